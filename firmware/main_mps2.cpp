@@ -1,0 +1,32 @@
+// The drive node on an Arm MPS2 board: nothing but the wiring.
+
+#include FXDYN_TABLES_HEADER
+
+#include "firmware/drive_node.hpp"
+#include "hal/mps2/systick.hpp"
+#include "hal/mps2/uart.hpp"
+
+namespace {
+constinit fxdyn::hal::mps2::Uart uart;
+
+/// The page as the flash holds it: hides from the compiler that it knows the values, since tables can be reflashed
+/// alone.
+const auto& tables_in_flash() {
+  const auto* page = &fxdyn::tables::page;
+  asm volatile("" : "+r"(page));
+  return *page;
+}
+}  // namespace
+
+extern "C" void uart0_receive_handler() { uart.on_receive(); }
+
+int main() {
+  const auto& page = tables_in_flash();
+  uart.start();
+  fxdyn::hal::mps2::SysTick counter;
+  static fxdyn::DriveNode<fxdyn::tables::Model, fxdyn::hal::mps2::Uart, fxdyn::hal::mps2::SysTick> node(
+      uart, counter, page.parameters, {page.header.layout_hash, page.header.crc32, fxdyn::page_is_valid(page)});
+  for (;;) {
+    if (!node.poll()) uart.wait();
+  }
+}

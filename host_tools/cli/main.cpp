@@ -1,0 +1,128 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "host_tools/error.hpp"
+#include "host_tools/model/effects.hpp"
+#include "host_tools/pipeline/pipeline.hpp"
+#include "host_tools/report/report.hpp"
+#include "host_tools/simulate/simulate.hpp"
+#include "host_tools/version.hpp"
+
+namespace {
+
+using namespace fxdyn;
+
+void print_effects(bool as_json) {
+  nlohmann::json list = nlohmann::json::array();
+  Catalogue::for_each([&]<class E>() {
+    nlohmann::json parameters = nlohmann::json::array();
+    const auto add = [&](const auto& infos, const char* kind) {
+      for (const ParameterInfo& p : infos) {
+        parameters.push_back({{"name", p.name},
+                              {"kind", kind},
+                              {"unit", p.unit},
+                              {"unit_prismatic", p.unit_prismatic},
+                              {"lower", p.lower},
+                              {"upper", p.upper},
+                              {"source", p.source}});
+      }
+    };
+    add(E::shape, "shape");
+    add(E::linear, "linear");
+    list.push_back({{"effect", E::name}, {"equation", E::equation}, {"side", "joint"}, {"parameters", parameters}});
+  });
+  if (as_json) {
+    fmt::print("{}\n", list.dump(1));
+    return;
+  }
+  for (const auto& effect : list) {
+    fmt::print("{:<16} tau = {}\n", effect["effect"].get<std::string>(), effect["equation"].get<std::string>());
+    for (const auto& p : effect["parameters"]) {
+      fmt::print("{:<16}   {} [{}] ({})\n", "", p["name"].get<std::string>(), p["unit"].get<std::string>(), p["source"].get<std::string>());
+    }
+  }
+}
+
+int run(int argc, char** argv) {
+  CLI::App app{"fxdyn: from a robot's measured log to torque feedforward on its drive controllers.\n"
+               "Example: fxdyn run robot.toml --out out/robot"};
+  app.set_version_flag("--version", version);
+  app.require_subcommand(1);
+
+  std::string project, out, scenario, model, log, image, numbers = "real";
+  bool as_json = false;
+  Eigen::Index ticks = 5000;
+  const auto stage = [&](const char* name, const char* what) {
+    CLI::App* verb = app.add_subcommand(name, fmt::format("{}\nExample: fxdyn {} robot.toml --out out/robot", what, name));
+    verb->add_option("PROJECT", project, "project file (TOML)")->required();
+    verb->add_option("--out", out, "directory for the results")->required();
+    return verb;
+  };
+  const CLI::App* run_verb = stage("run", "identify, train, export and report in one go.");
+  const CLI::App* identify_verb = stage("identify", "Structure and friction from the train logs: model.json, metrics.json.");
+  const CLI::App* train_verb = stage("train", "Fit a Broad Learning System on what is left; keep it where validation improves.");
+  const CLI::App* export_verb = stage("export", "Choose fixed-point formats, write tables.hpp, tables.bin, export.json.");
+  const CLI::App* report_verb = stage("report", "Draw report.html from what the other stages wrote.");
+  CLI::App* replay_verb = stage("replay", "Stream the held-out logs to a firmware image in QEMU and compare bit for bit: replay.json.");
+  replay_verb->add_option("--image", image, "firmware image (.elf) made by toolchains/build_image.sh")->required();
+  replay_verb->add_option("--ticks", ticks, "at most this many ticks of each log")->capture_default_str();
+
+  CLI::App* simulate_verb = app.add_subcommand("simulate", "Make logs from a scenario.\nExample: fxdyn simulate scenario.toml --out out/logs");
+  simulate_verb->add_option("SCENARIO", scenario, "scenario file (TOML)")->required();
+  simulate_verb->add_option("--out", out, "directory for the logs")->required();
+  CLI::App* predict_verb = app.add_subcommand(
+      "predict", "Torque of a model over a log: CSV and metrics.json.\nExample: fxdyn predict --model out/robot/model.json --log run.csv --out out/prediction");
+  predict_verb->add_option("--model", model, "model.json")->required();
+  predict_verb->add_option("--log", log, "log (CSV); without torque there are no metrics")->required();
+  predict_verb->add_option("--numbers", numbers, "real (double) or fixed (as the firmware computes)")
+      ->check(CLI::IsMember({"real", "fixed"}))
+      ->capture_default_str();
+  predict_verb->add_option("--out", out, "directory for the prediction")->required();
+  CLI::App* effects_verb = app.add_subcommand("effects", "List the effects that the model knows.\nExample: fxdyn effects --json");
+  effects_verb->add_flag("--json", as_json, "for machines");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  if (*effects_verb) {
+    print_effects(as_json);
+  } else if (*simulate_verb) {
+    for (const auto& file : simulate(scenario, out)) fmt::print("{}\n", file.string());
+  } else if (*predict_verb) {
+    predict_log(model, log, numbers == "fixed", out);
+    fmt::print("prediction in {}\n", out);
+  } else {
+    Pipeline pipeline(project, out);
+    if (*run_verb) pipeline.run();
+    if (*identify_verb) pipeline.identify();
+    if (*train_verb) pipeline.train();
+    if (*export_verb) pipeline.export_tables();
+    if (*report_verb) pipeline.report();
+    if (*replay_verb && !replay(pipeline, image, ticks)) {
+      throw DataError(fmt::format("firmware and host differ: see {}", (pipeline.directory() / "replay.json").string()));
+    }
+    fmt::print("{}", summary_table(pipeline.directory()));
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const fxdyn::InputError& error) {
+    fmt::print(stderr, "fxdyn: {}\n", error.what());
+    return 2;
+  } catch (const fxdyn::DataError& error) {
+    fmt::print(stderr, "fxdyn: {}\n", error.what());
+    return 1;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "fxdyn: internal error: {}\n", error.what());
+    return 2;
+  }
+}

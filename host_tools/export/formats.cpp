@@ -1,0 +1,162 @@
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "host_tools/error.hpp"
+#include "host_tools/export/export.hpp"
+#include "host_tools/files.hpp"
+#include "host_tools/model/effects.hpp"
+#include "host_tools/random.hpp"
+
+namespace fxdyn {
+namespace {
+
+/// Largest number of fractional bits with which +-range fits into `width` bits and a sign.
+int fitting_bits(double range, int width) { return width - static_cast<int>(std::ceil(std::log2(std::max(range, 1e-9)))); }
+
+Ranges observe(const IdentifiedModel& model, const std::vector<TickStates>& states) {
+  Ranges ranges;
+  current_ranges = &ranges;
+  Evaluator<ObservedNumbers> evaluator(model, model.tick_s);
+  const std::size_t n = model.robot.size();
+  std::vector<JointState<ObservedNumbers>> state(n);
+  Saturations ignored;
+  for (const TickStates& log : states) {
+    evaluator.reset();
+    for (Eigen::Index k = 0; k < log.t.size(); ++k) {
+      for (std::size_t j = 0; j < n; ++j) {
+        const auto c = static_cast<Eigen::Index>(j);
+        state[j] = {{log.q(k, c)}, {log.dq(k, c)}, {log.ddq(k, c)}};
+      }
+      evaluator.tick(state, ignored);
+    }
+  }
+  Random random(1);
+  for (int k = 0; k < 4000; ++k) {
+    for (std::size_t j = 0; j < n; ++j) {
+      const JointFit& joint = model.joints[j];
+      // Velocity and acceleration at their limits with either sign: the extremes lie at corners.
+      const double dq = (random.uniform() < 0.5 ? -1 : 1) * joint.dq_limit, ddq = (random.uniform() < 0.5 ? -1 : 1) * joint.ddq_limit;
+      state[j] = {{random.uniform(joint.q_lower, joint.q_upper)}, {dq}, {ddq}};
+    }
+    evaluator.tick(state, ignored);
+  }
+  current_ranges = nullptr;
+  return ranges;
+}
+
+}  // namespace
+
+Formats choose_formats(const IdentifiedModel& model, const std::vector<TickStates>& states) {
+  const Ranges ranges = observe(model, states);
+  Formats formats;
+  for (std::size_t i = 0; i < quantity_count; ++i) {
+    formats.quantity[i] = std::min(30, fitting_bits(2 * ranges.number[i], 31));
+  }
+  formats[Quantity::unit] = unit_bits;
+  formats[Quantity::argument] = argument_bits;
+  formats[Quantity::ratio] = ratio_bits;
+  // What align() and narrow() need (model/rigid_body.hpp): products at least as fine as what they are added to.
+  const auto at_most = [&](Quantity quantity, int bits) { formats[quantity] = std::min(formats[quantity], bits); };
+  at_most(Quantity::acceleration, 2 * formats[Quantity::velocity]);
+  at_most(Quantity::linear_acceleration, formats[Quantity::acceleration] + formats[Quantity::length]);
+  at_most(Quantity::torque, formats[Quantity::length] + formats[Quantity::force]);
+
+  const int a = formats[Quantity::linear_acceleration], w = formats[Quantity::acceleration];
+  const auto sum_bits = [](double largest) { return fitting_bits(8 * largest, 62); };
+  formats.force_sum = std::min({fitting_bits(ranges.mass, 31) + a, fitting_bits(ranges.first_moment, 31) + w,
+                                fitting_bits(ranges.second_moment, 31) + 2 * w - a, sum_bits(ranges[Quantity::force]),
+                                sum_bits(ranges[Quantity::torque]) + w - a});
+
+  // Every partial sum of a joint's contributions, bounded by the sum of the magnitudes.
+  double torque_sum = 0;
+  for (const JointFit& joint : model.joints) {
+    double sum = ranges[Quantity::torque];
+    for (const EffectFit& fit : joint.effects) {
+      const EffectInfo& info = *find_effect(fit.effect);
+      for (std::size_t i = 0; i < fit.linear.size(); ++i) {
+        sum += std::fabs(fit.linear[i]) * std::ldexp(1.0, 31 - formats[info.linear[i].quantity]);
+      }
+    }
+    if (joint.bls) sum += joint.bls->coefficients.cwiseAbs().sum() * 16;
+    torque_sum = std::max(torque_sum, sum);
+  }
+  formats.torque_sum = fitting_bits(torque_sum, 62);
+  for (std::size_t i = 0; i < quantity_count; ++i) {
+    if (ranges.coefficient[i] > 0) {
+      formats.torque_sum = std::min(formats.torque_sum, fitting_bits(ranges.coefficient[i], 31) + formats.quantity[i]);
+    }
+  }
+  if (formats.torque_sum < formats[Quantity::torque]) {
+    throw DataError("the joints' coefficients differ too much in size for one sum: leave out the joint's BLS or raise train.ridge");
+  }
+  return formats;
+}
+
+nlohmann::json formats_json(const Formats& formats) {
+  nlohmann::json out;
+  for (std::size_t i = 0; i < quantity_count; ++i) out[std::string(quantity_names[i])] = formats.quantity[i];
+  out["force_sum"] = formats.force_sum;
+  out["torque_sum"] = formats.torque_sum;
+  return out;
+}
+
+Formats read_formats(const std::filesystem::path& export_json) {
+  try {
+    const auto j = nlohmann::json::parse(read_file(export_json)).at("formats");
+    Formats formats;
+    for (std::size_t i = 0; i < quantity_count; ++i) formats.quantity[i] = j.at(std::string(quantity_names[i]));
+    formats.force_sum = j.at("force_sum");
+    formats.torque_sum = j.at("torque_sum");
+    return formats;
+  } catch (const nlohmann::json::exception& error) {
+    throw InputError(fmt::format("{}: not a valid export: {}; make it anew with `fxdyn export`", export_json.string(), error.what()));
+  }
+}
+
+TickStates at_ticks(const ProcessedLog& log, double tick_s) {
+  const double from = log.t[log.first], to = log.t[log.last - 1];
+  const auto ticks = static_cast<Eigen::Index>(std::floor((to - from) / tick_s + 1e-9)) + 1;
+  TickStates out{log.name, Eigen::VectorXd(ticks), Eigen::MatrixXd(ticks, log.q.cols()), Eigen::MatrixXd(ticks, log.q.cols()),
+                 Eigen::MatrixXd(ticks, log.q.cols())};
+  for (Eigen::Index k = 0; k < ticks; ++k) {
+    const double t = from + tick_s * static_cast<double>(k);
+    const double place = (t - from) / log.step_s;
+    const auto i = std::min(log.first + static_cast<Eigen::Index>(place + 1e-9), log.last - 2);
+    const double share = std::clamp((t - log.t[i]) / log.step_s, 0.0, 1.0);
+    out.t[k] = t;
+    const auto blend = [&](const Eigen::MatrixXd& m) { return ((1 - share) * m.row(i) + share * m.row(i + 1)).eval(); };
+    out.q.row(k) = blend(log.q);
+    out.dq.row(k) = blend(log.dq);
+    out.ddq.row(k) = blend(log.ddq);
+  }
+  return out;
+}
+
+TickStates perturbed(const TickStates& states, const IdentifiedModel& model, std::uint64_t seed) {
+  TickStates out = states;
+  out.name += " (perturbed)";
+  Random random(seed);
+  for (Eigen::Index k = 0; k < out.t.size(); ++k) {
+    for (Eigen::Index j = 0; j < out.q.cols(); ++j) {
+      const JointFit& joint = model.joints[static_cast<std::size_t>(j)];
+      const double spike = random.uniform() < 0.01 ? 200 : 1;
+      out.q(k, j) += 0.01 * spike * (joint.q_upper - joint.q_lower) * random.normal();
+      out.dq(k, j) += 0.01 * spike * joint.dq_limit * random.normal();
+      out.ddq(k, j) += 0.01 * spike * joint.ddq_limit * random.normal();
+    }
+  }
+  return out;
+}
+
+std::vector<std::int32_t> raw_states(const TickStates& states, Eigen::Index tick, const Formats& formats) {
+  std::vector<std::int32_t> words;
+  for (Eigen::Index j = 0; j < states.q.cols(); ++j) {
+    words.push_back(to_raw(states.q(tick, j), formats[Quantity::position]));
+    words.push_back(to_raw(states.dq(tick, j), formats[Quantity::velocity]));
+    words.push_back(to_raw(states.ddq(tick, j), formats[Quantity::acceleration]));
+  }
+  return words;
+}
+
+}  // namespace fxdyn

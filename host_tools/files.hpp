@@ -1,0 +1,19 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace fxdyn {
+
+/// @throws InputError if the file can't be read.
+std::string read_file(const std::filesystem::path& file);
+
+/// Writes to a temporary file beside it and renames: a reader sees the old content or the new, never half of it.
+/// Makes the directory where it is missing.
+void write_file(const std::filesystem::path& file, std::string_view content);
+
+/// FNV-1a, 64 bits, as 16 hex digits: tells whether a file is still the one a model was made from.
+std::string hash_of(std::string_view content);
+
+}  // namespace fxdyn

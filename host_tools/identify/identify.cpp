@@ -1,0 +1,210 @@
+#include "host_tools/identify/identify.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "host_tools/error.hpp"
+#include "host_tools/files.hpp"
+#include "host_tools/parallel.hpp"
+
+namespace fxdyn {
+namespace {
+
+/// An effect must lower the joint's held-out error by this share to be kept.
+constexpr double worth_keeping = 0.02;
+
+std::vector<double> geometric(double from, double to, int count) {
+  std::vector<double> values;
+  for (int i = 0; i < count; ++i) values.push_back(from * std::pow(to / from, static_cast<double>(i) / (count - 1)));
+  return values;
+}
+
+struct Candidate {
+  JointFit design;
+  Judgement judgement;
+};
+
+/// The best of one shape parameter: a geometric grid, then two refinements around its best point.
+template <class Set>
+Candidate search(const Fitter& fitter, std::size_t joint, const JointFit& start, double from, double to, Set&& set) {
+  Candidate best{start, {}};
+  double best_value = from;
+  const auto attempt = [&](double value) {
+    JointFit design = start;
+    set(design, value);
+    const Judgement judgement = fitter.held_out_with(joint, design, {0.0})[0];
+    if (judgement.rmse < best.judgement.rmse) {
+      best = {design, judgement};
+      best_value = value;
+    }
+  };
+  constexpr int points = 12;
+  for (const double value : geometric(from, to, points)) attempt(value);
+  double step = std::pow(to / from, 0.5 / (points - 1));
+  for (int round = 0; round < 2; ++round, step = std::sqrt(step)) {
+    const double centre = best_value;
+    attempt(std::max(from, centre / step));
+    attempt(std::min(to, centre * step));
+  }
+  return best;
+}
+
+struct Scales {
+  double velocity, range;
+};
+
+Candidate search_width(const Fitter& fitter, std::size_t joint, const Scales& scales) {
+  return search(fitter, joint, fitter.design(joint), 1e-4 * scales.velocity, 0.3 * scales.velocity,
+                [](JointFit& design, double value) { design.sign_width = value; });
+}
+
+/// The joint's design with the effect added, at its best shape.
+Candidate search_effect(const Fitter& fitter, std::size_t joint, std::string_view effect, const Scales& scales) {
+  JointFit design = fitter.design(joint);
+  const EffectInfo& info = *find_effect(effect);
+  EffectFit fit;
+  fit.effect = effect;
+  fit.shape.resize(info.shape.size());
+  design.effects.push_back(fit);
+  if (info.shape.empty()) return {design, fitter.held_out_with(joint, design, {0.0})[0]};
+  // Every shape of the catalogue so far is one velocity or one distance. Stribeck's is low by nature: a wide one is only
+  // a second viscous term.
+  const bool velocity = info.shape[0].quantity == Quantity::inverse_velocity;
+  const double from = velocity ? 3e-3 * scales.velocity : 1e-6 * scales.range;
+  const double to = velocity ? 0.15 * scales.velocity : 0.1 * scales.range;
+  return search(fitter, joint, design, from, to, [](JointFit& d, double value) { d.effects.back().shape[0] = value; });
+}
+
+}  // namespace
+
+GateData read_gate_data(const Project& project, const std::filesystem::path& directory) {
+  std::vector<Log> logs;
+  for (const Role role : {Role::train, Role::validate}) {
+    for (Log& log : read_logs(project, role, directory)) logs.push_back(std::move(log));
+  }
+  GateData data;
+  data.filter = choose_filter(logs, project.signals);
+  const auto n = static_cast<Eigen::Index>(project.robot.size());
+  data.largest_torque = data.dq = data.ddq = Eigen::VectorXd::Zero(n);
+  data.q_lower = Eigen::VectorXd::Constant(n, 1e300);
+  data.q_upper = -data.q_lower;
+  for (const Log& log : logs) {
+    ProcessedLog processed = process(log, data.filter);
+    data.largest_torque = data.largest_torque.cwiseMax(log.tau.cwiseAbs().colwise().maxCoeff().transpose());
+    const auto inside = [&](const Eigen::MatrixXd& m) { return m.middleRows(processed.first, processed.last - processed.first); };
+    data.q_lower = data.q_lower.cwiseMin(inside(processed.q).colwise().minCoeff().transpose());
+    data.q_upper = data.q_upper.cwiseMax(inside(processed.q).colwise().maxCoeff().transpose());
+    data.dq = data.dq.cwiseMax(inside(processed.dq).cwiseAbs().colwise().maxCoeff().transpose());
+    data.ddq = data.ddq.cwiseMax(inside(processed.ddq).cwiseAbs().colwise().maxCoeff().transpose());
+    data.references.push_back({log.file.filename().string(), to_string(log.role), hash_of(read_file(log.file)), log.from_s, log.to_s});
+    data.logs.push_back(std::move(processed));
+  }
+  return data;
+}
+
+std::vector<JointFit> initial_joints(const Project& project, const GateData& data) {
+  constexpr double margin = 1.2;
+  std::vector<JointFit> joints(project.robot.size());
+  const LimitSettings& given = project.limits;
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    const auto k = static_cast<Eigen::Index>(j);
+    JointFit& joint = joints[j];
+    const std::optional<Limits>& urdf = project.robot.joints[j].limits;
+    // A URDF's placeholder limits (1e6 N) would cost resolution for ranges that never occur.
+    const auto choose = [&](const std::vector<double>& set, double from_urdf, double measured) {
+      if (!set.empty()) return set[j];
+      return urdf && from_urdf > 0 && from_urdf <= 10 * measured ? std::max(from_urdf, measured) : margin * measured;
+    };
+    joint.rated_torque = project.rated_torque.empty() ? data.largest_torque[k] : project.rated_torque[j];
+    joint.dq_limit = choose(given.velocity, urdf ? urdf->velocity : 0, data.dq[k]);
+    joint.ddq_limit = choose(given.acceleration, 0, data.ddq[k]);
+    joint.tau_limit = choose(given.torque, urdf ? urdf->effort : 0, std::max(data.largest_torque[k], joint.rated_torque));
+    if (!given.position.empty()) {
+      joint.q_lower = given.position[j][0];
+      joint.q_upper = given.position[j][1];
+    } else {
+      const double middle = (data.q_lower[k] + data.q_upper[k]) / 2, half = (data.q_upper[k] - data.q_lower[k]) / 2;
+      joint.q_lower = middle - margin * half;
+      joint.q_upper = middle + margin * half;
+      if (urdf && urdf->upper > urdf->lower && urdf->upper - urdf->lower <= 20 * half) {
+        joint.q_lower = std::min(urdf->lower, data.q_lower[k]);
+        joint.q_upper = std::max(urdf->upper, data.q_upper[k]);
+      }
+    }
+    joint.sign_width = 0.01 * data.dq[k];
+  }
+  return joints;
+}
+
+std::unique_ptr<Fitter> identify(const Project& project, const GateData& data, Progress& progress) {
+  if (project.identify.method == "irls" || project.identify.method == "rls") {
+    throw InputError(fmt::format("{}: identify.method = \"{}\" is not built yet; use \"wls\" or \"ls\"", project.file.string(), project.identify.method));
+  }
+  const std::vector<std::string> nominal = project.identify.effects.value_or(
+      std::vector<std::string>{"viscous", "coulomb", "offset", "rotor_inertia"});
+  const std::vector<std::string_view> optional =
+      project.identify.effects ? std::vector<std::string_view>{} : std::vector<std::string_view>{"presliding", "stribeck"};
+
+  const std::size_t n = project.robot.size();
+  const DhChain chain = to_dh(project.robot);
+  const BaseSet base = find_base(chain);
+  std::vector<JointFit> design = initial_joints(project, data);
+  std::vector<Scales> scales;
+  for (std::size_t j = 0; j < n; ++j) {
+    const auto k = static_cast<Eigen::Index>(j);
+    scales.push_back({data.dq[k], data.q_upper[k] - data.q_lower[k]});
+    for (const std::string& effect : nominal) {
+      if (effect == "rotor_inertia" && rotor_inertia_is_absorbed(chain, base, k)) continue;
+      if (find_effect(effect)->shape.empty()) {
+        EffectFit fit;
+        fit.effect = effect;
+        design[j].effects.push_back(fit);
+      }
+    }
+  }
+  progress.stage("building the regressor", 1);
+  auto fitter = std::make_unique<Fitter>(project.robot, data.logs, design);
+  const bool weighted = project.identify.method != "ls";
+  if (weighted) fitter->reweight();
+
+  // All joints at once from the same state, then accepted together: the outcome does not depend on the thread count.
+  const auto improve = [&](const std::string& stage, bool always, auto&& propose) {
+    progress.stage(stage, n);
+    const std::vector<Judgement> before = fitter->held_out();
+    std::vector<Candidate> best(n);
+    parallel_for(n, [&](std::size_t j) {
+      best[j] = propose(j);
+      progress.step();
+    });
+    for (std::size_t j = 0; j < n; ++j) {
+      if (always || best[j].judgement.beats(before[j], worth_keeping)) fitter->set_design(j, best[j].design);
+    }
+    if (weighted) fitter->reweight();
+  };
+  improve("width of the Coulomb sign", true, [&](std::size_t j) { return search_width(*fitter, j, scales[j]); });
+  for (const std::string& effect : nominal) {
+    if (find_effect(effect)->shape.empty()) continue;
+    improve("shape of " + effect, true, [&](std::size_t j) { return search_effect(*fitter, j, effect, scales[j]); });
+  }
+  for (const std::string_view effect : optional) {
+    improve("is there " + std::string(effect) + "?", false,
+            [&](std::size_t j) { return search_effect(*fitter, j, effect, scales[j]); });
+  }
+  progress.done();
+  return fitter;
+}
+
+IdentifiedModel finish_model(const Fitter& fitter, const Project& project, const GateData& data) {
+  IdentifiedModel model = fitter.to_model(fitter.fit());
+  model.filter = data.filter;
+  model.format = project.logs.front().format;
+  model.tick_s = project.target.tick_s;
+  model.seed = project.train.seed;
+  model.project = project.file.filename().string();
+  model.project_hash = hash_of(read_file(project.file));
+  model.logs = data.references;
+  return model;
+}
+
+}  // namespace fxdyn

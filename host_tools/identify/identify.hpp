@@ -1,0 +1,31 @@
+#pragma once
+
+#include <memory>
+
+#include "host_tools/identify/fitter.hpp"
+#include "host_tools/progress.hpp"
+
+namespace fxdyn {
+
+/// The logs that decide: train and validate, filtered; test is not read here.
+struct GateData {
+  FilterFit filter;
+  std::vector<ProcessedLog> logs;
+  std::vector<LogReference> references;
+  Eigen::VectorXd largest_torque;             ///< raw, over the train logs [N*m | N]
+  Eigen::VectorXd q_lower, q_upper, dq, ddq;  ///< largest of the filtered motion
+};
+GateData read_gate_data(const Project& project, const std::filesystem::path& directory);
+
+/// Limits and ratings of each joint: the project's, else 1.2 times the largest in the logs; URDF limits where the logs come
+/// within a factor of ten of them.
+std::vector<JointFit> initial_joints(const Project& project, const GateData& data);
+
+/// Structure and friction: widths and shapes searched on the gate data, coefficients by (weighted) least squares. Returns
+/// the fitter with the chosen designs.
+std::unique_ptr<Fitter> identify(const Project& project, const GateData& data, Progress& progress);
+
+/// The fitter's model with everything that model.json records.
+IdentifiedModel finish_model(const Fitter& fitter, const Project& project, const GateData& data);
+
+}  // namespace fxdyn

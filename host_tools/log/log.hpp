@@ -1,0 +1,75 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace fxdyn {
+
+/// Which data decides what: see docs/guide. `baseline` serves `diagnose` only.
+enum class Role { baseline, train, validate, test };
+std::string to_string(Role role);
+
+/// A measured or simulated log on a uniform time grid, SI units, joint side of the gearbox. Matrices are samples x joints.
+/// Signals that the file does not have are empty (0 x 0).
+struct Log {
+  std::filesystem::path file;
+  Role role = Role::train;
+  double from_s = 0, to_s = 0;  ///< the half-open window that was cut out
+  double step_s = 0;            ///< sampling interval
+  bool resampled = false;       ///< the file's time stamps were irregular
+  Eigen::VectorXd t;            ///< [s]
+  Eigen::MatrixXd q, dq, ddq, tau, qlink;
+  Eigen::Index samples() const { return t.size(); }
+  Eigen::Index joints() const { return q.cols(); }
+};
+
+/// How to read a log; the defaults are the file format of the design (t, q1.., dq1.., ddq1.., tau1.., qlink1..).
+struct LogFormat {
+  std::map<std::string, std::string> columns;  ///< signal (t q dq ddq tau qlink temp) -> column prefix in the file
+  std::vector<double> torque_gain;             ///< measured column -> N*m; empty: 1
+};
+
+/// Reads `joints` joints. Irregular stamps (jitter > 1 % of the median step) are resampled to the median step by
+/// monotone-safe linear interpolation and `resampled` is set; a gap > 10 steps is an error. Continuous revolute joints
+/// are unwrapped where q jumps by about 2 pi between samples.
+/// @throws InputError naming file, line and column: missing column (names the nearest existing one), NaN or a non-number,
+/// time going backwards or standing still, a row with another number of fields, fewer than 2 rows; revolute q that looks
+/// like degrees (says "looks like degrees, multiply by pi/180"), window outside the file.
+/// `torque_required`: predict reads logs without torque.
+Log read_log(const std::filesystem::path& file, std::size_t joints, const std::vector<bool>& revolute, const LogFormat& format,
+             std::optional<double> from_s, std::optional<double> to_s, bool torque_required = true);
+
+/// Writes t, q, dq?, ddq?, tau? with 17 significant digits (to a temporary file, then renamed).
+void write_log(const std::filesystem::path& file, const Log& log);
+
+/// Zero-phase low-pass Butterworth filter: forward and backward over each column, with odd reflection at both ends and
+/// steady-state initial conditions. `order` is the order of one pass (the baseline of shared data: 4).
+class ZeroPhaseFilter {
+ public:
+  /// A cut-off at or above 0.95 of the Nyquist frequency, or <= 0, makes it the identity.
+  ZeroPhaseFilter(double cutoff_hz, double step_s, int order = 4);
+  Eigen::MatrixXd apply(const Eigen::Ref<const Eigen::MatrixXd>& columns) const;
+  /// Samples at either end that the transient of the filter can reach.
+  Eigen::Index edge_samples() const;
+  double cutoff_hz() const { return cutoff_hz_; }
+
+ private:
+  struct Section {
+    double b0, b1, b2, a1, a2;
+  };
+  double cutoff_hz_;
+  double step_s_;
+  std::vector<Section> sections_;
+};
+
+/// d/dt of each column by central differences of sixth order (one-sided towards the ends), error O(h^6).
+Eigen::MatrixXd differentiate(const Eigen::Ref<const Eigen::MatrixXd>& columns, double step_s);
+/// d^2/dt^2, likewise.
+Eigen::MatrixXd differentiate_twice(const Eigen::Ref<const Eigen::MatrixXd>& columns, double step_s);
+
+}  // namespace fxdyn

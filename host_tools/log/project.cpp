@@ -1,0 +1,331 @@
+#include "host_tools/log/project.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <numbers>
+
+#include "host_tools/error.hpp"
+#include "host_tools/model/effects.hpp"
+#include "host_tools/simulate/simulate.hpp"
+#include "host_tools/toml.hpp"
+
+namespace fxdyn {
+namespace {
+
+namespace fs = std::filesystem;
+
+using toml_input::as_boolean;
+using toml_input::as_count;
+using toml_input::as_number;
+using toml_input::as_positive;
+using toml_input::as_string;
+using toml_input::Names;
+using toml_input::Place;
+using toml_input::set;
+using toml_input::Table;
+using toml_input::Value;
+
+Names known_effects() {
+  Names names;
+  for (const std::string_view name : effect_names()) names.emplace_back(name);
+  return names;
+}
+
+const Names signal_names{"t", "q", "dq", "ddq", "tau", "qlink", "temp"};
+const Names role_names{"baseline", "train", "validate", "test"};
+const Names method_names{"ls", "wls", "irls", "rls"};
+const Names input_names{"physical", "state"};
+const Names board_names{"host",      "mps2-an385", "mps2-an386",    "mps2-an500", "mps2-an505",
+                        "zynqmp_r5", "microbit",   "netduinoplus2", "stm32g474"};
+
+class ProjectReader {
+ public:
+  explicit ProjectReader(const fs::path& file) : file_(file.string()), root_(toml_input::parse(file)) {
+    project_.file = fs::absolute(file);
+  }
+
+  Project read() {
+    Table root({file_, "", 1}, root_);
+    read_robot(Table(root.need("robot", "add a table [robot] with urdf = \"...\"")));
+    if (auto table = root.table("signals")) read_signals(*table);
+    if (auto table = root.table("limits")) read_limits(*table);
+    if (auto table = root.table("identify")) read_identify(*table);
+    if (auto table = root.table("diagnose")) read_diagnose(*table);
+    if (auto table = root.table("train")) read_train(*table);
+    if (auto table = root.table("excite")) read_excite(*table);
+    if (auto table = root.table("target")) read_target(*table);
+    const auto logs = root.find("log");
+    root.finish();
+    if (logs) {
+      for (const Value& value : logs->items()) read_log_entry(Table(value));
+    }
+    check_logs();
+    return project_;
+  }
+
+ private:
+  std::size_t joints() const { return project_.robot.size(); }
+
+  /// "${NAME:-default}/rest": the environment variable, else the default.
+  static std::string expand(const Value& value) {
+    std::string text = value.string();
+    const std::size_t from = text.find("${");
+    if (from == std::string::npos) return text;
+    const std::size_t to = text.find('}', from);
+    if (to == std::string::npos) value.place().fail("'${' without '}'");
+    const std::string inner = text.substr(from + 2, to - from - 2);
+    const std::size_t split = inner.find(":-");
+    const char* set = std::getenv(inner.substr(0, split).c_str());
+    if (set == nullptr && split == std::string::npos) {
+      value.place().fail(fmt::format("environment variable {} is not set", inner));
+    }
+    return text.replace(from, to - from + 1, set != nullptr ? set : inner.substr(split + 2));
+  }
+
+  fs::path path(const Value& value) const {
+    const fs::path path = (project_.file.parent_path() / expand(value)).lexically_normal();
+    if (!fs::is_regular_file(path)) {
+      value.place().fail(fmt::format("no file '{}'; paths are relative to the project file", path.string()));
+    }
+    return path;
+  }
+
+  void read_robot(Table table) {
+    project_.urdf = path(table.need("urdf", "add urdf = \"robot.urdf\""));
+    project_.robot = read_urdf(project_.urdf);
+    if (const auto gravity = table.find("gravity")) {
+      const std::vector<double> g = gravity->numbers(3, "x, y, z in the base frame");
+      project_.robot.gravity = Eigen::Vector3d(g[0], g[1], g[2]);
+      // Zero is legitimate (one horizontal axis); thousands are mm/s^2.
+      if (project_.robot.gravity.norm() > 30) gravity->place().fail("expected m/s^2, as in [0.0, 0.0, -9.81]");
+    }
+    set(project_.rated_torque, table.find("rated_torque"),
+        [this](const Value& v) { return v.positives(joints(), per_joint()); });
+    table.finish();
+  }
+
+  std::string per_joint() const { return fmt::format("one a joint of {}", project_.urdf.filename().string()); }
+
+  void read_limits(Table& table) {
+    if (const auto value = table.find("position")) {
+      for (const Value& item : value->items()) {
+        const std::vector<double> range = item.numbers(2, "lower, upper");
+        if (!(range[0] < range[1])) item.place().fail("lower limit is not below the upper one");
+        project_.limits.position.push_back({range[0], range[1]});
+      }
+      value->expect(project_.limits.position.size(), joints(), per_joint());
+    }
+    const auto per = [this](const Value& v) { return v.positives(joints(), per_joint()); };
+    set(project_.limits.velocity, table.find("velocity"), per);
+    set(project_.limits.acceleration, table.find("acceleration"), per);
+    set(project_.limits.torque, table.find("torque"), per);
+    if (const auto box = table.find("box")) {
+      box->expect(box->items().size(), 2, "two corners");
+      for (const Value& corner : box->items()) corner.numbers(3, "x, y, z");
+    }
+    table.finish();
+  }
+
+  LogFormat read_format(Table& table, LogFormat format) {
+    if (auto columns = table.table("columns")) {
+      for (const std::string& signal : signal_names) {
+        if (const auto value = columns->find(signal)) format.columns[signal] = value->string();
+      }
+      columns->finish();
+    }
+    set(format.torque_gain, table.find("torque_gain"),
+        [this](const Value& v) { return v.numbers(joints(), per_joint()); });
+    return format;
+  }
+
+  void read_signals(Table& table) {
+    set(project_.signals.position_cutoff_hz, table.find("position_cutoff_hz"), as_positive);
+    set(project_.signals.torque_cutoff_hz, table.find("torque_cutoff_hz"), as_positive);
+    if (const auto edge = table.find("edge_s")) {
+      if (edge->number() < 0) edge->place().fail("expected 0 or more");
+      project_.signals.edge_s = edge->number();
+    }
+    default_format_ = read_format(table, {});
+    table.finish();
+  }
+
+  void read_identify(Table& table) {
+    set(project_.identify.method, table.find("method"), [](const Value& v) { return v.name(method_names, "method"); });
+    if (const auto physical = table.find("physical")) physical->boolean();
+    if (const auto effects = table.find("effects")) {
+      Names names;
+      for (const Value& item : effects->items()) {
+        names.push_back(item.name(known_effects(), "effect"));
+      }
+      project_.identify.effects = names;
+    }
+    table.finish();
+  }
+
+  void read_diagnose(Table& table) {
+    if (const auto value = table.find("max_effects")) value->count(0);
+    table.finish();
+  }
+
+  void read_train(Table& table) {
+    TrainSettings& train = project_.train;
+    set(train.enabled, table.find("enabled"), as_boolean);
+    set(train.seed, table.find("seed"), [](const Value& v) { return static_cast<std::uint64_t>(v.integer(0)); });
+    set(train.inputs, table.find("inputs"), [](const Value& v) { return v.name(input_names, "inputs"); });
+    set(train.windows, table.find("windows"), as_count);
+    set(train.nodes, table.find("nodes"), as_count);
+    set(train.enhancement, table.find("enhancement"), as_count);
+    set(train.activation, table.find("activation"), as_string);
+    set(train.ridge, table.find("ridge"), as_positive);
+    if (auto pso = table.table("pso")) read_pso(*pso);
+    table.finish();
+  }
+
+  static void read_pso(Table& table) {
+    for (const char* key : {"particles", "iterations", "stall"}) {
+      if (const auto value = table.find(key)) value->count(1);
+    }
+    if (auto bounds = table.table("bounds")) {
+      for (const char* key : {"windows", "nodes", "enhancement", "ridge"}) {
+        if (const auto value = bounds->find(key)) value->numbers(2, "lower, upper");
+      }
+      bounds->finish();
+    }
+    table.finish();
+  }
+
+  static void read_excite(Table& table) {
+    if (const auto value = table.find("period_s")) value->positive();
+    for (const char* key : {"order", "trajectories"}) {
+      if (const auto value = table.find(key)) value->count(1);
+    }
+    table.find("noise");  // a number or one a joint
+    table.finish();
+  }
+
+  void read_target(Table& table) {
+    set(project_.target.board, table.find("board"), [](const Value& v) { return v.name(board_names, "board"); });
+    set(project_.target.tick_s, table.find("tick_s"), as_positive);
+    table.find("joints");  // "all" or a list
+    table.finish();
+  }
+
+  void read_log_entry(Table table) {
+    LogEntry entry;
+    entry.line = table.place().line;
+    const auto file = table.find("file"), scenario = table.find("scenario"), log = table.find("log");
+    if (file.has_value() == scenario.has_value())
+      table.place().fail("needs either file or scenario (with log = \"name\")");
+    if (file) {
+      entry.file = path(*file);
+      if (log) log->place().fail("belongs to a scenario; remove it");
+    } else {
+      entry.scenario = path(*scenario);
+      if (!log) scenario->place().fail("add log = \"name\": which of the scenario's logs");
+      entry.scenario_log = log->string();
+    }
+    const std::string role = table.need("role", "baseline, train, validate or test").name(role_names, "role");
+    entry.role = static_cast<Role>(std::find(role_names.begin(), role_names.end(), role) - role_names.begin());
+    set(entry.from_s, table.find("from_s"), as_number);
+    set(entry.to_s, table.find("to_s"), as_number);
+    if (entry.from_s && entry.to_s && !(*entry.from_s < *entry.to_s)) table.place().fail("from_s is not below to_s");
+    entry.format = read_format(table, default_format_);
+    if (auto payload = table.table("payload")) {
+      if (const auto mass = payload->find("mass"); mass && mass->number() < 0) mass->place().fail("expected 0 or more");
+      if (const auto com = payload->find("com")) com->numbers(3, "x, y, z");
+      payload->finish();
+    }
+    table.finish();
+    project_.logs.push_back(entry);
+  }
+
+  void check_logs() const {
+    if (!project_.has_role(Role::train)) {
+      throw InputError(file_ + ": no log to learn from; add a [[log]] with role = \"train\"");
+    }
+    const auto source = [](const LogEntry& e) {
+      return e.scenario ? e.scenario->string() + "/" + e.scenario_log : fs::weakly_canonical(e.file).string();
+    };
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < project_.logs.size(); ++i) {
+      for (std::size_t j = 0; j < i; ++j) {
+        const LogEntry &a = project_.logs[j], &b = project_.logs[i];
+        if (source(a) != source(b)) continue;
+        const double from = std::max(a.from_s.value_or(-infinity), b.from_s.value_or(-infinity));
+        const double to = std::min(a.to_s.value_or(infinity), b.to_s.value_or(infinity));
+        if (from < to) {
+          throw InputError(
+              fmt::format("{}:{}: overlaps the log in line {} (same file); separate them by from_s and to_s", file_,
+                          b.line, a.line));
+        }
+      }
+    }
+  }
+
+  std::string file_;
+  toml::table root_;
+  Project project_;
+  LogFormat default_format_;
+};
+
+/// The log of a scenario; simulated where it is missing or older than the scenario.
+fs::path simulated(const LogEntry& entry, const Project& project, const fs::path& directory) {
+  const fs::path folder = directory / "logs" / entry.scenario->stem();
+  const fs::path file = folder / (entry.scenario_log + ".csv");
+  const auto current = [&] {
+    return fs::exists(file) && fs::last_write_time(file) >= fs::last_write_time(*entry.scenario);
+  };
+  if (!current()) {
+    fs::create_directories(folder);
+    simulate(*entry.scenario, folder);
+  }
+  if (!fs::exists(file)) {
+    throw InputError(fmt::format("{}:{}: scenario {} has no log '{}'", project.file.string(), entry.line,
+                                 entry.scenario->string(), entry.scenario_log));
+  }
+  return file;
+}
+
+/// A joint with end stops can't turn far beyond them.
+void check_turns(const Log& log, const Robot& robot) {
+  for (std::size_t i = 0; i < robot.size(); ++i) {
+    const Joint& joint = robot.joints[i];
+    if (joint.type != JointType::revolute || joint.continuous || !joint.limits) continue;
+    const auto q = log.q.col(static_cast<Eigen::Index>(i));
+    const double range = q.maxCoeff() - q.minCoeff();
+    if (range < 4 * std::numbers::pi || range < 1.5 * (joint.limits->upper - joint.limits->lower)) continue;
+    throw InputError(
+        fmt::format("{}: q{} looks like degrees (range {:.3g}, joint '{}' has {:.3g} rad), multiply by pi/180",
+                    log.file.string(), i + 1, range, joint.name, joint.limits->upper - joint.limits->lower));
+  }
+}
+
+}  // namespace
+
+bool Project::has_role(Role role) const {
+  return std::any_of(logs.begin(), logs.end(), [role](const LogEntry& entry) { return entry.role == role; });
+}
+
+Project read_project(const fs::path& file) { return ProjectReader(file).read(); }
+
+std::vector<Log> read_logs(const Project& project, Role role, const fs::path& directory) {
+  std::vector<bool> revolute;
+  for (const Joint& joint : project.robot.joints) revolute.push_back(joint.type == JointType::revolute);
+  std::vector<Log> logs;
+  for (const LogEntry& entry : project.logs) {
+    if (entry.role != role) continue;
+    const fs::path file = entry.scenario ? simulated(entry, project, directory) : entry.file;
+    logs.push_back(read_log(file, project.robot.size(), revolute, entry.format, entry.from_s, entry.to_s));
+    logs.back().role = role;
+    check_turns(logs.back(), project.robot);
+  }
+  return logs;
+}
+
+}  // namespace fxdyn

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host_tools/log/log.hpp"
+#include "host_tools/robot/robot.hpp"
+
+namespace fxdyn {
+
+struct LogEntry {
+  std::filesystem::path file;                     ///< absolute; empty where a scenario makes it
+  std::optional<std::filesystem::path> scenario;  ///< simulated on first use into DIR/logs/<scenario name>/
+  std::string scenario_log;                       ///< which of its logs: <scenario_log>.csv
+  Role role = Role::train;
+  std::optional<double> from_s, to_s;
+  LogFormat format;
+  int line = 0;  ///< of the [[log]] in the project file
+};
+
+struct SignalSettings {
+  std::optional<double> position_cutoff_hz, torque_cutoff_hz;
+  std::optional<double> edge_s;  ///< dropped at both ends after filtering
+};
+
+struct IdentifySettings {
+  std::string method = "wls";  ///< ls | wls
+  std::optional<std::vector<std::string>> effects;
+};
+
+struct TrainSettings {
+  bool enabled = true;
+  std::uint64_t seed = 1;
+  std::string inputs = "physical";  ///< physical | state
+  std::optional<int> windows, nodes, enhancement;
+  std::string activation = "tanh";
+  std::optional<double> ridge;
+};
+
+struct TargetSettings {
+  std::string board = "mps2-an386";
+  double tick_s = 0.002;
+};
+
+struct LimitSettings {
+  std::vector<std::array<double, 2>> position;
+  std::vector<double> velocity, acceleration, torque;
+};
+
+/// A project file (TOML), see docs/guide/project.md. All paths are relative to it.
+struct Project {
+  std::filesystem::path file;
+  Robot robot;
+  std::filesystem::path urdf;
+  std::vector<double> rated_torque;  ///< may be empty
+  LimitSettings limits;              ///< each may be empty
+  std::vector<LogEntry> logs;
+  SignalSettings signals;
+  IdentifySettings identify;
+  TrainSettings train;
+  TargetSettings target;
+  bool has_role(Role role) const;
+};
+
+/// @throws InputError with file and line: not TOML, an unknown key (names the nearest known one), a wrong type, a vector
+/// whose length is not the number of joints, no train log, an unknown role, board, effect or method, overlapping windows
+/// of the same file whatever their roles, a missing file.
+Project read_project(const std::filesystem::path& file);
+
+/// The logs of the given role, read and checked against the robot. `directory`/logs receives simulated ones.
+std::vector<Log> read_logs(const Project& project, Role role, const std::filesystem::path& directory);
+
+}  // namespace fxdyn

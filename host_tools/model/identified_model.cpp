@@ -1,0 +1,253 @@
+#include "host_tools/model/identified_model.hpp"
+
+#include <fmt/format.h>
+
+#include "host_tools/error.hpp"
+#include "host_tools/files.hpp"
+#include "host_tools/model/effects.hpp"
+#include "model/broad_learning.hpp"
+#include "host_tools/version.hpp"
+
+namespace fxdyn {
+namespace {
+
+using nlohmann::json;
+
+json vector_json(const Eigen::VectorXd& v) { return std::vector<double>(v.data(), v.data() + v.size()); }
+Eigen::VectorXd to_vector(const json& j) {
+  const auto values = j.get<std::vector<double>>();
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+json matrix_json(const Eigen::MatrixXd& m) {
+  json rows = json::array();
+  for (Eigen::Index i = 0; i < m.rows(); ++i) rows.push_back(vector_json(m.row(i)));
+  return rows;
+}
+
+json pose_json(const Eigen::Isometry3d& pose) { return matrix_json(pose.matrix().topRows<3>()); }
+Eigen::Isometry3d to_pose(const json& j) {
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  for (int i = 0; i < 3; ++i) pose.matrix().row(i) = to_vector(j.at(static_cast<std::size_t>(i))).transpose();
+  return pose;
+}
+
+json robot_json(const Robot& robot) {
+  json joints = json::array();
+  for (std::size_t i = 0; i < robot.size(); ++i) {
+    const Joint& joint = robot.joints[i];
+    joints.push_back({{"joint", joint.name},
+                      {"index", i + 1},
+                      {"link", joint.link},
+                      {"type", joint.type == JointType::prismatic ? "prismatic" : (joint.continuous ? "continuous" : "revolute")},
+                      {"origin", pose_json(joint.origin)},
+                      {"axis", vector_json(joint.axis)}});
+  }
+  return {{"name", robot.name}, {"gravity", vector_json(robot.gravity)}, {"joints", joints}};
+}
+
+Robot to_robot(const json& j) {
+  Robot robot;
+  robot.name = j.at("name");
+  robot.gravity = to_vector(j.at("gravity"));
+  for (const json& entry : j.at("joints")) {
+    Joint joint;
+    joint.name = entry.at("joint");
+    joint.link = entry.at("link");
+    const std::string type = entry.at("type");
+    joint.type = type == "prismatic" ? JointType::prismatic : JointType::revolute;
+    joint.continuous = type == "continuous";
+    joint.origin = to_pose(entry.at("origin"));
+    joint.axis = to_vector(entry.at("axis"));
+    robot.joints.push_back(joint);
+  }
+  return robot;
+}
+
+json parameters_json(std::span<const ParameterInfo> infos, const std::vector<double>& values,
+                     const std::vector<double>& stds, bool prismatic) {
+  json list = json::array();
+  for (std::size_t i = 0; i < infos.size(); ++i) {
+    json entry = {{"name", infos[i].name}, {"value", values[i]}, {"unit", prismatic ? infos[i].unit_prismatic : infos[i].unit}};
+    if (i < stds.size() && stds[i] > 0) entry["std"] = stds[i];
+    list.push_back(entry);
+  }
+  return list;
+}
+
+json effect_json(const EffectFit& fit, double sign_width, bool prismatic) {
+  const EffectInfo* info = find_effect(fit.effect);
+  json parameters = parameters_json(info->shape, fit.shape, fit.shape_std, prismatic);
+  for (const json& entry : parameters_json(info->linear, fit.linear, fit.linear_std, prismatic)) parameters.push_back(entry);
+  if (fit.effect == "coulomb") {
+    parameters.push_back({{"name", "width"}, {"value", sign_width}, {"unit", prismatic ? "m/s" : "rad/s"}});
+  }
+  return {{"effect", fit.effect},
+          {"origin", fit.named ? "named" : "nominal"},
+          {"side", "joint"},
+          {"equation", info->equation},
+          {"parameters", parameters}};
+}
+
+EffectFit to_effect(const json& j) {
+  EffectFit fit;
+  fit.effect = j.at("effect");
+  fit.named = j.at("origin") == "named";
+  const EffectInfo* info = find_effect(fit.effect);
+  if (info == nullptr) throw InputError(fmt::format("unknown effect '{}': made by another version?", fit.effect));
+  std::size_t i = 0;
+  for (const json& p : j.at("parameters")) {
+    if (i < info->shape.size()) {
+      fit.shape.push_back(p.at("value"));
+    } else if (i < info->shape.size() + info->linear.size()) {
+      fit.linear.push_back(p.at("value"));
+      fit.linear_std.push_back(p.value("std", 0.0));
+    }
+    ++i;
+  }
+  if (fit.shape.size() != info->shape.size() || fit.linear.size() != info->linear.size()) {
+    throw InputError(fmt::format("effect '{}' has {} parameters, expected {}", fit.effect, i, info->shape.size() + info->linear.size()));
+  }
+  return fit;
+}
+
+json joint_json(const Robot& robot, std::size_t index, const JointFit& fit) {
+  const Joint& joint = robot.joints[index];
+  const bool prismatic = joint.type == JointType::prismatic;
+  json effects = json::array();
+  for (const EffectFit& effect : fit.effects) effects.push_back(effect_json(effect, fit.sign_width, prismatic));
+  json out = {{"joint", joint.name},
+              {"index", index + 1},
+              {"unit", joint.torque_unit()},
+              {"rated_torque", fit.rated_torque},
+              {"sign_width", fit.sign_width},
+              {"limits",
+               {{"position", {fit.q_lower, fit.q_upper}},
+                {"velocity", fit.dq_limit},
+                {"acceleration", fit.ddq_limit},
+                {"torque", fit.tau_limit}}},
+              {"effects", effects}};
+  if (fit.bls) {
+    out["bls"] = {{"inputs", "physical"},
+                  {"nodes", fit.bls->nodes()},
+                  {"reference_velocity", fit.bls->reference_velocity},
+                  {"distances", fit.bls->distances},
+                  {"ridge", fit.bls->ridge},
+                  {"weights", matrix_json(fit.bls->weights)},
+                  {"coefficients", vector_json(fit.bls->coefficients)}};
+  }
+  return out;
+}
+
+JointFit to_joint(const json& j) {
+  JointFit fit;
+  fit.rated_torque = j.at("rated_torque");
+  fit.sign_width = j.at("sign_width");
+  const json& limits = j.at("limits");
+  fit.q_lower = limits.at("position").at(0);
+  fit.q_upper = limits.at("position").at(1);
+  fit.dq_limit = limits.at("velocity");
+  fit.ddq_limit = limits.at("acceleration");
+  fit.tau_limit = limits.at("torque");
+  for (const json& effect : j.at("effects")) fit.effects.push_back(to_effect(effect));
+  if (j.contains("bls")) {
+    const json& b = j.at("bls");
+    BroadLearningFit bls;
+    bls.reference_velocity = b.at("reference_velocity");
+    bls.distances = b.at("distances").get<std::array<double, 3>>();
+    bls.ridge = b.at("ridge");
+    bls.weights.resize(static_cast<Eigen::Index>(b.at("weights").size()), BroadLearningInputs::count + 1);
+    for (Eigen::Index k = 0; k < bls.weights.rows(); ++k) {
+      bls.weights.row(k) = to_vector(b.at("weights").at(static_cast<std::size_t>(k))).transpose();
+    }
+    bls.coefficients = to_vector(b.at("coefficients"));
+    fit.bls = bls;
+  }
+  return fit;
+}
+
+}  // namespace
+
+const EffectFit* JointFit::find(std::string_view effect) const {
+  for (const EffectFit& fit : effects) {
+    if (fit.effect == effect) return &fit;
+  }
+  return nullptr;
+}
+
+std::array<double, parameters_per_link> to_array(const LinkInertia<Real>& link) {
+  return {link.m, link.h.x, link.h.y, link.h.z, link.xx, link.yy, link.zz, link.xy, link.xz, link.yz};
+}
+
+LinkInertia<Real> to_inertia(const std::array<double, parameters_per_link>& v) {
+  return {v[0], {v[1], v[2], v[3]}, v[4], v[5], v[6], v[7], v[8], v[9]};
+}
+
+json to_json(const IdentifiedModel& model) {
+  json base = json::array();
+  for (const BaseParameter& p : model.base) {
+    base.push_back({{"name", p.name},
+                    {"column", p.column},
+                    {"value", p.value},
+                    {"std", p.std},
+                    {"relative_std", p.value != 0 ? std::fabs(p.std / p.value) : 0.0}});
+  }
+  json inertia = json::array();
+  for (const auto& link : model.inertia) inertia.push_back(to_array(link));
+  json joints = json::array();
+  for (std::size_t i = 0; i < model.joints.size(); ++i) joints.push_back(joint_json(model.robot, i, model.joints[i]));
+  json logs = json::array();
+  for (const LogReference& log : model.logs) {
+    logs.push_back({{"file", log.file}, {"role", log.role}, {"from_s", log.from_s}, {"to_s", log.to_s}, {"hash", log.hash}});
+  }
+  return {{"schema", "fxdyn.model/1"},
+          {"tool_version", version},
+          {"project", model.project},
+          {"project_hash", model.project_hash},
+          {"seed", model.seed},
+          {"tick_s", model.tick_s},
+          {"robot", robot_json(model.robot)},
+          {"base_parameters", base},
+          {"inertia", inertia},
+          {"joints", joints},
+          {"filter",
+           {{"position_cutoff_hz", model.filter.position_cutoff_hz},
+            {"torque_cutoff_hz", model.filter.torque_cutoff_hz},
+            {"edge_s", model.filter.edge_s}}},
+          {"log_format", {{"columns", model.format.columns}, {"torque_gain", model.format.torque_gain}}},
+          {"logs", logs}};
+}
+
+IdentifiedModel read_model(const std::filesystem::path& file) {
+  const std::string text = read_file(file);
+  try {
+    const json j = json::parse(text);
+    if (j.value("schema", "") != "fxdyn.model/1") throw InputError("not a model file (schema fxdyn.model/1)");
+    IdentifiedModel model;
+    model.robot = to_robot(j.at("robot"));
+    model.project = j.at("project");
+    model.project_hash = j.at("project_hash");
+    model.seed = j.at("seed");
+    model.tick_s = j.at("tick_s");
+    for (const json& link : j.at("inertia")) model.inertia.push_back(to_inertia(link.get<std::array<double, parameters_per_link>>()));
+    for (const json& joint : j.at("joints")) model.joints.push_back(to_joint(joint));
+    if (model.inertia.size() != model.robot.size() || model.joints.size() != model.robot.size()) {
+      throw InputError("robot, inertia and joints differ in length");
+    }
+    for (const json& p : j.at("base_parameters")) {
+      model.base.push_back({p.at("column"), p.at("name"), p.at("value"), p.at("std")});
+    }
+    model.filter = {j.at("filter").at("position_cutoff_hz"), j.at("filter").at("torque_cutoff_hz"), j.at("filter").at("edge_s")};
+    model.format.columns = j.at("log_format").at("columns").get<std::map<std::string, std::string>>();
+    model.format.torque_gain = j.at("log_format").at("torque_gain").get<std::vector<double>>();
+    for (const json& log : j.at("logs")) {
+      model.logs.push_back({log.at("file"), log.at("role"), log.at("hash"), log.at("from_s"), log.at("to_s")});
+    }
+    return model;
+  } catch (const json::exception& error) {
+    throw InputError(fmt::format("{}: not a valid model: {}; make it anew with `fxdyn identify`", file.string(), error.what()));
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", file.string(), error.what()));
+  }
+}
+
+}  // namespace fxdyn

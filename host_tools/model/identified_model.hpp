@@ -1,0 +1,81 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <array>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host_tools/log/log.hpp"
+#include "host_tools/robot/robot.hpp"
+
+namespace fxdyn {
+
+/// One effect of one joint with its fitted parameters, in the order of the effect's ParameterInfo lists.
+struct EffectFit {
+  std::string effect;
+  std::vector<double> shape, linear;
+  std::vector<double> shape_std, linear_std;  ///< empty or 0: not estimated
+  bool named = false;                         ///< found by diagnosis; else nominal
+};
+
+/// The BLS of one joint (model/broad_learning.hpp).
+struct BroadLearningFit {
+  double reference_velocity = 1;                                 ///< asinh(dq / reference) [rad/s | m/s]
+  std::array<double, 3> distances{1e-3, 3e-3, 9e-3};             ///< Dahl widths [rad | m]
+  Eigen::MatrixXd weights;                                       ///< nodes x 5: input weights, bias [-]
+  Eigen::VectorXd coefficients;                                  ///< 4 inputs, then nodes [N*m | N]
+  double ridge = 0;
+  Eigen::Index nodes() const { return weights.rows(); }
+};
+
+struct JointFit {
+  double sign_width = 0.01;  ///< s = tanh(dq / width) [rad/s | m/s]
+  std::vector<EffectFit> effects;
+  std::optional<BroadLearningFit> bls;
+  double rated_torque = 0;                    ///< [N*m | N]
+  double q_lower = 0, q_upper = 0, dq_limit = 0, ddq_limit = 0, tau_limit = 0;
+  const EffectFit* find(std::string_view effect) const;
+};
+
+/// A base parameter: the standard parameter that stands for its group, see `expression` in model.json.
+struct BaseParameter {
+  std::size_t column = 0;  ///< 10 * link + parameter (model/rigid_body.hpp)
+  std::string name;        ///< e.g. "hx3": first moment of link 3 about x, DH frame
+  double value = 0, std = 0;
+};
+
+struct FilterFit {
+  double position_cutoff_hz = 0, torque_cutoff_hz = 0, edge_s = 0;
+};
+
+struct LogReference {
+  std::string file, role, hash;
+  double from_s = 0, to_s = 0;
+};
+
+/// Everything that predict, export and simulate need: the content of model.json.
+struct IdentifiedModel {
+  Robot robot;
+  std::vector<LinkInertia<Real>> inertia;  ///< representative: Y [beta; 0] = Y_b beta, DH frames
+  std::vector<BaseParameter> base;
+  std::vector<JointFit> joints;
+  FilterFit filter;
+  LogFormat format;
+  double tick_s = 0.002;
+  std::uint64_t seed = 1;
+  std::string project, project_hash;
+  std::vector<LogReference> logs;
+};
+
+nlohmann::json to_json(const IdentifiedModel& model);
+/// @throws InputError naming the file and the missing or wrong key.
+IdentifiedModel read_model(const std::filesystem::path& file);
+
+/// Content of the parameters of one link as ten numbers, the order of the regressor's columns.
+std::array<double, parameters_per_link> to_array(const LinkInertia<Real>& link);
+LinkInertia<Real> to_inertia(const std::array<double, parameters_per_link>& values);
+
+}  // namespace fxdyn

@@ -1,0 +1,119 @@
+#pragma once
+
+#include <cassert>
+#include <cmath>
+#include <compare>
+
+#include "host_tools/numbers/formats.hpp"
+#include "model/math.hpp"
+#include "model/numbers.hpp"
+
+// The firmware's fixed point on the host, with formats that are known only at run time: the same templates of model/, the
+// same functions on raw integers (namespace raw), hence the same bits. A test replays both side by side.
+
+namespace fxdyn {
+
+struct RunTimeWide {
+  std::int64_t raw = 0;
+  int bits = 0;
+
+  friend RunTimeWide operator+(RunTimeWide a, RunTimeWide b) { return assert(a.bits == b.bits), RunTimeWide{a.raw + b.raw, a.bits}; }
+  friend RunTimeWide operator-(RunTimeWide a, RunTimeWide b) { return assert(a.bits == b.bits), RunTimeWide{a.raw - b.raw, a.bits}; }
+  friend RunTimeWide operator-(RunTimeWide a) { return {-a.raw, a.bits}; }
+};
+
+/// The formats in force on this thread while a FormatScope lives.
+inline thread_local const Formats* current_formats = nullptr;
+
+class FormatScope {
+ public:
+  explicit FormatScope(const Formats& formats) : previous_(current_formats) { current_formats = &formats; }
+  ~FormatScope() { current_formats = previous_; }
+  FormatScope(const FormatScope&) = delete;
+  FormatScope& operator=(const FormatScope&) = delete;
+
+ private:
+  const Formats* previous_;
+};
+
+template <Kind kind>
+struct RunTimeFixed {
+  std::int32_t raw = 0;
+
+  static int bits() { return bits_of(*current_formats, kind); }
+  template <Kind other>
+  friend RunTimeWide operator*(RunTimeFixed a, RunTimeFixed<other> b) {
+    return {static_cast<std::int64_t>(a.raw) * b.raw, bits() + b.bits()};
+  }
+  friend RunTimeWide operator+(RunTimeFixed a, RunTimeFixed b) { return {std::int64_t{a.raw} + b.raw, bits()}; }
+  friend RunTimeWide operator-(RunTimeFixed a, RunTimeFixed b) { return {std::int64_t{a.raw} - b.raw, bits()}; }
+  friend RunTimeWide operator-(RunTimeFixed a) { return {-std::int64_t{a.raw}, bits()}; }
+  friend auto operator<=>(RunTimeFixed, RunTimeFixed) = default;
+};
+
+inline RunTimeWide align(RunTimeWide x, RunTimeWide like) {
+  assert(like.bits >= x.bits);
+  return {raw::shift_right(x.raw, x.bits - like.bits), like.bits};
+}
+template <Kind kind>
+RunTimeWide align(RunTimeFixed<kind> x, RunTimeWide like) { return align(RunTimeWide{x.raw, x.bits()}, like); }
+
+struct RunTimeNumbers {
+  template <Quantity quantity>
+  using Of = RunTimeFixed<Kind{Kind::number, quantity}>;
+  template <Quantity quantity>
+  using Coefficient = RunTimeFixed<Kind{Kind::coefficient, quantity}>;
+  using Mass = RunTimeFixed<Kind{Kind::mass}>;
+  using FirstMoment = RunTimeFixed<Kind{Kind::first_moment}>;
+  using SecondMoment = RunTimeFixed<Kind{Kind::second_moment}>;
+  using TorqueSum = RunTimeWide;
+  using Word = std::int32_t;
+
+  template <class T>
+  static T load(Word word) { return {word}; }
+  static TorqueSum no_torque() { return {0, current_formats->torque_sum}; }
+  static Of<Quantity::unit> one() { return {1 << unit_bits}; }
+
+  template <class T>
+  static T narrow(RunTimeWide x, Saturations& saturations) {
+    assert(x.bits >= T::bits());
+    std::uint32_t outside = 0;
+    const T result{raw::narrow(x.raw, x.bits - T::bits(), outside)};
+    saturations.count += outside;
+    return result;
+  }
+  template <class T>
+  static T clamp(RunTimeWide x) {
+    Saturations ignored;
+    return narrow<T>(x, ignored);
+  }
+  template <class T, Kind kind>
+  static T convert(RunTimeFixed<kind> x, Saturations& saturations) {
+    std::uint32_t outside = 0;
+    const T result{raw::narrow(x.raw, x.bits() - T::bits(), outside)};
+    saturations.count += outside;
+    return result;
+  }
+};
+
+template <Kind kind>
+SineCosine<RunTimeNumbers::Of<Quantity::unit>> sin_cos(RunTimeFixed<kind> q) {
+  const auto result = raw::sin_cos(q.raw, q.bits());
+  return {{result.sine}, {result.cosine}};
+}
+inline RunTimeNumbers::Of<Quantity::unit> tanh_of(RunTimeNumbers::Of<Quantity::argument> x) { return {raw::tanh(x.raw)}; }
+inline RunTimeNumbers::Of<Quantity::unit> exp_negative(RunTimeNumbers::Of<Quantity::argument> x) { return {raw::exp_negative(x.raw)}; }
+inline RunTimeNumbers::Of<Quantity::argument> asinh_of(RunTimeNumbers::Of<Quantity::ratio> x) { return {raw::asinh(x.raw)}; }
+template <Kind kind>
+RunTimeFixed<kind> magnitude(RunTimeFixed<kind> x) { return {raw::magnitude(x.raw)}; }
+template <Kind kind>
+RunTimeNumbers::Of<Quantity::unit> sign_of(RunTimeFixed<kind> x) { return {raw::sign(x.raw)}; }
+
+/// The nearest fixed-point number with `bits` fractional bits; saturates.
+inline std::int32_t to_raw(double value, int bits) {
+  const double scaled = std::floor(std::ldexp(value, bits) + 0.5);
+  return static_cast<std::int32_t>(std::clamp(scaled, static_cast<double>(raw::min32), static_cast<double>(raw::max32)));
+}
+inline double from_raw(std::int32_t raw_value, int bits) { return std::ldexp(static_cast<double>(raw_value), -bits); }
+
+}  // namespace fxdyn

@@ -1,0 +1,214 @@
+#include "host_tools/pipeline/pipeline.hpp"
+
+#include <fmt/format.h>
+
+#include "host_tools/error.hpp"
+#include "host_tools/export/export.hpp"
+#include "host_tools/files.hpp"
+#include "host_tools/report/metrics.hpp"
+#include "host_tools/report/report.hpp"
+#include "host_tools/train/train.hpp"
+
+namespace fxdyn {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+Pipeline::Pipeline(const fs::path& project, fs::path directory) : project_(read_project(project)), directory_(std::move(directory)) {}
+
+const GateData& Pipeline::data() {
+  if (!data_) {
+    progress_.stage("reading and filtering the logs", 1);
+    data_ = std::make_unique<GateData>(read_gate_data(project_, directory_));
+    progress_.step();
+    progress_.done();
+  }
+  return *data_;
+}
+
+bool Pipeline::is_current(const IdentifiedModel& model) {
+  if (model.project_hash != hash_of(read_file(project_.file)) || model.logs.size() != data().references.size()) return false;
+  for (std::size_t i = 0; i < model.logs.size(); ++i) {
+    if (model.logs[i].hash != data().references[i].hash) return false;
+  }
+  return true;
+}
+
+std::vector<ProcessedLog> Pipeline::logs(Role role) {
+  std::vector<ProcessedLog> out;
+  for (const Log& log : read_logs(project_, role, directory_)) out.push_back(process(log, data().filter));
+  return out;
+}
+
+json Pipeline::stage_metrics(const IdentifiedModel& model, const std::string& stage) {
+  json list = json::array();
+  for (const Role role : {Role::train, Role::validate, Role::test}) {
+    for (const ProcessedLog& log : logs(role)) {
+      list.push_back(metrics_json(log, model.robot, judge(log, predict(model, log.q, log.dq, log.ddq, log.step_s))));
+    }
+  }
+  return {{"stage", stage}, {"logs", list}};
+}
+
+void Pipeline::finish(const Fitter& fitter, Stage stage, const json& training) {
+  const IdentifiedModel model = finish_model(fitter, project_, data());
+  // The same structure with less: what friction and BLS are worth is seen on the same logs.
+  const auto reduced = [&](bool friction) {
+    Fitter less = fitter;
+    for (std::size_t j = 0; j < less.joints(); ++j) {
+      JointFit design = less.design(j);
+      design.bls.reset();
+      if (!friction) design.effects.clear();
+      less.set_design(j, design);
+    }
+    if (project_.identify.method != "ls") less.reweight();
+    return finish_model(less, project_, data());
+  };
+  json stages = json::array({stage_metrics(reduced(false), "rigid"), stage_metrics(reduced(true), "friction")});
+  if (stage == Stage::trained) stages.push_back(stage_metrics(model, "bls"));
+  json metrics = {{"schema", "fxdyn.metrics/1"},
+                  {"gate", fitter.gate()},
+                  {"base_parameters", fitter.base().columns.size()},
+                  {"logs", stages.back()["logs"]},
+                  {"stages", stages}};
+  if (!training.is_null()) metrics["training"] = training;
+  json document = to_json(model);
+  document["stage"] = stage == Stage::trained ? "trained" : "identified";
+  write_file(directory_ / "model.json", document.dump(1) + "\n");
+  write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
+}
+
+std::unique_ptr<Fitter> Pipeline::fitter_from(const IdentifiedModel& model) {
+  auto fitter = std::make_unique<Fitter>(project_.robot, data().logs, model.joints);
+  if (project_.identify.method != "ls") fitter->reweight();
+  return fitter;
+}
+
+void Pipeline::identify() {
+  fitter_ = fxdyn::identify(project_, data(), progress_);
+  finish(*fitter_, Stage::identified, {});
+}
+
+void Pipeline::train() {
+  if (!fitter_) {
+    if (const fs::path file = directory_ / "model.json"; fs::exists(file)) {
+      IdentifiedModel model = read_model(file);
+      if (is_current(model)) {
+        for (JointFit& joint : model.joints) joint.bls.reset();
+        fitter_ = fitter_from(model);
+      }
+    }
+    if (!fitter_) identify();
+  }
+  json training = json::array();
+  if (project_.train.enabled) {
+    const auto outcomes = fxdyn::train(*fitter_, project_.train, progress_);
+    for (std::size_t j = 0; j < outcomes.size(); ++j) {
+      training.push_back({{"joint", project_.robot.joints[j].name},
+                          {"index", j + 1},
+                          {"unit", project_.robot.joints[j].torque_unit()},
+                          {"held_out_without", outcomes[j].error_without},
+                          {"held_out_with", outcomes[j].error_with},
+                          {"kept", outcomes[j].kept}});
+    }
+    if (project_.identify.method != "ls") fitter_->reweight();
+  }
+  finish(*fitter_, Stage::trained, training);
+}
+
+IdentifiedModel Pipeline::model() {
+  const fs::path file = directory_ / "model.json";
+  if (fs::exists(file)) {
+    IdentifiedModel model = read_model(file);
+    if (is_current(model) && json::parse(read_file(file)).value("stage", "") == "trained") return model;
+  }
+  train();
+  return read_model(file);
+}
+
+void Pipeline::export_tables() {
+  const IdentifiedModel model = this->model();
+  progress_.stage("choosing formats, writing tables", 1);
+  std::vector<TickStates> states, judged;
+  for (const ProcessedLog& log : data().logs) states.push_back(at_ticks(log, model.tick_s));
+  const Formats formats = choose_formats(model, states);
+  judged = states;
+  for (std::size_t i = 0; i < states.size(); ++i) judged.push_back(perturbed(states[i], model, 1000 + i));
+  const QuantisationError clean = quantisation_error(model, formats, states);
+  const QuantisationError error = quantisation_error(model, formats, judged);
+  write_tables(model, formats, error, directory_);
+  json joints = json::array();
+  for (std::size_t j = 0; j < model.joints.size(); ++j) {
+    const auto k = static_cast<Eigen::Index>(j);
+    joints.push_back({{"joint", model.robot.joints[j].name},
+                      {"index", j + 1},
+                      {"unit", model.robot.joints[j].torque_unit()},
+                      {"rated_torque", model.joints[j].rated_torque},
+                      {"formats", formats_json(formats)},
+                      {"proven_bound", nullptr},  // not proven yet: only observed
+                      {"observed_max", error.largest[k]},
+                      {"observed_max_of_rated", error.largest[k] / model.joints[j].rated_torque},
+                      {"quantisation_rms", error.rms[k]}});
+  }
+  const json document = {{"schema", "fxdyn.export/1"},
+                         {"tick_s", model.tick_s},
+                         {"board", project_.target.board},
+                         {"formats", formats_json(formats)},
+                         {"joints", joints},
+                         {"saturations_on_logs", clean.saturations},
+                         {"table_bytes", fs::file_size(directory_ / "tables.bin")}};
+  write_file(directory_ / "export.json", document.dump(1) + "\n");
+  progress_.step();
+  progress_.done();
+}
+
+void Pipeline::report() {
+  const IdentifiedModel model = this->model();
+  if (!fs::exists(directory_ / "export.json")) export_tables();
+  progress_.stage("drawing the report", 1);
+  std::vector<ProcessedLog> shown = logs(Role::test);
+  if (shown.empty()) shown = logs(Role::validate);
+  if (shown.empty()) shown = logs(Role::train);
+  write_report(model, shown, directory_);
+  progress_.step();
+  progress_.done();
+}
+
+void Pipeline::run() {
+  identify();
+  train();
+  export_tables();
+  report();
+}
+
+void predict_log(const fs::path& model_file, const fs::path& log_file, bool fixed, const fs::path& directory) {
+  const IdentifiedModel model = read_model(model_file);
+  const Robot& robot = model.robot;
+  std::vector<bool> revolute;
+  for (const Joint& joint : robot.joints) revolute.push_back(joint.type == JointType::revolute);
+  const Log log = read_log(log_file, robot.size(), revolute, model.format, {}, {}, false);
+  const ProcessedLog processed = process(log, model.filter);
+
+  Eigen::MatrixXd torque;
+  if (fixed) {
+    const fs::path export_file = model_file.parent_path() / "export.json";
+    if (!fs::exists(export_file)) throw InputError(fmt::format("{}: not there; run `fxdyn export` first", export_file.string()));
+    torque = predict_fixed(model, read_formats(export_file), {processed.name, processed.t, processed.q, processed.dq, processed.ddq});
+  } else {
+    torque = predict(model, processed.q, processed.dq, processed.ddq, processed.step_s);
+  }
+  const fs::path out = directory / log_file.filename();
+  std::error_code ignored;
+  if (fs::equivalent(out, log_file, ignored)) {
+    throw InputError(fmt::format("{}: would be overwritten by its prediction; choose another --out", out.string()));
+  }
+  Log result;
+  result.t = processed.t;
+  result.tau = torque;
+  write_log(out, result);
+  json logs = json::array();
+  if (processed.tau.size() > 0) logs.push_back(metrics_json(processed, robot, judge(processed, torque)));
+  write_file(directory / "metrics.json", json{{"schema", "fxdyn.metrics/1"}, {"numbers", fixed ? "fixed" : "real"}, {"logs", logs}}.dump(1) + "\n");
+}
+
+}  // namespace fxdyn

@@ -1,0 +1,125 @@
+#include <fmt/format.h>
+
+#include "host_tools/error.hpp"
+#include "host_tools/export/export.hpp"
+#include "host_tools/files.hpp"
+#include "host_tools/hil/qemu_target.hpp"
+#include "host_tools/pipeline/pipeline.hpp"
+
+namespace fxdyn {
+namespace {
+
+using nlohmann::json;
+
+struct Replayed {
+  Eigen::Index ticks = 0, different_ticks = 0;
+  std::uint32_t fewest = UINT32_MAX, most = 0;
+  std::uint64_t instructions = 0, saturations = 0;
+  Eigen::VectorXd largest_error;  ///< |target - double| [N*m | N]
+};
+
+Replayed play(QemuTarget& target, const IdentifiedModel& model, FixedModel& fixed, const TickStates& states, Eigen::Index ticks) {
+  std::vector<std::int32_t> stream;
+  for (Eigen::Index k = 0; k < ticks; ++k) {
+    for (const std::int32_t word : raw_states(states, k, fixed.formats())) stream.push_back(word);
+  }
+  const std::size_t per_tick = 3 * model.robot.size();
+  target.reset();
+  const std::vector<TickReply> replies = target.run(stream, per_tick);
+
+  fixed.reset();
+  Evaluator<Real> exact(model, model.tick_s);
+  Replayed out;
+  out.ticks = ticks;
+  out.largest_error = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model.robot.size()));
+  std::vector<JointState<Real>> state(model.robot.size());
+  Saturations ignored;
+  for (std::size_t k = 0; k < replies.size(); ++k) {
+    const std::vector<std::int32_t> words(stream.begin() + static_cast<std::ptrdiff_t>(k * per_tick),
+                                          stream.begin() + static_cast<std::ptrdiff_t>((k + 1) * per_tick));
+    Saturations saturations;
+    const std::vector<std::int32_t> expected = fixed.tick(words, saturations);
+    out.different_ticks += expected != replies[k].torques || saturations.count != replies[k].saturations;
+    const auto& formats = fixed.formats();
+    for (std::size_t j = 0; j < state.size(); ++j) {
+      state[j] = {from_raw(words[3 * j], formats[Quantity::position]), from_raw(words[3 * j + 1], formats[Quantity::velocity]),
+                  from_raw(words[3 * j + 2], formats[Quantity::acceleration])};
+    }
+    const auto reference = exact.tick(state, ignored);
+    for (std::size_t j = 0; j < state.size(); ++j) {
+      double& largest = out.largest_error[static_cast<Eigen::Index>(j)];
+      largest = std::max(largest, std::fabs(from_raw(replies[k].torques[j], formats[Quantity::torque]) - reference[j]));
+    }
+    out.fewest = std::min(out.fewest, replies[k].instructions);
+    out.most = std::max(out.most, replies[k].instructions);
+    out.instructions += replies[k].instructions;
+    out.saturations += replies[k].saturations;
+  }
+  return out;
+}
+
+json to_json(const Replayed& replayed, const TickStates& states, const IdentifiedModel& model) {
+  json joints = json::array();
+  for (std::size_t j = 0; j < model.joints.size(); ++j) {
+    const double error = replayed.largest_error[static_cast<Eigen::Index>(j)];
+    joints.push_back({{"joint", model.robot.joints[j].name},
+                      {"index", j + 1},
+                      {"largest_error", error},
+                      {"unit", model.robot.joints[j].torque_unit()},
+                      {"largest_error_of_rated", error / model.joints[j].rated_torque}});
+  }
+  return {{"log", states.name},
+          {"ticks", replayed.ticks},
+          {"different_ticks", replayed.different_ticks},
+          {"saturations", replayed.saturations},
+          {"instructions_per_tick",
+           {{"fewest", replayed.fewest},
+            {"most", replayed.most},
+            {"mean", static_cast<double>(replayed.instructions) / static_cast<double>(std::max<Eigen::Index>(1, replayed.ticks))}}},
+          {"joints", joints}};
+}
+
+}  // namespace
+
+bool replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index max_ticks) {
+  const IdentifiedModel model = pipeline.model();
+  const std::filesystem::path export_file = pipeline.directory() / "export.json";
+  if (!std::filesystem::exists(export_file)) {
+    throw InputError(fmt::format("{}: not there; run `fxdyn export` and build the image from its tables.hpp", export_file.string()));
+  }
+  FixedModel fixed(model, read_formats(export_file));
+  std::vector<TickStates> streams;
+  for (const Role role : {Role::test, Role::validate}) {
+    for (const ProcessedLog& log : pipeline.logs(role)) streams.push_back(at_ticks(log, model.tick_s));
+  }
+  if (streams.empty()) {
+    for (const ProcessedLog& log : pipeline.logs(Role::train)) streams.push_back(at_ticks(log, model.tick_s));
+  }
+  streams.push_back(perturbed(streams.front(), model, 7));
+
+  QemuTarget target(image);
+  const serial::Identity identity = target.hello();
+  if (identity.state != serial::NodeState::ready) throw InputError(fmt::format("{}: the image refuses its tables (CRC or layout)", image.string()));
+  if (identity.layout_hash != fixed.layout_hash()) {
+    throw InputError(fmt::format("{}: holds another model (layout {:08x}, expected {:08x}); build it from {}", image.string(),
+                                 identity.layout_hash, fixed.layout_hash(), (pipeline.directory() / "tables.hpp").string()));
+  }
+  Progress progress;
+  progress.stage("replaying on the firmware", streams.size());
+  json logs = json::array();
+  bool same = true;
+  for (const TickStates& states : streams) {
+    const Replayed replayed = play(target, model, fixed, states, std::min(max_ticks, states.t.size()));
+    same = same && replayed.different_ticks == 0;
+    logs.push_back(to_json(replayed, states, model));
+    progress.step();
+  }
+  progress.done();
+  json document = {{"schema", "fxdyn.replay/1"}, {"image", image.filename().string()}, {"bit_exact", same}, {"logs", logs}};
+  const std::filesystem::path size_file = image.parent_path() / "size.json";
+  if (std::filesystem::exists(size_file)) document["size"] = json::parse(read_file(size_file));
+  write_file(pipeline.directory() / "replay.json", document.dump(1) + "\n");
+  return same;
+}
+
+}  // namespace fxdyn

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "host_tools/identify/dataset.hpp"
+
+namespace fxdyn {
+
+/// Writes report.html: tables from model.json, metrics.json, export.json (and replay.json where it is there), and the
+/// measured and predicted torque of the given logs, drawn by gnuplot.
+void write_report(const IdentifiedModel& model, const std::vector<ProcessedLog>& logs,
+                  const std::filesystem::path& directory);
+
+/// The table that ends `fxdyn run` and the demo: held-out error per joint and stage, fixed point against double.
+std::string summary_table(const std::filesystem::path& directory);
+
+}  // namespace fxdyn

@@ -1,0 +1,72 @@
+#include <fmt/format.h>
+
+#include "host_tools/report/report.hpp"
+#include "host_tools/report/results.hpp"
+
+namespace fxdyn {
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+/// What the BLS did to a joint's error on the shown logs: "-85 %", or "not kept" where validation said no.
+std::string bls_verdict(const json& metrics, const std::string& role, std::size_t joint) {
+  const json& stages = metrics.at("stages");
+  if (!metrics.contains("training") || joint >= metrics.at("training").size() || stages.size() < 3) return "";
+  if (!metrics.at("training").at(joint).at("kept").get<bool>()) return "not kept";
+  const double before = pooled_error(stages.at(1).at("logs"), role, joint).rmse;
+  const double after = pooled_error(stages.at(2).at("logs"), role, joint).rmse;
+  return before > 0 ? fmt::format("{:+.0f} %", 100 * (after / before - 1)) : "";
+}
+
+std::string replay_line(const json& replayed) {
+  const ReplaySummary sum = summarise_replay(replayed);
+  std::string line =
+      fmt::format("firmware on {} (QEMU): {} ticks {}, {} instructions a tick", sum.processor, sum.ticks,
+                  sum.different_ticks == 0 ? "bit-exact" : "DIFFER from the host",
+                  sum.fewest == sum.most ? fmt::format("{}", sum.most) : fmt::format("{} to {}", sum.fewest, sum.most));
+  if (replayed.contains("size")) {
+    line +=
+        fmt::format(", {:.1f} KiB flash, {:.1f} KiB RAM", replayed.at("size").at("flash_bytes").get<double>() / 1024,
+                    replayed.at("size").at("ram_bytes").get<double>() / 1024);
+  }
+  return line + "\n";
+}
+
+}  // namespace
+
+std::string summary_table(const fs::path& directory) {
+  const auto [metrics, exported, replayed, role] = read_results(directory);
+  if (metrics.is_null()) return "";
+  const json& stages = metrics.at("stages");
+  const json& joints = metrics.at("logs").at(0).at("joints");
+  std::size_t width = 8;
+  for (const json& joint : joints) width = std::max(width, joint.at("joint").get<std::string>().size() + 2);
+
+  std::string out = fmt::format("\nRMSE on the {} logs (in parentheses: share of the RMS of the torque)\n{:<{}}{:<6}",
+                                role, "joint", width, "unit");
+  for (const json& stage : stages) out += fmt::format("{:>20}", stage_title(stage));
+  if (metrics.contains("training")) out += fmt::format("{:>10}", "by BLS");
+  if (!exported.is_null()) out += fmt::format("{:>22}", "|fixed - double| max");
+  out += "\n";
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    out += fmt::format("{:<{}}{:<6}", joints.at(j).at("joint").get<std::string>(), width,
+                       joints.at(j).at("unit").get<std::string>());
+    for (const json& stage : stages) {
+      const PooledError error = pooled_error(stage.at("logs"), role, j);
+      out += fmt::format("{:>10.4g} ({:6.2f}%)", error.rmse, 100 * error.relative());
+    }
+    if (metrics.contains("training")) out += fmt::format("{:>10}", bls_verdict(metrics, role, j));
+    if (!exported.is_null()) {
+      out += fmt::format("{:>13.1e} of rated", exported.at("joints").at(j).at("observed_max_of_rated").get<double>());
+    }
+    out += "\n";
+  }
+  if (!replayed.is_null()) out += replay_line(replayed);
+  if (const fs::path report = directory / "report.html"; fs::exists(report)) {
+    out += fmt::format("report: {}\n", fs::absolute(report).lexically_normal().string());
+  }
+  return out;
+}
+
+}  // namespace fxdyn

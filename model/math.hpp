@@ -1,0 +1,206 @@
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+#include "model/fixed.hpp"
+#include "model/numbers.hpp"
+
+// sin, cos, tanh, exp(-x), asinh. In fixed point: tables made by the compiler and a short series around the nearest node,
+// constant time, no division. Each function states its largest error.
+
+namespace fxdyn {
+
+template <class U>
+struct SineCosine {
+  U sine, cosine;
+};
+
+// ---- double ----------------------------------------------------------------------------------------------------------
+inline SineCosine<double> sin_cos(double q) { return {std::sin(q), std::cos(q)}; }
+inline double tanh_of(double x) { return std::tanh(x); }
+/// exp(-x) for x >= 0
+inline double exp_negative(double x) { return std::exp(-x); }
+inline double asinh_of(double x) { return std::asinh(x); }
+constexpr double magnitude(double x) { return x < 0 ? -x : x; }
+/// sign(x): -1, 0 or 1
+constexpr double sign_of(double x) { return static_cast<double>((x > 0) - (x < 0)); }
+
+// ---- raw integers: shared by all fixed formats -------------------------------------------------------------------------
+namespace raw {
+
+/// Series for the compiler's use only (the standard library's functions are not constexpr).
+namespace series {
+constexpr double exponential(double x) {  // |x| <= 1
+  double term = 1, sum = 1;
+  for (int k = 1; k < 24; ++k) sum += term *= x / k;
+  return sum;
+}
+constexpr double sine(double x) {  // |x| <= 2 pi
+  double term = x, sum = x;
+  for (int k = 1; k < 24; ++k) sum += term *= -x * x / ((2 * k) * (2 * k + 1));
+  return sum;
+}
+constexpr double logarithm(double x) {  // x >= 1
+  double result = 0;
+  while (x > 1.0905077326652577) {  // 2^(1/8)
+    x /= 1.0905077326652577;
+    result += 0.08664339756999316;  // ln 2 / 8
+  }
+  const double u = (x - 1) / (x + 1);
+  double power = u;
+  for (int k = 1; k < 40; k += 2, power *= u * u) result += 2 * power / k;
+  return result;
+}
+constexpr double square_root(double x) {
+  double root = x > 1 ? x : 1;
+  for (int k = 0; k < 60; ++k) root = (root + x / root) / 2;
+  return root;
+}
+constexpr double inverse_hyperbolic_sine(double x) { return logarithm(x + square_root(x * x + 1)); }
+constexpr double hyperbolic_tangent(double x) {  // x >= 0; exp(-2x) by powers
+  double e = 1;
+  for (int k = 0; k < 32; ++k) e *= exponential(-2 * x / 32);
+  return (1 - e) / (1 + e);
+}
+constexpr std::int32_t to_raw(double x, int bits) {
+  const double scaled = x * static_cast<double>(std::int64_t{1} << bits);
+  return static_cast<std::int32_t>(scaled < 0 ? scaled - 0.5 : scaled + 0.5);
+}
+}  // namespace series
+
+inline constexpr double pi = 3.14159265358979323846;
+
+/// sin(2 pi i / 256), one and a quarter turns, 30 bits.
+inline constexpr auto sine_table = [] {
+  std::array<std::int32_t, 321> table{};
+  for (int i = 0; i < 321; ++i) table[i] = series::to_raw(series::sine(2 * pi * (i % 256) / 256), 30);
+  return table;
+}();
+
+/// Sine and cosine (30 bits) of q [rad] with `bits` fractional bits, |error| < 4e-9 + 2^-(bits + 1). From the nearest
+/// node a: sin(a + h) = sin a cos h + cos a sin h with |h| <= pi / 256, cos h = 1 - h^2/2, sin h = h - h^3/6.
+constexpr SineCosine<std::int32_t> sin_cos(std::int32_t q, int bits) {
+  constexpr std::int64_t inverse_two_pi = 1367130551;  // 2^33 / (2 pi)
+  constexpr std::int64_t two_pi = 1686629713;          // 2 pi * 2^28
+  const auto phase = static_cast<std::uint32_t>(shift_right(q * inverse_two_pi, bits + 1));  // 2^-32 turns, wraps
+  const std::uint32_t nearest = phase + (1U << 23);
+  const std::uint32_t node = nearest >> 24;
+  const auto offset = static_cast<std::int32_t>(nearest & 0x00ffffffU) - (1 << 23);
+  const std::int64_t h = (offset * two_pi) >> 26;         // 34 bits
+  const std::int64_t half_square = (h * h) >> 35;         // h^2 / 2, 34 bits
+  const std::int64_t sine_h = h - ((h * ((half_square * 715827883) >> 31)) >> 34);  // h - h (h^2/2) / 3
+  const std::int64_t s = sine_table[node];
+  const std::int64_t c = sine_table[node + 64];
+  return {static_cast<std::int32_t>(s + shift_right(c * sine_h - s * half_square, 34)),
+          static_cast<std::int32_t>(c - shift_right(s * sine_h + c * half_square, 34))};
+}
+
+/// tanh(i / 32), 0 <= x <= 8, 30 bits.
+inline constexpr auto tanh_table = [] {
+  std::array<std::int32_t, 257> table{};
+  for (int i = 0; i < 257; ++i) table[i] = series::to_raw(series::hyperbolic_tangent(i / 32.0), 30);
+  return table;
+}();
+
+/// tanh (30 bits) of x with `argument_bits`, |error| < 1.5e-6; constant beyond |x| = 8. From the nearest node t = tanh(a):
+/// tanh(a + d) = t + d (1 - t^2) (1 - d t) + O(d^3 / 3), |d| <= 1/64.
+constexpr std::int32_t tanh(std::int32_t x) {
+  const std::int32_t sign = x >> 31;
+  std::uint32_t size = static_cast<std::uint32_t>(x ^ sign) - static_cast<std::uint32_t>(sign);
+  constexpr std::uint32_t end = 8U << argument_bits;
+  size = size < end ? size : end;
+  const std::uint32_t node = (size + (1U << (argument_bits - 6))) >> (argument_bits - 5);
+  const std::int64_t d = static_cast<std::int32_t>(size - (node << (argument_bits - 5)));  // 27 bits
+  const std::int64_t t = tanh_table[node];
+  const std::int64_t slope = (std::int64_t{1} << 30) - ((t * t) >> 30);
+  const std::int64_t bend = (std::int64_t{1} << 30) - ((d * t) >> argument_bits);
+  const auto value = static_cast<std::int32_t>(t + ((d * ((slope * bend) >> 30)) >> argument_bits));
+  return (value ^ sign) - sign;
+}
+
+/// 2^(-i/64), 30 bits.
+inline constexpr auto power_table = [] {
+  std::array<std::int32_t, 65> table{};
+  for (int i = 0; i < 65; ++i) table[i] = series::to_raw(series::exponential(-0.69314718055994531 * i / 64), 30);
+  return table;
+}();
+
+/// exp(-x) (30 bits) of x >= 0 with `argument_bits` (negative x count as 0), |error| < 7e-9. x / ln 2 = k + i/64 + r:
+/// 2^-k by shifting, 2^(-i/64) from the table, 2^-r by its series to the third power.
+constexpr std::int32_t exp_negative(std::int32_t x) {
+  x &= ~(x >> 31);
+  const std::int64_t y = (x * std::int64_t{1549082005}) >> 30;  // 1 / ln 2, 30 bits
+  const int k = static_cast<int>(y >> argument_bits);
+  const auto node = static_cast<std::uint32_t>(y >> (argument_bits - 6)) & 63U;
+  const std::int64_t r = y & ((std::int64_t{1} << (argument_bits - 6)) - 1);
+  const std::int64_t u = (r * 1488522236) >> 24;                // r ln 2 (31 bits), result with 34 bits
+  const std::int64_t square = (u * u) >> 35;                    // u^2 / 2
+  const std::int64_t cube = (u * ((square * 715827883) >> 31)) >> 34;
+  const std::int64_t value = power_table[node];
+  const std::int64_t full = value - ((value * (u - square + cube)) >> 34);
+  return static_cast<std::int32_t>((((full << 1) >> k) + 1) >> 1);
+}
+
+struct Parabola {
+  std::int32_t c0, c1, c2;  ///< 27 bits; over a segment parameter in [0, 1)
+};
+
+/// asinh over 1 + |x| in [2^e, 2^(e+1)), e = 0 .. 7, sixteen segments an octave, interpolated at three points of each.
+inline constexpr auto asinh_table = [] {
+  std::array<Parabola, 8 * 16> table{};
+  for (int e = 0; e < 8; ++e) {
+    for (int i = 0; i < 16; ++i) {
+      const double width = static_cast<double>(1 << e) / 16;
+      const double from = static_cast<double>(1 << e) + i * width - 1;
+      const double f0 = series::inverse_hyperbolic_sine(from);
+      const double f1 = series::inverse_hyperbolic_sine(from + width / 2);
+      const double f2 = series::inverse_hyperbolic_sine(from + width);
+      table[e * 16 + i] = {series::to_raw(f0, argument_bits), series::to_raw(4 * f1 - 3 * f0 - f2, argument_bits),
+                           series::to_raw(2 * f0 - 4 * f1 + 2 * f2, argument_bits)};
+    }
+  }
+  return table;
+}();
+
+/// asinh (argument_bits) of x with `ratio_bits`, |error| < 7e-6.
+constexpr std::int32_t asinh(std::int32_t x) {
+  const std::int32_t sign = x >> 31;
+  // 1 + |x|, at most 129 * 2^24: fits unsigned
+  const std::uint32_t shifted = (static_cast<std::uint32_t>(x ^ sign) - static_cast<std::uint32_t>(sign)) + (1U << ratio_bits);
+  const int e = 31 - ratio_bits - std::countl_zero(shifted);
+  const std::uint32_t mantissa = shifted << (31 - ratio_bits - e);  // leading one at bit 31
+  const Parabola& piece = asinh_table[static_cast<std::uint32_t>(e) * 16 + ((mantissa >> 27) & 15U)];
+  const std::int64_t s = mantissa & ((1U << 27) - 1);  // 27 bits
+  const auto value = static_cast<std::int32_t>(piece.c0 + ((s * (piece.c1 + ((s * piece.c2) >> 27))) >> 27));
+  return (value ^ sign) - sign;
+}
+
+constexpr std::int32_t magnitude(std::int32_t x) {
+  const std::int32_t sign = x >> 31;
+  // -2^31 has no positive counterpart: ~x is the nearest
+  return x == static_cast<std::int32_t>(min32) ? ~x : (x ^ sign) - sign;
+}
+
+/// sign(x) with 30 bits
+constexpr std::int32_t sign(std::int32_t x) { return ((x > 0) - (x < 0)) * (1 << 30); }
+
+}  // namespace raw
+
+// ---- fixed point -----------------------------------------------------------------------------------------------------
+template <int bits>
+constexpr SineCosine<Fixed<unit_bits>> sin_cos(Fixed<bits> q) {
+  const auto result = raw::sin_cos(q.raw, bits);
+  return {{result.sine}, {result.cosine}};
+}
+constexpr Fixed<unit_bits> tanh_of(Fixed<argument_bits> x) { return {raw::tanh(x.raw)}; }
+constexpr Fixed<unit_bits> exp_negative(Fixed<argument_bits> x) { return {raw::exp_negative(x.raw)}; }
+constexpr Fixed<argument_bits> asinh_of(Fixed<ratio_bits> x) { return {raw::asinh(x.raw)}; }
+template <int bits>
+constexpr Fixed<bits> magnitude(Fixed<bits> x) { return {raw::magnitude(x.raw)}; }
+template <int bits>
+constexpr Fixed<unit_bits> sign_of(Fixed<bits> x) { return {raw::sign(x.raw)}; }
+
+}  // namespace fxdyn

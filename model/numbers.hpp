@@ -1,0 +1,138 @@
+#pragma once
+
+#include <algorithm>
+#include <concepts>
+
+#include "model/fixed.hpp"
+
+// A number system says which type stands for which quantity, so that every formula of the model is written once.
+//   a * b, a + b, a - b, -a   widen and are exact (for Real: double)
+//   align(x, w)               x in the format of the accumulator w
+//   N::narrow<T>(w, s)        w as a stored number of type T: rounds half up, saturates, counts in s
+//   N::clamp<T>(w)            the same where saturation is meant, not counted
+//   N::convert<T>(x, s)       a stored number as another quantity of the same unit (a prismatic joint's q is a length)
+//   N::Word, N::load<T>(word)  how parameters are stored in tables, and one of them as a number
+// Coefficients (N::Coefficient<Q>) multiply a number of quantity Q to give a torque; their format follows from that of
+// Q, so that products of a sum need no shifts.
+
+namespace fxdyn {
+
+/// Double precision; narrowing is the identity.
+struct Real {
+  template <Quantity>
+  using Of = double;
+  template <Quantity>
+  using Coefficient = double;
+  using Mass = double;
+  using FirstMoment = double;
+  using SecondMoment = double;
+  using TorqueSum = double;
+  using Word = double;
+
+  template <class T>
+  static constexpr T load(Word word) { return word; }
+  static constexpr TorqueSum no_torque() { return 0; }
+  static constexpr double one() { return 1; }
+  template <class T>
+  static constexpr T narrow(double x, Saturations&) { return x; }
+  template <class T>
+  static constexpr T clamp(double x) { return x; }
+  template <class T>
+  static constexpr T convert(double x, Saturations&) { return x; }
+};
+
+constexpr double align(double x, double) { return x; }
+
+/// Fixed point with formats known at compile time. `Formats` is a generated struct of static constexpr int: one
+/// member per name in `quantity_names` (but for `unit`, `argument` and `ratio`), `force_sum` (fractional bits of the sums that
+/// give forces) and `torque_sum` (of the sum of all contributions to a joint's torque).
+template <class Formats>
+struct FixedNumbers {
+  static constexpr int bits(Quantity quantity) {
+    switch (quantity) {
+      case Quantity::position: return Formats::position;
+      case Quantity::velocity: return Formats::velocity;
+      case Quantity::acceleration: return Formats::acceleration;
+      case Quantity::linear_acceleration: return Formats::linear_acceleration;
+      case Quantity::length: return Formats::length;
+      case Quantity::force: return Formats::force;
+      case Quantity::torque: return Formats::torque;
+      case Quantity::unit: return unit_bits;
+      case Quantity::argument: return argument_bits;
+      case Quantity::ratio: return ratio_bits;
+      case Quantity::inverse_velocity: return Formats::inverse_velocity;
+      case Quantity::inverse_path: return Formats::inverse_path;
+      case Quantity::weight: return Formats::weight;
+    }
+    return 0;
+  }
+
+  template <Quantity quantity>
+  using Of = Fixed<bits(quantity)>;
+  template <Quantity quantity>
+  using Coefficient = Fixed<Formats::torque_sum - bits(quantity)>;
+  // m * a, K * h and h x a, K * J meet in common sums: that fixes the formats of the inertial parameters.
+  using Mass = Fixed<Formats::force_sum - Formats::linear_acceleration>;
+  using FirstMoment = Fixed<Formats::force_sum - Formats::acceleration>;
+  using SecondMoment = Fixed<Formats::force_sum - 2 * Formats::acceleration + Formats::linear_acceleration>;
+  using TorqueSum = Wide<Formats::torque_sum>;
+  using Word = std::int32_t;
+
+  template <class T>
+  static constexpr T load(Word word) { return {word}; }
+  static constexpr TorqueSum no_torque() { return {}; }
+  static constexpr Fixed<unit_bits> one() { return {1 << unit_bits}; }
+  template <class Hash>
+  static constexpr void hash_formats(Hash& hash) {
+    for (std::size_t i = 0; i < quantity_count; ++i) hash.add(bits(static_cast<Quantity>(i)));
+    hash.add(Formats::force_sum);
+    hash.add(Formats::torque_sum);
+  }
+
+  template <class T, int bits>
+  static constexpr T narrow(Wide<bits> x, Saturations& saturations) {
+    static_assert(bits >= T::bits, "narrowing to a finer format");
+    std::uint32_t outside = 0;
+    const T result{raw::narrow(x.raw, bits - T::bits, outside)};
+    saturations.count += outside;
+    return result;
+  }
+  template <class T, int bits>
+  static constexpr T clamp(Wide<bits> x) {
+    static_assert(bits >= T::bits, "narrowing to a finer format");
+    std::uint32_t outside = 0;
+    return {raw::narrow(x.raw, bits - T::bits, outside)};
+  }
+  template <class T, int bits>
+  static constexpr T convert(Fixed<bits> x, Saturations& saturations) {
+    std::uint32_t outside = 0;
+    const T result{raw::narrow(x.raw, bits - T::bits, outside)};
+    saturations.count += outside;
+    return result;
+  }
+};
+
+/// The names that formulas use.
+template <class N> using Position = typename N::template Of<Quantity::position>;
+template <class N> using Velocity = typename N::template Of<Quantity::velocity>;
+template <class N> using Acceleration = typename N::template Of<Quantity::acceleration>;
+template <class N> using LinearAcceleration = typename N::template Of<Quantity::linear_acceleration>;
+template <class N> using Length = typename N::template Of<Quantity::length>;
+template <class N> using Force = typename N::template Of<Quantity::force>;
+template <class N> using Torque = typename N::template Of<Quantity::torque>;
+template <class N> using Unit = typename N::template Of<Quantity::unit>;
+template <class N> using Argument = typename N::template Of<Quantity::argument>;
+template <class N> using Ratio = typename N::template Of<Quantity::ratio>;
+template <class N> using InverseVelocity = typename N::template Of<Quantity::inverse_velocity>;
+template <class N> using InversePath = typename N::template Of<Quantity::inverse_path>;
+template <class N> using Weight = typename N::template Of<Quantity::weight>;
+
+template <class N>
+concept NumberSystem = requires(Velocity<N> v, Unit<N> u, Saturations& saturations) {
+  { N::template narrow<Torque<N>>(typename N::TorqueSum{}, saturations) } -> std::same_as<Torque<N>>;
+  { N::template clamp<Argument<N>>(v * InverseVelocity<N>{}) } -> std::same_as<Argument<N>>;
+  { typename N::template Coefficient<Quantity::unit>{} * u } -> std::same_as<typename N::TorqueSum>;
+};
+static_assert(NumberSystem<Real>);
+
+}  // namespace fxdyn

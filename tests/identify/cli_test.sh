@@ -1,0 +1,87 @@
+#!/usr/bin/env bash
+# cli_test.sh FXDYN SOURCE_DIR: bad input gives exit code 1 or 2, one line that says what is wrong, and no files.
+set -u
+fxdyn=$1
+source=$2
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+failures=0
+
+# expect CODE "part of the message" ARGUMENTS...
+expect() {
+  local code=$1 part=$2
+  shift 2
+  local message status
+  rm -rf "$work/out"
+  message=$("$fxdyn" "$@" 2>&1 >/dev/null)
+  status=$?
+  message=$(grep '^fxdyn:' <<<"$message")
+  if [ $status -ne "$code" ] || [ "$(wc -l <<<"$message")" -ne 1 ] || ! grep -qF -- "$part" <<<"$message"; then
+    echo "FAILED: fxdyn $* -> exit $status (expected $code), expected '$part' in: $message"
+    failures=$((failures + 1))
+  fi
+  if [ -e "$work/out/model.json" ] || [ -n "$(find "$work" -name '*.tmp' 2>/dev/null)" ]; then
+    echo "FAILED: fxdyn $* left files behind"
+    failures=$((failures + 1))
+  fi
+}
+
+cat >"$work/arm.urdf" <<'URDF'
+<robot name="arm"><link name="base"/><link name="one"/><link name="two"/>
+<joint name="first" type="continuous"><parent link="base"/><child link="one"/><axis xyz="0 0 1"/></joint>
+<joint name="second" type="continuous"><parent link="one"/><child link="two"/><origin xyz="0.5 0 0"/><axis xyz="0 1 0"/></joint>
+</robot>
+URDF
+# make FILE AMPLITUDE_OF_JOINT_2 SAMPLES [FACTOR]
+make() {
+  awk -v a="$2" -v n="$3" -v f="${4:-1}" 'BEGIN { print "t,q1,q2,tau1,tau2"; for (k = 0; k < n; k++) { t = k * 0.002;
+    printf "%.4f,%.9f,%.9f,%.6f,%.6f\n", t, f * sin(3 * t), f * a * sin(4 * t + 1), -9 * sin(3 * t), -16 * a * sin(4 * t + 1) } }' >"$work/$1"
+}
+project() {  # project NAME LINES...
+  local name=$1
+  shift
+  printf '[robot]\nurdf = "arm.urdf"\n' >"$work/$name"
+  printf '%s\n' "$@" >>"$work/$name"
+}
+run() { expect "$1" "$2" run "$work/$3" --out "$work/out"; }
+
+make good.csv 0.7 5000
+project good.toml '[[log]]' 'file = "good.csv"' 'role = "train"' 'to_s = 7.0' '[[log]]' 'file = "good.csv"' 'role = "test"' 'from_s = 7.0'
+"$fxdyn" run "$work/good.toml" --out "$work/good" >/dev/null 2>&1 || { echo "FAILED: a good project"; failures=$((failures + 1)); }
+
+make still.csv 0 5000
+project still.toml '[[log]]' 'file = "still.csv"' 'role = "train"'
+run 1 "joint 2 (second) never moves" still.toml
+make short.csv 0.7 60
+project short.toml '[[log]]' 'file = "short.csv"' 'role = "train"'
+run 1 "short.csv" short.toml
+make degrees.csv 1 5000 57.3
+project degrees.toml '[[log]]' 'file = "degrees.csv"' 'role = "train"'
+run 2 "looks like degrees" degrees.toml
+project overlap.toml '[[log]]' 'file = "good.csv"' 'role = "train"' '[[log]]' 'file = "good.csv"' 'role = "test"' 'from_s = 5.0'
+run 2 "overlap" overlap.toml
+sed '100s/^[^,]*,[^,]*/0.1960,nan/' "$work/good.csv" >"$work/nan.csv"
+project nan.toml '[[log]]' 'file = "nan.csv"' 'role = "train"'
+run 2 "nan.csv:100" nan.toml
+sed '200s/^[^,]*/0.1/' "$work/good.csv" >"$work/back.csv"
+project back.toml '[[log]]' 'file = "back.csv"' 'role = "train"'
+run 2 "back.csv:200" back.toml
+sed '1s/tau2/torque2/' "$work/good.csv" >"$work/column.csv"
+project column.toml '[[log]]' 'file = "column.csv"' 'role = "train"'
+run 2 "tau2" column.toml
+sed 's/<parent link="one"/<parent link="base"/' "$work/arm.urdf" >"$work/branch.urdf"
+sed 's/arm.urdf/branch.urdf/' "$work/good.toml" >"$work/branch.toml"
+run 2 "branch" branch.toml
+run 2 "there.toml" there.toml
+project key.toml '[trian]' 'enabled = true'
+run 2 "trian" key.toml
+project rls.toml '[identify]' 'method = "rls"' '[[log]]' 'file = "good.csv"' 'role = "train"'
+run 2 "rls" rls.toml
+
+echo '{"schema": "fxdyn.model/1"}' >"$work/model.json"
+expect 2 "model.json" predict --model "$work/model.json" --log "$work/good.csv" --out "$work/out"
+expect 2 "prediction" predict --model "$work/good/model.json" --log "$work/good.csv" --out "$work"
+expect 2 "not there" replay "$work/good.toml" --image "$work/none.elf" --out "$work/fresh"
+
+[ $failures -eq 0 ] && echo "all refused as they should be"
+exit $failures

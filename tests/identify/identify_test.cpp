@@ -1,0 +1,144 @@
+#include "host_tools/identify/identify.hpp"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "host_tools/files.hpp"
+#include "host_tools/model/evaluator.hpp"
+#include "host_tools/pipeline/pipeline.hpp"
+#include "host_tools/simulate/simulate.hpp"
+#include "tests/support/files.hpp"
+
+namespace fxdyn {
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+const std::string robot_lines = "urdf = \"" FXDYN_SOURCE_DIR "/host_tools/demo/puma560.urdf\"\n";
+
+/// A scenario with three trajectories of the PUMA 560; `more` adds sensors and effects.
+fs::path scenario(const std::string& name, const std::string& more) {
+  std::string text = "seed = 1\n" + more + "[robot]\n" + robot_lines +
+                     "rated_torque = [97.6, 186.4, 89.4, 24.2, 20.1, 21.3]\nacceleration = [10, 10, 10, 20, 20, 20]\n";
+  for (const char* log : {"a", "b", "c"}) text += std::string("[[log]]\nname = \"") + log + "\"\nduration_s = 10\nseed = " + std::to_string(log[0]) + "\n";
+  return test::write(name, text);
+}
+
+fs::path project(const std::string& name, const fs::path& scenario_file, const std::string& more) {
+  std::string text = more + "[robot]\n" + robot_lines + "rated_torque = [97.6, 186.4, 89.4, 24.2, 20.1, 21.3]\n";
+  const char* roles[] = {"train", "validate", "test"};
+  for (int i = 0; i < 3; ++i) {
+    text += std::string("[[log]]\nscenario = \"") + scenario_file.filename().string() + "\"\nlog = \"" + "abc"[i] + "\"\nrole = \"" + roles[i] + "\"\n";
+  }
+  return test::write(name, text);
+}
+
+/// Largest relative error of any joint on the test logs.
+double worst_relative(const fs::path& directory) {
+  double worst = 0;
+  int joints = 0;
+  for (const json& log : json::parse(read_file(directory / "metrics.json")).at("logs")) {
+    if (log.at("role") != "test") continue;
+    for (const json& joint : log.at("joints")) {
+      worst = std::max(worst, joint.at("relative").get<double>());
+      ++joints;
+    }
+  }
+  EXPECT_EQ(joints, 6);
+  return worst;
+}
+
+constexpr const char* rigid_only = "[identify]\neffects = []\n[train]\nenabled = false\n";
+
+TEST(Identify, ExactMotionWithoutNoiseGivesTheRigidModelToOneInAMillionMillion) {
+  const fs::path file = project("exact.toml", scenario("exact_s.toml", "[sensors]\nexact_motion = true\n"), rigid_only);
+  const fs::path out = test::folder() / "exact";
+  Pipeline(file, out).identify();
+  EXPECT_LT(worst_relative(out), 1e-9);
+}
+
+TEST(Identify, PositionAloneWithoutNoiseGivesTheRigidModelToOneInAHundredThousand) {
+  const fs::path file = project("position.toml", scenario("position_s.toml", ""), rigid_only);
+  const fs::path out = test::folder() / "position";
+  Pipeline(file, out).identify();
+  EXPECT_LT(worst_relative(out), 1e-5);
+}
+
+TEST(Identify, RecoversTheParametersThatMadeTheData) {
+  std::string effects = "[sensors]\nexact_motion = true\n";
+  for (int j = 1; j <= 6; ++j) {
+    const std::string joint = "joint = " + std::to_string(j) + "\n";
+    effects += "[[effect]]\nname = \"viscous\"\n" + joint + "parameters = { coefficient = 1.5 }\n";
+    effects += "[[effect]]\nname = \"offset\"\n" + joint + "parameters = { torque = 0.7 }\n";
+    if (j >= 3) effects += "[[effect]]\nname = \"rotor_inertia\"\n" + joint + "parameters = { inertia = 0.3 }\n";
+  }
+  const fs::path file = project("recover.toml", scenario("recover_s.toml", effects),
+                                "[identify]\neffects = [\"viscous\", \"offset\", \"rotor_inertia\"]\n[train]\nenabled = false\n"
+                                "[signals]\nposition_cutoff_hz = 1000\ntorque_cutoff_hz = 1000\n");  // no filter: exact data
+  const fs::path out = test::folder() / "recover";
+  Pipeline(file, out).identify();
+  const IdentifiedModel model = read_model(out / "model.json");
+  for (std::size_t j = 0; j < 6; ++j) {
+    EXPECT_NEAR(model.joints[j].find("viscous")->linear[0], 1.5, 1e-8);
+    EXPECT_NEAR(model.joints[j].find("offset")->linear[0], 0.7, 1e-8);
+    ASSERT_EQ(model.joints[j].find("rotor_inertia") != nullptr, j >= 2);  // J1, J2: absorbed by link inertia
+    if (j < 2) continue;
+    EXPECT_NEAR(model.joints[j].find("rotor_inertia")->linear[0], 0.3, 1e-8);
+  }
+  // Base parameters: grouping times the parameters of the plant.
+  const IdentifiedModel truth = read_model(out / "logs" / "recover_s" / "truth.json");
+  const BaseSet base = find_base(to_dh(truth.robot));
+  Eigen::VectorXd parameters(60);
+  for (std::size_t i = 0; i < 6; ++i) {
+    const auto values = to_array(truth.inertia[i]);
+    for (std::size_t p = 0; p < parameters_per_link; ++p) parameters[static_cast<Eigen::Index>(10 * i + p)] = values[p];
+  }
+  const Eigen::VectorXd beta = base.grouping * parameters;
+  ASSERT_EQ(model.base.size(), base.columns.size());
+  for (std::size_t i = 0; i < model.base.size(); ++i) EXPECT_NEAR(model.base[i].value, beta[static_cast<Eigen::Index>(i)], 1e-7 * (1 + beta.cwiseAbs().maxCoeff())) << model.base[i].name;
+}
+
+TEST(Identify, ModelFileKeepsEverythingThatPredictionNeeds) {
+  const fs::path s = scenario("keep_s.toml", "[sensors]\nencoder_bits = 17\ntorque_noise = 0.01\n"
+                                             "[[effect]]\nname = \"coulomb\"\njoint = 2\nparameters = { amplitude = 8.0 }\n"
+                                             "[[effect]]\nname = \"presliding\"\njoint = 2\nparameters = { amplitude = 8.0, distance = 0.003 }\n");
+  const fs::path out = test::folder() / "keep";
+  Pipeline pipeline(project("keep.toml", s, "[train]\nnodes = 10\n"), out);
+  pipeline.identify();
+  pipeline.train();
+  const IdentifiedModel model = read_model(out / "model.json");
+  EXPECT_EQ(to_json(model).dump(), to_json([&] {
+              write_file(test::folder() / "copy.json", to_json(model).dump());
+              return read_model(test::folder() / "copy.json");
+            }()).dump());
+  // predict: from model.json and a log alone, at the log's own time stamps, and never over the log itself.
+  const fs::path log = out / "logs" / "keep_s" / "c.csv";
+  predict_log(out / "model.json", log, false, test::folder() / "prediction");
+  const Log prediction = read_log(test::folder() / "prediction" / "c.csv", 6, std::vector<bool>(6, true), {{{"q", "tau"}}, {}}, {}, {});
+  const Log measured = read_log(log, 6, std::vector<bool>(6, true), {}, {}, {});
+  EXPECT_EQ(prediction.samples(), measured.samples());
+  EXPECT_THROW(predict_log(out / "model.json", log, false, log.parent_path()), InputError);
+  // The same input gives the same bytes.
+  const std::string first = read_file(out / "model.json");
+  Pipeline again(project("keep.toml", s, "[train]\nnodes = 10\n"), test::folder() / "again");
+  again.identify();
+  again.train();
+  EXPECT_EQ(read_file(test::folder() / "again" / "model.json"), first);
+}
+
+TEST(Simulate, SameScenarioSameBytesAndTruthApart) {
+  const fs::path s = scenario("bytes.toml", "[sensors]\nencoder_bits = 16\ntorque_noise = 0.01\n");
+  const auto one = simulate(s, test::folder() / "one"), two = simulate(s, test::folder() / "two");
+  ASSERT_EQ(one.size(), 3U);
+  for (std::size_t i = 0; i < one.size(); ++i) EXPECT_EQ(read_file(one[i]), read_file(two[i]));
+  const Log log = read_log(one[0], 6, std::vector<bool>(6, true), {}, {}, {});
+  const double step = 2 * M_PI / 65536;
+  for (Eigen::Index k = 0; k < log.samples(); ++k) ASSERT_NEAR(std::remainder(log.q(k, 1), step), 0, 1e-9);
+  EXPECT_EQ(log.dq.size(), 0);
+  EXPECT_TRUE(fs::exists(test::folder() / "one" / "a.truth.csv"));
+}
+
+}  // namespace
+}  // namespace fxdyn

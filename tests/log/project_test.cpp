@@ -1,0 +1,214 @@
+#include "host_tools/log/project.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/files.hpp"
+
+namespace fxdyn {
+namespace {
+
+using test::Bad;
+using test::write;
+
+const std::string robot = "[robot]\nurdf = \"arm.urdf\"\n";               // lines 1, 2
+const std::string log = "[[log]]\nfile = \"a.csv\"\nrole = \"train\"\n";  // three lines
+
+std::filesystem::path write_project(const std::string& name, const std::string& text) {
+  write("arm.urdf",
+        "<robot name=\"arm\"><link name=\"a\"/><link name=\"b\"/><link name=\"c\"/>"
+        "<joint name=\"j1\" type=\"continuous\"><parent link=\"a\"/><child link=\"b\"/></joint>"
+        "<joint name=\"j2\" type=\"revolute\"><parent link=\"b\"/><child link=\"c\"/>"
+        "<limit lower=\"-1\" upper=\"1\" velocity=\"1\" effort=\"1\"/></joint></robot>");
+  std::string csv = "t,q1,q2,tau1,tau2\n";
+  for (int i = 0; i < 100; ++i) csv += std::to_string(i) + ",0,0,0,0\n";
+  write("a.csv", csv);
+  write("s.toml", "");
+  return write(name + ".toml", text);
+}
+
+class BadProject : public testing::TestWithParam<Bad> {};
+TEST_P(BadProject, IsRefusedInOneLine) {
+  const auto file = write_project("bad_" + GetParam().name, GetParam().text);
+  test::expect_refused(file, GetParam().message, [&] { read_project(file); });
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Table, BadProject,
+    testing::Values(
+        Bad{"not_toml", robot + "gravity = [1, 2\n[x]\n", {":4:", "not valid TOML"}},
+        Bad{"empty", "", {":1:", "'robot' is missing"}}, Bad{"no_urdf", "[robot]\n", {":1:", "'urdf' is missing"}},
+        Bad{"urdf_file", "[robot]\nurdf = \"army.urdf\"\n", {":2:", "robot.urdf", "no file", "army.urdf"}},
+        Bad{"urdf_number", "[robot]\nurdf = 3\n", {":2:", "expected a string"}},
+        Bad{"section", robot + "[identity]\n" + log, {":3:", "unknown key 'identity'", "nearest is 'identify'"}},
+        Bad{"key",
+            robot + "gravty = [0,0,1]\n" + log,
+            {":3:", "robot", "unknown key 'gravty'", "nearest is 'gravity'"}},
+        Bad{"log_key", robot + log + "from = 3\n", {":6:", "unknown key 'from'", "nearest is 'from_s'"}},
+        Bad{"signal", robot + log + "columns = { torque = \"i\" }\n", {":6:", "log.columns", "unknown key 'torque'"}},
+        Bad{"gravity", robot + "gravity = [0.0, -9.81]\n" + log, {":3:", "has 2 values, expected 3"}},
+        Bad{"gravity_mm", robot + "gravity = [0, 0, -9810]\n" + log, {":3:", "m/s^2"}},
+        Bad{"gravity_text", robot + "gravity = [0, 0, \"down\"]\n" + log, {":3:", "expected a number"}},
+        Bad{"rated", robot + "rated_torque = [1.0]\n" + log, {":3:", "has 1 values, expected 2", "arm.urdf"}},
+        Bad{"rated_sign", robot + "rated_torque = [1.0, -1.0]\n" + log, {":3:", "above 0"}},
+        Bad{"limits", robot + "[limits]\nposition = [[1, -1], [0, 1]]\n" + log, {":4:", "lower limit"}},
+        Bad{"limits_count", robot + "[limits]\nvelocity = [1, 2, 3]\n" + log, {":4:", "has 3 values, expected 2"}},
+        Bad{"no_logs", robot, {"role = \"train\""}},
+        Bad{"only_test", robot + "[[log]]\nfile = \"a.csv\"\nrole = \"test\"\n", {"role = \"train\""}},
+        Bad{"no_role", robot + "[[log]]\nfile = \"a.csv\"\n", {":3:", "'role' is missing"}},
+        Bad{"role",
+            robot + "[[log]]\nfile = \"a.csv\"\nrole = \"trian\"\n",
+            {":5:", "unknown role 'trian'", "nearest is 'train'"}},
+        Bad{"log_file", robot + "[[log]]\nfile = \"b.csv\"\nrole = \"train\"\n", {":4:", "no file", "b.csv"}},
+        Bad{"no_file", robot + "[[log]]\nrole = \"train\"\n", {":3:", "either file or scenario"}},
+        Bad{"scenario_log", robot + "[[log]]\nscenario = \"s.toml\"\nrole = \"train\"\n", {":4:", "add log ="}},
+        Bad{"window", robot + log + "from_s = 2\nto_s = 1\n", {":3:", "from_s is not below to_s"}},
+        Bad{"overlap",
+            robot + log + "to_s = 20\n[[log]]\nfile = \"./a.csv\"\nrole = \"test\"\nfrom_s = 19.9\n",
+            {":7:", "overlaps the log in line 3"}},
+        Bad{"torque_gain", robot + log + "torque_gain = [1]\n", {":6:", "has 1 values, expected 2"}},
+        Bad{"method",
+            robot + "[identify]\nmethod = \"lsq\"\n" + log,
+            {":4:", "unknown method 'lsq'", "nearest is 'ls'"}},
+        Bad{"effect",
+            robot + "[identify]\neffects = [\"viscous\", \"colomb\"]\n" + log,
+            {":4:", "unknown effect 'colomb'", "nearest is 'coulomb'"}},
+        Bad{"board",
+            robot + "[target]\nboard = \"mps2-an387\"\n" + log,
+            {":4:", "unknown board", "nearest is 'mps2-an38"}},
+        Bad{"tick", robot + "[target]\ntick_s = 0\n" + log, {":4:", "above 0"}},
+        Bad{"seed", robot + "[train]\nseed = 1.5\n" + log, {":4:", "expected an integer"}},
+        Bad{"enabled", robot + "[train]\nenabled = 1\n" + log, {":4:", "true or false"}},
+        Bad{"cutoff", robot + "[signals]\ntorque_cutoff_hz = -3\n" + log, {":4:", "above 0"}},
+        Bad{"log_table", robot + "log = 3\n", {":3:"}}, Bad{"robot_value", "robot = 3\n", {":1:", "expected a table"}}),
+    [](const auto& parameter) { return parameter.param.name; });
+
+TEST(Project, MissingFileIsNamed) {
+  test::expect_refused("nowhere.toml", {"can't be read"}, [] { read_project("/nowhere.toml"); });
+}
+
+TEST(Project, ReadsEveryKeyOfTheGuide) {
+  const auto file = write_project("full", R"(
+[robot]
+urdf = "arm.urdf"
+gravity = [0, 0, -9.81]
+rated_torque = [250, 30.5]
+[limits]
+position = [[-3, 3], [-1, 1]]
+velocity = [1, 2]
+acceleration = [10, 20]
+torque = [250, 30]
+box = [[-1, -1, 0], [1, 1, 2]]
+[[log]]
+file = "a.csv"
+role = "train"
+to_s = 50
+columns = { tau = "i" }
+torque_gain = [12.5, 1]
+payload = { mass = 0.0 }
+[[log]]
+file = "a.csv"
+role = "test"
+from_s = 50.0
+[[log]]
+scenario = "s.toml"
+log = "slow"
+role = "baseline"
+[signals]
+position_cutoff_hz = 20
+torque_cutoff_hz = 12
+edge_s = 0.25
+columns = { dq = "v", tau = "torque" }
+[identify]
+method = "ls"
+physical = true
+effects = ["viscous", "stribeck"]
+[diagnose]
+max_effects = 3
+[train]
+enabled = false
+seed = 7
+inputs = "state"
+windows = 2
+nodes = 10
+enhancement = 20
+activation = "tanh"
+ridge = 1e-3
+[train.pso]
+particles = 30
+iterations = 40
+stall = 10
+bounds = { nodes = [5, 40], ridge = [1e-4, 1e-1] }
+[excite]
+period_s = 10.0
+order = 5
+trajectories = 3
+noise = 0.0
+[target]
+board = "stm32g474"
+tick_s = 0.001
+joints = "all"
+)");
+  const Project project = read_project(file);
+  EXPECT_EQ(project.robot.size(), 2U);
+  EXPECT_EQ(project.robot.gravity.z(), -9.81);
+  EXPECT_EQ(project.rated_torque, std::vector({250.0, 30.5}));
+  EXPECT_EQ(project.limits.position[1][0], -1);
+  ASSERT_EQ(project.logs.size(), 3U);
+  EXPECT_TRUE(project.logs[0].file.is_absolute());
+  EXPECT_EQ(project.logs[0].line, 12);
+  EXPECT_EQ(*project.logs[0].to_s, 50);
+  EXPECT_EQ(project.logs[0].format.columns.at("tau"), "i");
+  EXPECT_EQ(project.logs[0].format.columns.at("dq"), "v");  // the default of [signals]
+  EXPECT_EQ(project.logs[0].format.torque_gain[0], 12.5);
+  EXPECT_EQ(project.logs[1].format.columns.at("tau"), "torque");
+  EXPECT_EQ(project.logs[1].role, Role::test);
+  EXPECT_EQ(project.logs[2].scenario_log, "slow");
+  EXPECT_TRUE(project.logs[2].file.empty());
+  EXPECT_TRUE(project.has_role(Role::baseline));
+  EXPECT_FALSE(project.has_role(Role::validate));
+  EXPECT_EQ(*project.signals.edge_s, 0.25);
+  EXPECT_EQ(project.identify.method, "ls");
+  EXPECT_EQ(*project.identify.effects, (std::vector<std::string>{"viscous", "stribeck"}));
+  EXPECT_FALSE(project.train.enabled);
+  EXPECT_EQ(project.train.seed, 7U);
+  EXPECT_EQ(*project.train.ridge, 1e-3);
+  EXPECT_EQ(project.target.board, "stm32g474");
+}
+
+TEST(Project, ReadsTheLogsOfARole) {
+  const auto file =
+      write_project("logs", robot + log + "to_s = 60\n[[log]]\nfile = \"a.csv\"\nrole = \"test\"\nfrom_s = 60\n");
+  const Project project = read_project(file);
+  const auto train = read_logs(project, Role::train, testing::TempDir()),
+             test = read_logs(project, Role::test, testing::TempDir());
+  ASSERT_EQ(train.size(), 1U);
+  EXPECT_EQ(train[0].samples(), 60);
+  ASSERT_EQ(test.size(), 1U);
+  EXPECT_EQ(test[0].samples(), 40);
+  EXPECT_EQ(test[0].role, Role::test);
+  EXPECT_TRUE(read_logs(project, Role::validate, testing::TempDir()).empty());
+}
+
+TEST(Project, JointsWithStopsDoNotTurnFarBeyondThem) {
+  std::string csv = "t,q1,q2,tau1,tau2\n";
+  for (int i = 0; i < 100; ++i) csv += std::to_string(i) + ",0," + std::to_string(i % 30) + ",0,0\n";
+  write("degrees.csv", csv);
+  const auto file = write_project("degrees", robot + "[[log]]\nfile = \"degrees.csv\"\nrole = \"train\"\n");
+  test::expect_refused("degrees.csv", {"q2 looks like degrees", "'j2'", "pi/180"},
+                       [&] { read_logs(read_project(file), Role::train, testing::TempDir()); });
+}
+
+TEST(Project, ALogNewerThanItsScenarioIsNotSimulatedAgain) {
+  const auto file =
+      write_project("scenario", robot + "[[log]]\nscenario = \"s.toml\"\nlog = \"slow\"\nrole = \"train\"\n");
+  const auto directory = file.parent_path() / "out";
+  std::filesystem::create_directories(directory / "logs/s");
+  std::filesystem::copy_file(file.parent_path() / "a.csv", directory / "logs/s/slow.csv",
+                             std::filesystem::copy_options::overwrite_existing);
+  std::filesystem::last_write_time(directory / "logs/s/slow.csv", std::filesystem::file_time_type::clock::now());
+  const Project project = read_project(file);
+  EXPECT_EQ(read_logs(project, Role::train, directory).at(0).samples(), 100);
+}
+
+}  // namespace
+}  // namespace fxdyn

@@ -1,0 +1,119 @@
+#include <gtest/gtest.h>
+
+#include "host_tools/export/export.hpp"
+#include "host_tools/identify/regressor.hpp"
+#include "host_tools/model/evaluator.hpp"
+#include "host_tools/random.hpp"
+
+namespace fxdyn {
+namespace {
+
+/// PUMA 560, or the same arm with its third joint sliding.
+IdentifiedModel arm(bool prismatic) {
+  IdentifiedModel model;
+  model.robot = read_urdf(FXDYN_SOURCE_DIR "/host_tools/demo/puma560.urdf");
+  if (prismatic) model.robot.joints[2].type = JointType::prismatic;
+  const DhChain chain = to_dh(model.robot);
+  const double rated[] = {97.6, 186.4, 89.4, 24.2, 20.1, 21.3};
+  for (std::size_t j = 0; j < model.robot.size(); ++j) {
+    model.inertia.push_back(to_link_inertia(*model.robot.joints[j].inertial, chain.urdf_in_dh[j]));
+    JointFit fit;
+    fit.rated_torque = rated[j];
+    fit.tau_limit = 5 * rated[j];
+    fit.q_lower = prismatic && j == 2 ? -0.5 : -2.8;
+    fit.q_upper = -fit.q_lower;
+    fit.dq_limit = 4;
+    fit.ddq_limit = 20;
+    model.joints.push_back(fit);
+  }
+  return model;
+}
+
+TickStates random_states(const IdentifiedModel& model, int count, std::uint64_t seed) {
+  Random random(seed);
+  const auto n = static_cast<Eigen::Index>(model.robot.size());
+  TickStates s{"random", Eigen::VectorXd::LinSpaced(count, 0, 1), Eigen::MatrixXd(count, n), Eigen::MatrixXd(count, n), Eigen::MatrixXd(count, n)};
+  for (Eigen::Index k = 0; k < count; ++k) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const JointFit& fit = model.joints[static_cast<std::size_t>(j)];
+      const bool corner = k % 4 == 0;
+      s.q(k, j) = random.uniform(fit.q_lower, fit.q_upper);
+      s.dq(k, j) = fit.dq_limit * (corner ? (random.uniform() < 0.5 ? -1 : 1) : random.uniform(-1, 1));
+      s.ddq(k, j) = fit.ddq_limit * (corner ? (random.uniform() < 0.5 ? -1 : 1) : random.uniform(-1, 1));
+    }
+  }
+  return s;
+}
+
+TEST(RneaFixed, StaysWithinAHundredThousandthOfRatedTorque) {
+  for (const bool prismatic : {false, true}) {
+    const IdentifiedModel model = arm(prismatic);
+    const Formats formats = choose_formats(model, {});
+    const QuantisationError error = quantisation_error(model, formats, {random_states(model, 20'000, 9)});
+    EXPECT_EQ(error.saturations, 0U);
+    for (std::size_t j = 0; j < model.joints.size(); ++j) {
+      EXPECT_LT(error.largest[static_cast<Eigen::Index>(j)], 1e-5 * model.joints[j].rated_torque) << "joint " << j + 1;
+    }
+  }
+}
+
+TEST(RneaFixed, TooNarrowFormatsSaturateAndAreCounted) {
+  const IdentifiedModel model = arm(false);
+  Formats formats = choose_formats(model, {});
+  formats[Quantity::force] += 5;
+  const TickStates states = random_states(model, 200, 9);
+  EXPECT_GT(quantisation_error(model, formats, {states}).saturations, 0U);
+}
+
+TEST(Regressor, TimesParametersIsRnea) {
+  for (const bool prismatic : {false, true}) {
+    const IdentifiedModel model = arm(prismatic);
+    Regressor regressor(to_dh(model.robot));
+    const TickStates states = random_states(model, 200, 13);
+    const Eigen::MatrixXd torque = predict(model, states.q, states.dq, states.ddq, 0.002);
+    Eigen::VectorXd parameters(60);
+    for (std::size_t i = 0; i < 6; ++i) {
+      const auto values = to_array(model.inertia[i]);
+      for (std::size_t p = 0; p < parameters_per_link; ++p) parameters[static_cast<Eigen::Index>(10 * i + p)] = values[p];
+    }
+    for (Eigen::Index k = 0; k < states.q.rows(); ++k) {
+      const Eigen::VectorXd product = regressor(states.q.row(k), states.dq.row(k), states.ddq.row(k)) * parameters;
+      ASSERT_LT((product - torque.row(k).transpose()).norm(), 1e-11 * torque.row(k).norm());
+    }
+  }
+}
+
+TEST(Regressor, BaseParametersOfThePuma560) {
+  const DhChain chain = to_dh(arm(false).robot);
+  const BaseSet base = find_base(chain);
+  EXPECT_EQ(base.columns.size(), 36U);
+  EXPECT_LT(base.condition, 100);
+  std::size_t rotors = 0;
+  for (Eigen::Index j = 0; j < 6; ++j) rotors += !rotor_inertia_is_absorbed(chain, base, j);
+  EXPECT_EQ(base.columns.size() + rotors, 40U);  // J3 .. J6 have one of their own
+}
+
+TEST(Regressor, TheRepresentativeGivesTheSameTorque) {
+  const IdentifiedModel model = arm(false);
+  const BaseSet base = find_base(to_dh(model.robot));
+  Eigen::VectorXd parameters(60);
+  for (std::size_t i = 0; i < 6; ++i) {
+    const auto values = to_array(model.inertia[i]);
+    for (std::size_t p = 0; p < parameters_per_link; ++p) parameters[static_cast<Eigen::Index>(10 * i + p)] = values[p];
+  }
+  const Eigen::VectorXd beta = base.grouping * parameters;
+  IdentifiedModel representative = model;
+  std::vector<std::array<double, parameters_per_link>> links(6);
+  for (std::size_t i = 0; i < base.columns.size(); ++i) {
+    const auto column = static_cast<std::size_t>(base.columns[i]);
+    links[column / 10][column % 10] = beta[static_cast<Eigen::Index>(i)];
+  }
+  for (std::size_t i = 0; i < 6; ++i) representative.inertia[i] = to_inertia(links[i]);
+  const TickStates states = random_states(model, 300, 17);
+  const Eigen::MatrixXd a = predict(model, states.q, states.dq, states.ddq, 0.002);
+  const Eigen::MatrixXd b = predict(representative, states.q, states.dq, states.ddq, 0.002);
+  EXPECT_LT((a - b).norm(), 1e-10 * a.norm());
+}
+
+}  // namespace
+}  // namespace fxdyn

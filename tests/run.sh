@@ -1,0 +1,45 @@
+#!/usr/bin/env bash
+# run.sh [LABEL...]: builds and runs the tests, all of them or those with one of the labels
+#   unit target hil real diagnosis fuzz bench
+# Without a label the unit tests also run with address and undefined-behaviour sanitizers.
+set -euo pipefail
+root=$(cd "$(dirname "$0")/.." && pwd)
+labels=(unit target hil real diagnosis fuzz bench)
+for label in "$@"; do
+  if [[ " ${labels[*]} " != *" $label "* ]]; then
+    echo "run.sh: unknown label '$label'; known: ${labels[*]}" >&2
+    exit 2
+  fi
+done
+
+cd "$root"
+step() { printf '\n[%3d s] %s\n' "$SECONDS" "$*"; }
+jobs=$(nproc)
+
+# build PRESET [TARGET]
+build() {
+  step "building $1"
+  cmake --preset "$1" >/dev/null
+  cmake --build --preset "$1" ${2:+--target "$2"}
+}
+
+step "packages"
+toolchains/setup.sh
+build host
+
+for label in "$@"; do
+  if ctest --test-dir build/host -N -L "^$label\$" | grep -q '^Total Tests: 0$'; then
+    echo "run.sh: no tests have the label '$label' yet" >&2
+    exit 1
+  fi
+done
+
+pattern=$(IFS='|'; echo "^($*)\$")
+step "tests"
+ctest --test-dir build/host --parallel "$jobs" --output-on-failure --no-tests=error ${1:+-L "$pattern"}
+[ $# -eq 0 ] || exit 0
+
+build host-asan
+step "unit tests with sanitizers"
+ctest --test-dir build/host-asan --parallel "$jobs" --output-on-failure --no-tests=error -L '^unit$'
+printf '\ndone in %d s\n' "$SECONDS"
