@@ -57,18 +57,30 @@ Eigen::MatrixXd ProcessedLog::decimate(const Eigen::Ref<const Eigen::MatrixXd>& 
   return out;
 }
 
+/// Whether velocity holds anything above the cut-off: noise, or motion that a filter would bend.
+static bool is_noisy(const Eigen::MatrixXd& velocity, double cutoff_hz, double step_s) {
+  const Eigen::MatrixXd above = velocity - ZeroPhaseFilter(cutoff_hz, step_s).apply(velocity);
+  const Eigen::Index edge = std::min<Eigen::Index>(velocity.rows() / 4, static_cast<Eigen::Index>(2 / (cutoff_hz * step_s)));
+  const Eigen::Index rows = velocity.rows() - 2 * edge;
+  return above.middleRows(edge, rows).norm() > 1e-6 * velocity.middleRows(edge, rows).norm();
+}
+
 FilterFit choose_filter(const std::vector<Log>& logs, const SignalSettings& settings) {
   double excited = 0, rate = 1e30;
+  std::vector<Eigen::MatrixXd> velocities;
   for (const Log& log : logs) {
     rate = std::min(rate, 1 / log.step_s);
     if (settings.position_cutoff_hz && settings.torque_cutoff_hz) continue;
-    const Eigen::MatrixXd velocity = log.dq.size() > 0 ? log.dq : differentiate(log.q, log.step_s);
-    excited = std::max(excited, power_frequency(velocity, log.step_s, 0.999, std::min(30.0, 0.4 * rate)));
+    velocities.push_back(log.dq.size() > 0 ? log.dq : differentiate(log.q, log.step_s));
+    excited = std::max(excited, power_frequency(velocities.back(), log.step_s, 0.999, std::min(30.0, 0.4 * rate)));
   }
+  const double position = std::min(0.4 * rate, std::max(10 * excited, 10.0));
+  bool noisy = false;
+  for (std::size_t i = 0; i < velocities.size(); ++i) noisy |= is_noisy(velocities[i], position, logs[i].step_s);
   FilterFit filter;
-  filter.position_cutoff_hz = settings.position_cutoff_hz.value_or(std::min(0.4 * rate, std::max(10 * excited, 10.0)));
+  filter.position_cutoff_hz = settings.position_cutoff_hz.value_or(noisy ? position : rate / 2);  // half the rate: no filter
   filter.torque_cutoff_hz = settings.torque_cutoff_hz.value_or(std::min(0.4 * rate, std::max(5 * excited, 10.0)));
-  filter.edge_s = settings.edge_s.value_or(1.5 / std::min(filter.torque_cutoff_hz, filter.position_cutoff_hz));
+  filter.edge_s = settings.edge_s.value_or(3 / std::min(filter.torque_cutoff_hz, filter.position_cutoff_hz));
   return filter;
 }
 

@@ -30,7 +30,8 @@ struct ProcessedLog {
 };
 
 /// Cut-offs: the project's, else chosen from the logs: ten times the frequency below which 99.9 % of the power of the
-/// velocity lies (five times for torque: friction reverses faster than the motion), at most 0.4 of the sampling rate.
+/// velocity lies (five times for torque: friction reverses faster than the motion), at most 0.4 of the sampling rate. Motion
+/// without noise (simulated, exact) is not filtered.
 FilterFit choose_filter(const std::vector<Log>& logs, const SignalSettings& settings);
 
 /// @throws DataError where the log is shorter than the edges that the filter needs.

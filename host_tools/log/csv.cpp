@@ -478,6 +478,8 @@ void write_log(const std::filesystem::path& file, const Log& log) {
   }
   out += '\n';
 
+  std::error_code error;
+  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), error);
   std::filesystem::path temporary = file;
   temporary += ".tmp";
   std::ofstream stream(temporary, std::ios::binary | std::ios::trunc);

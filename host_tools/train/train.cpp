@@ -10,6 +10,7 @@ namespace fxdyn {
 namespace {
 
 constexpr double worth_keeping = 0.05;
+constexpr double nearly = 1.05;
 
 /// Fixed point costs about 1.5e-6 (tanh) of the sum of the coefficients: this keeps it below 1e-4 of rated torque.
 constexpr double largest_sum = 60;
@@ -60,8 +61,11 @@ std::vector<TrainOutcome> train(Fitter& fitter, const TrainSettings& settings, P
 
   progress.stage("training the BLS", n * candidates);
   const std::vector<Judgement> without = fitter.held_out();
-  std::vector<Choice> best(n);
+  std::vector<Choice> chosen(n);
   parallel_for(n, [&](std::size_t j) {
+    std::vector<Choice> tried;
+    const Choice* best = nullptr;
+    tried.reserve(candidates * ridges.size());
     const double range = span(fitter, j);
     JointFit design = fitter.design(j);
     BroadLearningFit bls;
@@ -73,25 +77,30 @@ std::vector<TrainOutcome> train(Fitter& fitter, const TrainSettings& settings, P
       const std::vector<Judgement> judgements = fitter.held_out_with(j, design, ridges);
       for (std::size_t i = 0; i < judgements.size(); ++i) {
         if (judgements[i].coefficient_sum > largest_sum * design.rated_torque) continue;
-        if (judgements[i].rmse >= best[j].judgement.rmse) continue;
-        best[j] = {design, judgements[i]};
-        best[j].design.bls->ridge = ridges[i];
+        tried.push_back({design, judgements[i]});
+        tried.back().design.bls->ridge = ridges[i];
+        if (best == nullptr || judgements[i].rmse < best->judgement.rmse) best = &tried.back();
       }
       progress.step();
     };
     // The presliding distance matters most: it is chosen with a middling network, the network with that distance.
     for (const double share : distances) attempt(share * range, 1.0, sizes[sizes.size() / 2]);
-    if (!best[j].design.bls) return;  // none whose coefficients are small enough
-    const double distance = best[j].design.bls->distances[1];
+    if (best == nullptr) return;  // none whose coefficients are small enough
+    const double distance = best->design.bls->distances[1];
     for (const double scale : scales) {
       for (const Eigen::Index nodes : sizes) attempt(distance, scale, nodes);
+    }
+    // Of those that are nearly as good, the one with the smallest coefficients: it leans least on its training data.
+    for (const Choice& choice : tried) {
+      if (choice.judgement.rmse > nearly * best->judgement.rmse) continue;
+      if (!chosen[j].design.bls || choice.judgement.coefficient_sum < chosen[j].judgement.coefficient_sum) chosen[j] = choice;
     }
   });
 
   std::vector<TrainOutcome> outcomes(n);
   for (std::size_t j = 0; j < n; ++j) {
-    outcomes[j] = {without[j].rmse, best[j].judgement.rmse, best[j].judgement.beats(without[j], worth_keeping)};
-    if (outcomes[j].kept) fitter.set_design(j, best[j].design);
+    outcomes[j] = {without[j].rmse, chosen[j].judgement.rmse, chosen[j].judgement.beats(without[j], worth_keeping)};
+    if (outcomes[j].kept) fitter.set_design(j, chosen[j].design);
   }
   progress.done();
   return outcomes;

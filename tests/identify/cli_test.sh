@@ -52,7 +52,7 @@ project good.toml '[[log]]' 'file = "good.csv"' 'role = "train"' 'to_s = 7.0' '[
 make still.csv 0 5000
 project still.toml '[[log]]' 'file = "still.csv"' 'role = "train"'
 run 1 "joint 2 (second) never moves" still.toml
-make short.csv 0.7 60
+make short.csv 0.7 12
 project short.toml '[[log]]' 'file = "short.csv"' 'role = "train"'
 run 1 "short.csv" short.toml
 make degrees.csv 1 5000 57.3

@@ -39,7 +39,8 @@ fs::path project(const std::string& name, const fs::path& scenario_file, const s
 double worst_relative(const fs::path& directory) {
   double worst = 0;
   int joints = 0;
-  for (const json& log : json::parse(read_file(directory / "metrics.json")).at("logs")) {
+  const json metrics = json::parse(read_file(directory / "metrics.json"));
+  for (const json& log : metrics.at("logs")) {
     if (log.at("role") != "test") continue;
     for (const json& joint : log.at("joints")) {
       worst = std::max(worst, joint.at("relative").get<double>());

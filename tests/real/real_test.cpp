@@ -23,6 +23,8 @@ struct RealSet {
   double goal;  ///< largest geometric mean of ours / baseline
 };
 
+void PrintTo(const RealSet& set, std::ostream* out) { *out << set.name; }
+
 class Real : public testing::TestWithParam<RealSet> {};
 
 TEST_P(Real, HeldOutErrorIsNoWorseThanTheBaseline) {

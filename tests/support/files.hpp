@@ -30,6 +30,8 @@ struct Bad {
   std::vector<std::string> message;
 };
 
+inline void PrintTo(const Bad& bad, std::ostream* out) { *out << bad.name; }
+
 template <class Action>
 void expect_refused(const std::filesystem::path& file, const std::vector<std::string>& parts, Action action) {
   std::string message;
