@@ -89,7 +89,14 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
   data.largest_torque = data.dq = data.ddq = Eigen::VectorXd::Zero(n);
   data.q_lower = Eigen::VectorXd::Constant(n, 1e300);
   data.q_upper = -data.q_lower;
+  if (project.limits.position.empty() || project.limits.velocity.empty() || project.limits.acceleration.empty()) {
+    data.notes.push_back("limits not in the project: 1.2 times the largest in the logs (URDF limits where they are within a factor of ten)");
+  }
+  if (project.rated_torque.empty()) data.notes.push_back("robot.rated_torque not in the project: the largest measured torque stands for it");
   for (const Log& log : logs) {
+    if (log.resampled) {
+      data.notes.push_back(fmt::format("{}: irregular time stamps, resampled to {:.6g} s", log.file.filename().string(), log.step_s));
+    }
     ProcessedLog processed = process(log, data.filter);
     data.largest_torque = data.largest_torque.cwiseMax(log.tau.cwiseAbs().colwise().maxCoeff().transpose());
     const auto inside = [&](const Eigen::MatrixXd& m) { return m.middleRows(processed.first, processed.last - processed.first); };
@@ -195,6 +202,8 @@ std::unique_ptr<Fitter> identify(const Project& project, const GateData& data, P
   return fitter;
 }
 
+std::string project_hash(const Project& project) { return hash_of(read_file(project.file) + read_file(project.urdf)); }
+
 IdentifiedModel finish_model(const Fitter& fitter, const Project& project, const GateData& data) {
   IdentifiedModel model = fitter.to_model(fitter.fit());
   model.filter = data.filter;
@@ -202,7 +211,7 @@ IdentifiedModel finish_model(const Fitter& fitter, const Project& project, const
   model.tick_s = project.target.tick_s;
   model.seed = project.train.seed;
   model.project = project.file.filename().string();
-  model.project_hash = hash_of(read_file(project.file));
+  model.project_hash = fxdyn::project_hash(project);
   model.logs = data.references;
   return model;
 }

@@ -12,6 +12,7 @@ struct GateData {
   FilterFit filter;
   std::vector<ProcessedLog> logs;
   std::vector<LogReference> references;
+  std::vector<std::string> notes;             ///< what a reader should know of the data
   Eigen::VectorXd largest_torque;             ///< raw, over the train logs [N*m | N]
   Eigen::VectorXd q_lower, q_upper, dq, ddq;  ///< largest of the filtered motion
 };
@@ -24,6 +25,9 @@ std::vector<JointFit> initial_joints(const Project& project, const GateData& dat
 /// Structure and friction: widths and shapes searched on the gate data, coefficients by (weighted) least squares. Returns
 /// the fitter with the chosen designs.
 std::unique_ptr<Fitter> identify(const Project& project, const GateData& data, Progress& progress);
+
+/// Of the project file and its URDF.
+std::string project_hash(const Project& project);
 
 /// The fitter's model with everything that model.json records.
 IdentifiedModel finish_model(const Fitter& fitter, const Project& project, const GateData& data);

@@ -297,6 +297,14 @@ Eigen::MatrixXd resample(const Eigen::MatrixXd& columns, const Eigen::VectorXd& 
   return result;
 }
 
+}  // namespace
+
+Eigen::MatrixXd interpolate(const Eigen::MatrixXd& columns, const Eigen::VectorXd& t, const Eigen::VectorXd& at) {
+  return resample(columns, t, at);
+}
+
+namespace {
+
 void resample(Log& log, double step) {
   const double length = log.t[log.t.size() - 1] - log.t[0];
   const auto count = static_cast<Index>(std::floor(length / step * (1 + 1e-12))) + 1;
@@ -461,6 +469,7 @@ Log read_log(const std::filesystem::path& file, std::size_t joints, const std::v
     if (turns) check_range(log, joint, where);
   }
   check_ranges(log, revolute, where);
+  log.stamps = log.t;
   if (log.resampled) resample(log, log.step_s);
   return log;
 }

@@ -23,6 +23,7 @@ struct Log {
   double step_s = 0;            ///< sampling interval
   bool resampled = false;       ///< the file's time stamps were irregular
   Eigen::VectorXd t;            ///< [s]
+  Eigen::VectorXd stamps;       ///< the file's own time stamps in the window [s]
   Eigen::MatrixXd q, dq, ddq, tau, qlink;
   Eigen::Index samples() const { return t.size(); }
   Eigen::Index joints() const { return q.cols(); }
@@ -46,6 +47,9 @@ Log read_log(const std::filesystem::path& file, std::size_t joints, const std::v
 
 /// Writes t, q, dq?, ddq?, tau? with 17 significant digits (to a temporary file, then renamed).
 void write_log(const std::filesystem::path& file, const Log& log);
+
+/// Columns sampled at t, linearly interpolated at other instants (ascending).
+Eigen::MatrixXd interpolate(const Eigen::MatrixXd& columns, const Eigen::VectorXd& t, const Eigen::VectorXd& at);
 
 /// Zero-phase low-pass Butterworth filter: forward and backward over each column, with odd reflection at both ends and
 /// steady-state initial conditions. `order` is the order of one pass (the baseline of shared data: 4).

@@ -22,12 +22,13 @@ const GateData& Pipeline::data() {
     data_ = std::make_unique<GateData>(read_gate_data(project_, directory_));
     progress_.step();
     progress_.done();
+    for (const std::string& note : data_->notes) fmt::print(stderr, "note: {}\n", note);
   }
   return *data_;
 }
 
 bool Pipeline::is_current(const IdentifiedModel& model) {
-  if (model.project_hash != hash_of(read_file(project_.file)) || model.logs.size() != data().references.size()) return false;
+  if (model.project_hash != project_hash(project_) || model.logs.size() != data().references.size()) return false;
   for (std::size_t i = 0; i < model.logs.size(); ++i) {
     if (model.logs[i].hash != data().references[i].hash) return false;
   }
@@ -69,6 +70,7 @@ void Pipeline::finish(const Fitter& fitter, Stage stage, const json& training) {
   json metrics = {{"schema", "fxdyn.metrics/1"},
                   {"gate", fitter.gate()},
                   {"base_parameters", fitter.base().columns.size()},
+                  {"notes", data().notes},
                   {"logs", stages.back()["logs"]},
                   {"stages", stages}};
   if (!training.is_null()) metrics["training"] = training;
@@ -85,24 +87,20 @@ std::unique_ptr<Fitter> Pipeline::fitter_from(const IdentifiedModel& model) {
 }
 
 void Pipeline::identify() {
-  fitter_ = fxdyn::identify(project_, data(), progress_);
-  finish(*fitter_, Stage::identified, {});
+  const auto fitter = fxdyn::identify(project_, data(), progress_);
+  finish(*fitter, Stage::identified, {});
 }
 
 void Pipeline::train() {
-  if (!fitter_) {
-    if (const fs::path file = directory_ / "model.json"; fs::exists(file)) {
-      IdentifiedModel model = read_model(file);
-      if (is_current(model)) {
-        for (JointFit& joint : model.joints) joint.bls.reset();
-        fitter_ = fitter_from(model);
-      }
-    }
-    if (!fitter_) identify();
-  }
+  const fs::path file = directory_ / "model.json";
+  if (!fs::exists(file) || !is_current(read_model(file))) identify();
+  // Always from the file: `fxdyn run` gives the same bytes as the verbs one by one.
+  IdentifiedModel identified = read_model(file);
+  for (JointFit& joint : identified.joints) joint.bls.reset();
+  const auto fitter = fitter_from(identified);
   json training = json::array();
   if (project_.train.enabled) {
-    const auto outcomes = fxdyn::train(*fitter_, project_.train, progress_);
+    const auto outcomes = fxdyn::train(*fitter, project_.train, progress_);
     for (std::size_t j = 0; j < outcomes.size(); ++j) {
       training.push_back({{"joint", project_.robot.joints[j].name},
                           {"index", j + 1},
@@ -111,9 +109,9 @@ void Pipeline::train() {
                           {"held_out_with", outcomes[j].error_with},
                           {"kept", outcomes[j].kept}});
     }
-    if (project_.identify.method != "ls") fitter_->reweight();
+    if (project_.identify.method != "ls") fitter->reweight();
   }
-  finish(*fitter_, Stage::trained, training);
+  finish(*fitter, Stage::trained, training);
 }
 
 IdentifiedModel Pipeline::model() {
@@ -203,8 +201,8 @@ void predict_log(const fs::path& model_file, const fs::path& log_file, bool fixe
     throw InputError(fmt::format("{}: would be overwritten by its prediction; choose another --out", out.string()));
   }
   Log result;
-  result.t = processed.t;
-  result.tau = torque;
+  result.t = log.stamps;
+  result.tau = log.resampled ? interpolate(torque, processed.t, log.stamps) : torque;
   write_log(out, result);
   json logs = json::array();
   if (processed.tau.size() > 0) logs.push_back(metrics_json(processed, robot, judge(processed, torque)));

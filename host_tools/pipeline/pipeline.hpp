@@ -37,7 +37,6 @@ class Pipeline {
   Project project_;
   std::filesystem::path directory_;
   std::unique_ptr<GateData> data_;
-  std::unique_ptr<Fitter> fitter_;
   Progress progress_;
 };
 

@@ -92,7 +92,7 @@ bool replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index
   for (const Role role : {Role::test, Role::validate}) {
     for (const ProcessedLog& log : pipeline.logs(role)) streams.push_back(at_ticks(log, model.tick_s));
   }
-  if (streams.empty()) {
+  if (streams.size() < 2) {
     for (const ProcessedLog& log : pipeline.logs(Role::train)) streams.push_back(at_ticks(log, model.tick_s));
   }
   streams.push_back(perturbed(streams.front(), model, 7));

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
@@ -70,6 +72,26 @@ TEST(Target, FirmwareGivesTheHostsBitsOnASimulatedRobot) {
   for (int i = 0; i < 3; ++i) text += std::string("[[log]]\nscenario = \"scenario.toml\"\nlog = \"") + "abc"[i] + "\"\nrole = \"" + roles[i] + "\"\n";
   const fs::path project = test::write("project.toml", text);
   expect_exact(replay_on_target(project, test::folder() / "simulated"), 3000);
+}
+
+TEST(Demo, TheBlsLearnsTheFrictionThatTheModelLeavesOut) {
+  const fs::path out = test::folder() / "demo";
+  Pipeline(FXDYN_SOURCE_DIR "/host_tools/demo/project.toml", out).train();
+  const json metrics = json::parse(read_file(out / "metrics.json"));
+  // [friction, bls][joint]: squared error over the test logs
+  std::array<std::array<double, 6>, 2> square{};
+  for (std::size_t s = 0; s < 2; ++s) {
+    for (const json& log : metrics.at("stages").at(s + 1).at("logs")) {
+      if (log.at("role") != "test") continue;
+      for (std::size_t j = 0; j < 6; ++j) square[s][j] += std::pow(log.at("joints").at(j).at("rmse").get<double>(), 2);
+    }
+  }
+  int improved = 0;
+  for (std::size_t j = 0; j < 6; ++j) {
+    const bool kept = metrics.at("training").at(j).at("kept");
+    improved += kept && std::sqrt(square[1][j]) <= 0.7 * std::sqrt(square[0][j]);
+  }
+  EXPECT_GE(improved, 4);
 }
 
 TEST(Target, FirmwareGivesTheHostsBitsOnARealLog) {
