@@ -32,7 +32,7 @@ images=("$out"/firmware/fxdyn-*.elf)
 echo "${images[0]}"
 
 step "the held-out logs on the firmware, in QEMU"
-"$fxdyn" replay "$project" --out "$out" --image "${images[0]}" --ticks 2500 >/dev/null
+"$fxdyn" replay "$project" --out "$out" --image "${images[0]}" --ticks 1000 >/dev/null
 
 step "report"
 "$fxdyn" report "$project" --out "$out"

@@ -16,7 +16,8 @@ namespace fxdyn {
 std::string read_file(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   std::ostringstream text;
-  if (!in || !(text << in.rdbuf())) {
+  // Inserting nothing, from an empty file, sets the fail bit.
+  if (!in || (in.peek() != std::ifstream::traits_type::eof() && !(text << in.rdbuf()))) {
     throw InputError(fmt::format("{}: can't be read: {}", file.string(), std::strerror(errno)));
   }
   return text.str();

@@ -39,7 +39,7 @@ step "tests"
 ctest --test-dir build/host --parallel "$jobs" --output-on-failure --no-tests=error ${1:+-L "$pattern"}
 [ $# -eq 0 ] || exit 0
 
-build host-asan
+build host-asan unit_tests
 step "unit tests with sanitizers"
 ctest --test-dir build/host-asan --parallel "$jobs" --output-on-failure --no-tests=error -L '^unit$'
 printf '\ndone in %d s\n' "$SECONDS"

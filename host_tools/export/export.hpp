@@ -1,7 +1,7 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <vector>
 
 #include "host_tools/identify/dataset.hpp"
@@ -15,7 +15,8 @@ struct TickStates {
   Eigen::VectorXd t;
   Eigen::MatrixXd q, dq, ddq;
 };
-TickStates at_ticks(const ProcessedLog& log, double tick_s);
+/// `whole`: with the edges that the filters disturb, which figures leave out.
+TickStates at_ticks(const ProcessedLog& log, double tick_s, bool whole = false);
 
 /// Seeded disturbance of every state: noise of 1 % of the limits, and now and then a value far beyond them.
 TickStates perturbed(const TickStates& states, const IdentifiedModel& model, std::uint64_t seed);
@@ -42,8 +43,9 @@ class FixedModel {
 };
 
 /// Chooses the formats: ranges observed when the model runs over the given states and over 4000 random states within the
-/// joint limits, with a factor of two in reserve. Not a proof: whatever exceeds it saturates and is counted.
-/// @throws DataError where a sum can't be held in 64 bits.
+/// joint limits, with a factor of two in reserve; 64-bit sums bounded by the sum of the magnitudes of their terms. Not a
+/// proof: whatever exceeds a number's format saturates and is counted.
+/// @throws DataError where the joints' parameters are too far apart in size for common sums.
 Formats choose_formats(const IdentifiedModel& model, const std::vector<TickStates>& states);
 
 /// |fixed - double| of each joint over the states [N*m | N], both fed with the same quantised states.
@@ -56,11 +58,9 @@ QuantisationError quantisation_error(const IdentifiedModel& model, const Formats
 /// Torques of the fixed-point model over a log at its own states, samples x joints [N*m | N].
 Eigen::MatrixXd predict_fixed(const IdentifiedModel& model, const Formats& formats, const TickStates& states);
 
-/// Writes tables.hpp and tables.bin.
-void write_tables(const IdentifiedModel& model, const Formats& formats, const QuantisationError& error,
+/// Writes tables.hpp and tables.bin; returns the CRC-32 of the parameters.
+std::uint32_t write_tables(const IdentifiedModel& model, const Formats& formats, const QuantisationError& error,
                   const std::filesystem::path& directory);
 
-nlohmann::json formats_json(const Formats& formats);
-Formats read_formats(const std::filesystem::path& export_json);
 
 }  // namespace fxdyn

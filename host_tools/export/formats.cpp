@@ -4,9 +4,10 @@
 
 #include "host_tools/error.hpp"
 #include "host_tools/export/export.hpp"
-#include "host_tools/files.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/random.hpp"
+
+#include <nlohmann/json.hpp>
 
 namespace fxdyn {
 namespace {
@@ -56,17 +57,31 @@ Formats choose_formats(const IdentifiedModel& model, const std::vector<TickState
   formats[Quantity::unit] = unit_bits;
   formats[Quantity::argument] = argument_bits;
   formats[Quantity::ratio] = ratio_bits;
-  // What align() and narrow() need (model/rigid_body.hpp): products at least as fine as what they are added to.
-  const auto at_most = [&](Quantity quantity, int bits) { formats[quantity] = std::min(formats[quantity], bits); };
-  at_most(Quantity::acceleration, 2 * formats[Quantity::velocity]);
-  at_most(Quantity::linear_acceleration, formats[Quantity::acceleration] + formats[Quantity::length]);
-  at_most(Quantity::torque, formats[Quantity::length] + formats[Quantity::force]);
+  // A product must be at least as fine as what it is added to, and the sum of its terms must fit 62 bits and a sign
+  // (model/rigid_body.hpp: align() and narrow()). Bounds are sums of magnitudes, so no partial sum exceeds them.
+  using Q = Quantity;
+  const auto bits = [&](Q quantity) -> int& { return formats[quantity]; };
+  const auto at_most = [&](Q quantity, int most) { bits(quantity) = std::min(bits(quantity), most); };
+  const auto product_at_most = [&](Q x, Q y, double sum) {
+    while (bits(x) + bits(y) > fitting_bits(2 * sum, 62)) --(bits(x) > bits(y) ? bits(x) : bits(y));
+  };
+  const double v = ranges[Q::velocity], w = ranges[Q::acceleration], a = ranges[Q::linear_acceleration];
+  const double l = ranges[Q::length], f = ranges[Q::force], t = ranges[Q::torque];
+  at_most(Q::velocity, fitting_bits(2 * (2 * v * v + w + a), 62) / 2);
+  at_most(Q::acceleration, 2 * bits(Q::velocity));
+  at_most(Q::linear_acceleration, 2 * bits(Q::velocity));
+  product_at_most(Q::acceleration, Q::length, 3 * w * l + a);
+  product_at_most(Q::length, Q::force, 2 * l * f + 2 * t);
+  at_most(Q::linear_acceleration, bits(Q::acceleration) + bits(Q::length));
+  at_most(Q::torque, bits(Q::length) + bits(Q::force));
 
-  const int a = formats[Quantity::linear_acceleration], w = formats[Quantity::acceleration];
-  const auto sum_bits = [](double largest) { return fitting_bits(8 * largest, 62); };
-  formats.force_sum = std::min({fitting_bits(ranges.mass, 31) + a, fitting_bits(ranges.first_moment, 31) + w,
-                                fitting_bits(ranges.second_moment, 31) + 2 * w - a, sum_bits(ranges[Quantity::force]),
-                                sum_bits(ranges[Quantity::torque]) + w - a});
+  const int fa = bits(Q::linear_acceleration), fw = bits(Q::acceleration);
+  formats.force_sum = std::min({fitting_bits(ranges.mass, 31) + fa, fitting_bits(ranges.first_moment, 31) + fw,
+                                fitting_bits(ranges.second_moment, 31) + 2 * fw - fa,
+                                fitting_bits(2 * (ranges.mass * a + 3 * w * ranges.first_moment), 62),
+                                fitting_bits(2 * (2 * ranges.first_moment * a + 6 * w * ranges.second_moment), 62) + fw - fa});
+  at_most(Q::force, formats.force_sum);
+  at_most(Q::torque, std::min(formats.force_sum - fw + fa, bits(Q::length) + bits(Q::force)));
 
   // Every partial sum of a joint's contributions, bounded by the sum of the magnitudes.
   double torque_sum = 0;
@@ -93,36 +108,16 @@ Formats choose_formats(const IdentifiedModel& model, const std::vector<TickState
   return formats;
 }
 
-nlohmann::json formats_json(const Formats& formats) {
-  nlohmann::json out;
-  for (std::size_t i = 0; i < quantity_count; ++i) out[std::string(quantity_names[i])] = formats.quantity[i];
-  out["force_sum"] = formats.force_sum;
-  out["torque_sum"] = formats.torque_sum;
-  return out;
-}
-
-Formats read_formats(const std::filesystem::path& export_json) {
-  try {
-    const auto j = nlohmann::json::parse(read_file(export_json)).at("formats");
-    Formats formats;
-    for (std::size_t i = 0; i < quantity_count; ++i) formats.quantity[i] = j.at(std::string(quantity_names[i]));
-    formats.force_sum = j.at("force_sum");
-    formats.torque_sum = j.at("torque_sum");
-    return formats;
-  } catch (const nlohmann::json::exception& error) {
-    throw InputError(fmt::format("{}: not a valid export: {}; make it anew with `fxdyn export`", export_json.string(), error.what()));
-  }
-}
-
-TickStates at_ticks(const ProcessedLog& log, double tick_s) {
-  const double from = log.t[log.first], to = log.t[log.last - 1];
+TickStates at_ticks(const ProcessedLog& log, double tick_s, bool whole) {
+  const Eigen::Index first = whole ? 0 : log.first, last = whole ? log.t.size() : log.last;
+  const double from = log.t[first], to = log.t[last - 1];
   const auto ticks = static_cast<Eigen::Index>(std::floor((to - from) / tick_s + 1e-9)) + 1;
   TickStates out{log.name, Eigen::VectorXd(ticks), Eigen::MatrixXd(ticks, log.q.cols()), Eigen::MatrixXd(ticks, log.q.cols()),
                  Eigen::MatrixXd(ticks, log.q.cols())};
   for (Eigen::Index k = 0; k < ticks; ++k) {
     const double t = from + tick_s * static_cast<double>(k);
     const double place = (t - from) / log.step_s;
-    const auto i = std::min(log.first + static_cast<Eigen::Index>(place + 1e-9), log.last - 2);
+    const auto i = std::min(first + static_cast<Eigen::Index>(place + 1e-9), last - 2);
     const double share = std::clamp((t - log.t[i]) / log.step_s, 0.0, 1.0);
     out.t[k] = t;
     const auto blend = [&](const Eigen::MatrixXd& m) { return ((1 - share) * m.row(i) + share * m.row(i + 1)).eval(); };

@@ -188,7 +188,7 @@ Eigen::MatrixXd predict_fixed(const IdentifiedModel& model, const Formats& forma
   return out;
 }
 
-void write_tables(const IdentifiedModel& model, const Formats& formats, const QuantisationError& error,
+std::uint32_t write_tables(const IdentifiedModel& model, const Formats& formats, const QuantisationError& error,
                   const std::filesystem::path& directory) {
   const FixedModel fixed(model, formats);
   const std::vector<std::int32_t> words = fixed.words();
@@ -245,6 +245,7 @@ using Model = RobotModel<Numbers{}>;
   std::memcpy(bytes.data(), &header, sizeof header);
   std::memcpy(bytes.data() + sizeof header, words.data(), 4 * words.size());
   write_file(directory / "tables.bin", bytes);
+  return header.crc32;
 }
 
 }  // namespace fxdyn

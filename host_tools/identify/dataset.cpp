@@ -107,6 +107,10 @@ ProcessedLog process(const Log& log, const FilterFit& filter) {
     throw DataError(fmt::format("{}: {:.2f} s from {} s is too short: {:.2f} s at either end go to the filters; take a longer window",
                                 out.name, static_cast<double>(log.samples()) * log.step_s, log.from_s, filter.edge_s));
   }
+  const auto inside = [&](const Eigen::MatrixXd& m) { return m.middleRows(out.first, out.last - out.first); };
+  out.q_range = (inside(out.q).colwise().maxCoeff() - inside(out.q).colwise().minCoeff()).transpose();
+  const Eigen::MatrixXd taken = inside(log.q) - inside(out.q);
+  out.q_noise = (taken.colwise().norm() / std::sqrt(static_cast<double>(taken.rows()))).transpose();
   // Eight samples a period of the cut-off lose nothing and spare work.
   out.decimation = std::max<Eigen::Index>(1, static_cast<Eigen::Index>(1 / (log.step_s * 8 * filter.torque_cutoff_hz)));
   return out;

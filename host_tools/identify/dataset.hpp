@@ -19,6 +19,7 @@ struct ProcessedLog {
   Eigen::VectorXd t;
   Eigen::MatrixXd q, dq, ddq;     ///< full rate, filtered
   Eigen::MatrixXd tau_raw, tau;   ///< empty without torque
+  Eigen::VectorXd q_range, q_noise;  ///< per joint: range of the filtered position, RMS of what its filter took out
   Eigen::Index first = 0, last = 0;  ///< [first, last) is free of filter transients
   Eigen::Index decimation = 1;       ///< rows for fitting: first, first + decimation, ...
   FilterFit filter;

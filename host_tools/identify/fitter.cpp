@@ -61,15 +61,17 @@ Fitter::Fitter(const Robot& robot, std::vector<ProcessedLog> logs, std::vector<J
 
   Eigen::Index train_rows = 0;
   for (Eigen::Index j = 0; j < n; ++j) {
-    double lowest = 1e300, highest = -1e300;
+    double range = 0;
+    bool moves = false;
     for (const ProcessedLog& log : logs_) {
       if (log.role != Role::train) continue;
-      lowest = std::min(lowest, log.q.col(j).minCoeff());
-      highest = std::max(highest, log.q.col(j).maxCoeff());
+      range = std::max(range, log.q_range[j]);
+      // Noise alone looks like motion of a few times what the filter took out.
+      moves |= log.q_range[j] > std::max(1e-4, 20 * log.q_noise[j]);
     }
-    if (highest - lowest < 1e-4) {
+    if (!moves) {
       throw DataError(fmt::format("joint {} ({}) never moves in the train logs (range {:.1e} {}): record a log in which it does",
-                                  j + 1, robot_.joints[static_cast<std::size_t>(j)].name, highest - lowest,
+                                  j + 1, robot_.joints[static_cast<std::size_t>(j)].name, range,
                                   robot_.joints[static_cast<std::size_t>(j)].position_unit()));
     }
   }
@@ -152,6 +154,39 @@ std::vector<Moments> Fitter::moments(std::size_t joint, const JointFit& design) 
   return out;
 }
 
+std::vector<Fitter::Dependent> Fitter::dependent_effects() const {
+  // Cholesky of the normalised gram in the order base, joint 1, joint 2, ..: a column whose pivot vanishes is a sum of those
+  // before it.
+  const auto nb = static_cast<Eigen::Index>(base_.columns.size());
+  std::vector<Dependent> found;
+  Eigen::MatrixXd base = Eigen::MatrixXd::Zero(nb, nb);
+  for (std::size_t j = 0; j < joints(); ++j) {
+    for (const std::size_t b : train_blocks()) base += moments_[j][b].gram.topLeftCorner(nb, nb);
+  }
+  for (std::size_t j = 0; j < joints(); ++j) {
+    Eigen::MatrixXd gram = moments_[j][0].gram * 0;
+    for (const std::size_t b : train_blocks()) gram += moments_[j][b].gram;
+    gram.topLeftCorner(nb, nb) = base;  // base columns show up in all joints' rows, the effects in their own only
+    const Eigen::VectorXd scale = gram.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    gram = scale.asDiagonal() * gram * scale.asDiagonal();
+    const Eigen::Index p = gram.rows();
+    std::size_t effect = 0;
+    for (Eigen::Index k = 0; k < p; ++k) {
+      const double pivot = gram(k, k);
+      const bool dependent = pivot < 1e-10;
+      if (k >= nb) {
+        // One linear parameter an effect so far; effects with more would be named by their first dependent one.
+        if (dependent) found.push_back({j, effect});
+        ++effect;
+      }
+      if (dependent) continue;
+      const Eigen::Index rest = p - k - 1;
+      gram.bottomRightCorner(rest, rest) -= gram.col(k).tail(rest) * gram.col(k).tail(rest).transpose() / pivot;
+    }
+  }
+  return found;
+}
+
 void Fitter::set_design(std::size_t joint, JointFit design) {
   design_[joint] = std::move(design);
   moments_[joint] = moments(joint, design_[joint]);
@@ -162,6 +197,34 @@ Eigen::VectorXd Fitter::ridge_of(const JointFit& design, double ridge, Eigen::In
   if (design.bls) out.tail(design.bls->nodes() + static_cast<Eigen::Index>(BroadLearningInputs::count)).setConstant(ridge);
   return out;
 }
+
+namespace {
+
+/// Whether the linear parameters of the last effect keep their bounds. Only those: viscous friction that is zero in truth comes
+/// out a little negative, and that must not keep another effect out. (With a BLS beside it, one coefficient means nothing.)
+bool last_is_physical(const JointFit& design, const Eigen::VectorXd& theta) {
+  if (design.effects.empty() || design.bls) return true;
+  const auto& parameters = find_effect(design.effects.back().effect)->linear;
+  Eigen::Index at = theta.size();
+  for (std::size_t i = parameters.size(); i-- > 0;) {
+    --at;
+    if (theta[at] < parameters[i].lower || theta[at] > parameters[i].upper) return false;
+  }
+  // Presliding takes the place of Coulomb's sign change (amplitude = Coulomb's): much less of it is something else.
+  if (design.effects.back().effect != Presliding::name) return true;
+  for (std::size_t i = 0; i < design.effects.size(); ++i) {
+    if (design.effects[i].effect == Coulomb::name) return theta[at] > 0.5 * theta[static_cast<Eigen::Index>(i)];
+  }
+  return true;
+}
+
+double square_error(const Moments& m, const Eigen::VectorXd& beta, const Eigen::VectorXd& theta) {
+  Eigen::VectorXd x(beta.size() + theta.size());
+  x << beta, theta;
+  return std::max(0.0, m.square - 2 * x.dot(m.projection) + x.dot(m.gram * x));
+}
+
+}  // namespace
 
 Solution Fitter::solve(const std::vector<std::size_t>& blocks, const std::vector<const std::vector<Moments>*>& all,
                        const std::vector<const JointFit*>& design, bool with_std) const {
@@ -206,44 +269,43 @@ Solution Fitter::solve(const std::vector<std::size_t>& blocks, const std::vector
   solution.beta = x.head(nb);
   for (std::size_t j = 0; j < joints(); ++j) solution.theta.emplace_back(x.segment(offset[j], offset[j + 1] - offset[j]));
   if (with_std) {
+    // Sandwich: the residual's variance of each joint, whatever the weights were. Filtered samples are correlated: only
+    // two in a period of the cut-off are independent.
     const Eigen::MatrixXd inverse = scale.asDiagonal() * ldlt.solve(Eigen::MatrixXd::Identity(p, p)) * scale.asDiagonal();
-    // Weights are one over the variances, so the inverse is the covariance but for the correlation of filtered samples:
-    // decimated to eight samples a period of the cut-off, about one in four is independent.
-    const Eigen::VectorXd std = (4.0 * inverse.diagonal().cwiseMax(0)).cwiseSqrt();
+    Eigen::MatrixXd middle = Eigen::MatrixXd::Zero(p, p);
+    for (std::size_t j = 0; j < joints(); ++j) {
+      const double w = weights_[static_cast<Eigen::Index>(j)];
+      const Eigen::Index at = offset[j], own = offset[j + 1] - at;
+      double square = 0;
+      Eigen::Index rows = 0;
+      for (const std::size_t b : blocks) {
+        square += square_error((*all[j])[b], solution.beta, solution.theta[j]);
+        rows += (*all[j])[b].count;
+      }
+      const double factor = w * w * square / static_cast<double>(rows);
+      for (const std::size_t b : blocks) {
+        const Moments& m = (*all[j])[b];
+        middle.topLeftCorner(nb, nb) += factor * m.gram.topLeftCorner(nb, nb);
+        middle.block(0, at, nb, own) += factor * m.gram.topRightCorner(nb, own);
+        middle.block(at, 0, own, nb) += factor * m.gram.bottomLeftCorner(own, nb);
+        middle.block(at, at, own, own) += factor * m.gram.bottomRightCorner(own, own);
+      }
+    }
+    const ProcessedLog& log = logs_.front();
+    const double row_rate = 1 / (log.step_s * static_cast<double>(log.decimation));
+    const double correlated = std::max(1.0, row_rate / (2 * log.filter.torque_cutoff_hz));
+    const Eigen::VectorXd std = (correlated * (inverse * middle * inverse).diagonal().cwiseMax(0)).cwiseSqrt();
     solution.beta_std = std.head(nb);
     for (std::size_t j = 0; j < joints(); ++j) solution.theta_std.emplace_back(std.segment(offset[j], offset[j + 1] - offset[j]));
   }
   return solution;
 }
 
-namespace {
-
-/// Linear parameters of catalogue effects outside the bounds that their ParameterInfo states.
-int violations_of(const JointFit& design, const Eigen::VectorXd& theta) {
-  int count = 0;
-  Eigen::Index at = 0;
-  for (const EffectFit& fit : design.effects) {
-    for (const ParameterInfo& parameter : find_effect(fit.effect)->linear) {
-      count += theta[at] < parameter.lower || theta[at] > parameter.upper;
-      ++at;
-    }
-  }
-  return count;
-}
-
-double square_error(const Moments& m, const Eigen::VectorXd& beta, const Eigen::VectorXd& theta) {
-  Eigen::VectorXd x(beta.size() + theta.size());
-  x << beta, theta;
-  return std::max(0.0, m.square - 2 * x.dot(m.projection) + x.dot(m.gram * x));
-}
-
-}  // namespace
-
 bool Judgement::beats(const Judgement& other, double worth) const {
-  if (!(rmse < (1 - worth) * other.rmse) || violations > other.violations) return false;
+  if (!(rmse < (1 - (blocks_of_one_log ? 4 : 1) * worth) * other.rmse) || !physical) return false;
   std::size_t better = 0;
   for (std::size_t b = 0; b < blocks.size(); ++b) better += blocks[b] < other.blocks[b];
-  return 4 * better >= 3 * blocks.size();
+  return blocks_of_one_log ? better == blocks.size() : 4 * better >= 3 * blocks.size();
 }
 
 std::vector<Judgement> Fitter::judged(std::size_t first, std::size_t last, const std::vector<const std::vector<Moments>*>& all,
@@ -261,14 +323,17 @@ std::vector<Judgement> Fitter::judged(std::size_t first, std::size_t last, const
         sum[j - first] += square;
         count[j - first] += static_cast<double>(m.count);
       }
-      judgement.violations = std::max(judgement.violations, violations_of(*design[j], solution.theta[j]));
+      judgement.physical &= last_is_physical(*design[j], solution.theta[j]);
       if (design[j]->bls) {
         const Eigen::Index own = design[j]->bls->nodes() + static_cast<Eigen::Index>(BroadLearningInputs::count);
         judgement.coefficient_sum = std::max(judgement.coefficient_sum, solution.theta[j].tail(own).cwiseAbs().sum());
       }
     }
   }
-  for (std::size_t i = 0; i < out.size(); ++i) out[i].rmse = std::sqrt(sum[i] / count[i]);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    out[i].rmse = std::sqrt(sum[i] / count[i]);
+    out[i].blocks_of_one_log = logs_.size() == 1;
+  }
   return out;
 }
 

@@ -37,10 +37,12 @@ struct Split {
 struct Judgement {
   double rmse = 1e300;             ///< of the residual over all judging blocks [N*m | N]
   std::vector<double> blocks;      ///< RMSE of each judging block
-  int violations = 0;              ///< linear parameters outside their bounds, most of any fold
+  bool physical = true;            ///< the effect that was added last keeps its bounds in every fold
   double coefficient_sum = 0;      ///< sum of |c| of the BLS, most of any fold [N*m | N]
 
-  /// Better by `worth` over all, better at all on three blocks in four, and no more unphysical.
+  bool blocks_of_one_log = false;  ///< the blocks resemble the fit's data: four times the improvement is asked for, on every block
+
+  /// Better by `worth` over all, better at all on three blocks in four, and physical.
   bool beats(const Judgement& other, double worth) const;
 };
 
@@ -59,6 +61,13 @@ class Fitter {
   const std::string& gate() const { return split_.kind; }
 
   void set_design(std::size_t joint, JointFit design);
+
+  /// Effects whose columns are, on the train rows, sums of base columns and of the effects before them (relative 1e-5):
+  /// these logs can't tell them apart.
+  struct Dependent {
+    std::size_t joint, effect;
+  };
+  std::vector<Dependent> dependent_effects() const;
   /// Weights are one over the residual's variance of each joint (1 for ordinary least squares).
   void set_weights(const Eigen::VectorXd& weights) { weights_ = weights; }
   /// Two rounds of reweighting from the residuals of the train logs.

@@ -72,7 +72,7 @@ Candidate search_effect(const Fitter& fitter, std::size_t joint, std::string_vie
   // a second viscous term.
   const bool velocity = info.shape[0].quantity == Quantity::inverse_velocity;
   const double from = velocity ? 3e-3 * scales.velocity : 1e-6 * scales.range;
-  const double to = velocity ? 0.15 * scales.velocity : 0.1 * scales.range;
+  const double to = std::min(info.shape[0].upper, velocity ? 0.15 * scales.velocity : 0.1 * scales.range);
   return search(fitter, joint, design, from, to, [](JointFit& d, double value) { d.effects.back().shape[0] = value; });
 }
 
@@ -96,6 +96,11 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
   for (const Log& log : logs) {
     if (log.resampled) {
       data.notes.push_back(fmt::format("{}: irregular time stamps, resampled to {:.6g} s", log.file.filename().string(), log.step_s));
+    }
+    for (Eigen::Index j = 0; j < log.tau.cols(); ++j) {
+      if (log.tau.col(j).maxCoeff() > log.tau.col(j).minCoeff()) continue;
+      throw DataError(fmt::format("{}: torque of joint {} ({}) never changes: check the column and its gain", log.file.string(),
+                                  j + 1, project.robot.joints[static_cast<std::size_t>(j)].name));
     }
     ProcessedLog processed = process(log, data.filter);
     data.largest_torque = data.largest_torque.cwiseMax(log.tau.cwiseAbs().colwise().maxCoeff().transpose());
@@ -144,7 +149,7 @@ std::vector<JointFit> initial_joints(const Project& project, const GateData& dat
   return joints;
 }
 
-std::unique_ptr<Fitter> identify(const Project& project, const GateData& data, Progress& progress) {
+std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progress& progress) {
   if (project.identify.method == "irls" || project.identify.method == "rls") {
     throw InputError(fmt::format("{}: identify.method = \"{}\" is not built yet; use \"wls\" or \"ls\"", project.file.string(), project.identify.method));
   }
@@ -172,6 +177,14 @@ std::unique_ptr<Fitter> identify(const Project& project, const GateData& data, P
   }
   progress.stage("building the regressor", 1);
   auto fitter = std::make_unique<Fitter>(project.robot, data.logs, design);
+  const auto dependent = fitter->dependent_effects();
+  for (auto d = dependent.rbegin(); d != dependent.rend(); ++d) {
+    JointFit joint = fitter->design(d->joint);
+    data.notes.push_back(fmt::format("{}: {} left out, these logs can't tell it from the base parameters and the other effects",
+                                     project.robot.joints[d->joint].name, joint.effects[d->effect].effect));
+    joint.effects.erase(joint.effects.begin() + static_cast<std::ptrdiff_t>(d->effect));
+    fitter->set_design(d->joint, joint);
+  }
   const bool weighted = project.identify.method != "ls";
   if (weighted) fitter->reweight();
 
@@ -198,6 +211,7 @@ std::unique_ptr<Fitter> identify(const Project& project, const GateData& data, P
     improve("is there " + std::string(effect) + "?", false,
             [&](std::size_t j) { return search_effect(*fitter, j, effect, scales[j]); });
   }
+  if (!optional.empty()) improve("width of the Coulomb sign", true, [&](std::size_t j) { return search_width(*fitter, j, scales[j]); });
   progress.done();
   return fitter;
 }
@@ -207,7 +221,14 @@ std::string project_hash(const Project& project) { return hash_of(read_file(proj
 IdentifiedModel finish_model(const Fitter& fitter, const Project& project, const GateData& data) {
   IdentifiedModel model = fitter.to_model(fitter.fit());
   model.filter = data.filter;
-  model.format = project.logs.front().format;
+  // "": what a log that the project does not name is read with, if its own logs agree.
+  bool agree = true;
+  for (const LogEntry& entry : project.logs) {
+    const LogFormat& first = project.logs.front().format;
+    agree = agree && entry.format.columns == first.columns && entry.format.torque_gain == first.torque_gain;
+    model.log_formats[entry.scenario ? entry.scenario_log + ".csv" : entry.file.filename().string()] = entry.format;
+  }
+  if (agree) model.log_formats = {{"", project.logs.front().format}};
   model.tick_s = project.target.tick_s;
   model.seed = project.train.seed;
   model.project = project.file.filename().string();

@@ -23,8 +23,8 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
 std::vector<JointFit> initial_joints(const Project& project, const GateData& data);
 
 /// Structure and friction: widths and shapes searched on the gate data, coefficients by (weighted) least squares. Returns
-/// the fitter with the chosen designs.
-std::unique_ptr<Fitter> identify(const Project& project, const GateData& data, Progress& progress);
+/// the fitter with the chosen designs. What it leaves out for want of data goes into data.notes.
+std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progress& progress);
 
 /// Of the project file and its URDF.
 std::string project_hash(const Project& project);

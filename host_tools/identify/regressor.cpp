@@ -84,16 +84,13 @@ BaseSet find_base(const DhChain& chain) {
   for (Eigen::Index i = 0; i < qr.rank(); ++i) base.columns.push_back(qr.colsPermutation().indices()[i]);
   std::sort(base.columns.begin(), base.columns.end());
   const Eigen::MatrixXd independent = scaled(Eigen::all, base.columns);
-  const Eigen::HouseholderQR<Eigen::MatrixXd> solver(independent);
-  base.grouping = solver.solve(scaled);
+  base.grouping = Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(independent).solve(scaled);
   for (Eigen::Index i = 0; i < base.grouping.rows(); ++i) {
     for (Eigen::Index j = 0; j < p; ++j) {
       double& value = base.grouping(i, j);
       value = std::fabs(value) < threshold ? 0 : value * norms[j] / norms[base.columns[static_cast<std::size_t>(i)]];
     }
   }
-  const Eigen::VectorXd singular = independent.jacobiSvd().singularValues();
-  base.condition = singular[0] / singular[singular.size() - 1];
   return base;
 }
 
@@ -103,7 +100,7 @@ bool rotor_inertia_is_absorbed(const DhChain& chain, const BaseSet& base, Eigen:
   Eigen::VectorXd column = Eigen::VectorXd::Zero(motions.y.rows());
   for (Eigen::Index k = 0; k < motions.ddq.rows(); ++k) column[k * n + joint] = motions.ddq(k, joint);
   const Eigen::MatrixXd y = motions.y(Eigen::all, base.columns);
-  const Eigen::VectorXd rest = column - y * y.householderQr().solve(column);
+  const Eigen::VectorXd rest = column - y * Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(y).solve(Eigen::MatrixXd(column)).col(0);
   return rest.norm() < 1e-8 * column.norm();
 }
 

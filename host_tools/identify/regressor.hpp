@@ -28,7 +28,6 @@ class Regressor {
 struct BaseSet {
   std::vector<Eigen::Index> columns;  ///< ascending
   Eigen::MatrixXd grouping;           ///< base x 10 n
-  double condition = 0;               ///< of the normalised Y_b over the random motions
 };
 
 /// Column-normalised pivoted QR of Y at 60 random motions (fixed seed). Rank: relative 1e-9.

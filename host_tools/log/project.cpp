@@ -11,6 +11,7 @@
 #include <numbers>
 
 #include "host_tools/error.hpp"
+#include "host_tools/files.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/toml.hpp"
@@ -43,6 +44,14 @@ const Names method_names{"ls", "wls", "irls", "rls"};
 const Names input_names{"physical", "state"};
 const Names board_names{"host",      "mps2-an385", "mps2-an386",    "mps2-an500", "mps2-an505",
                         "zynqmp_r5", "microbit",   "netduinoplus2", "stm32g474"};
+
+auto between(int lowest, int highest) {
+  return [=](const Value& value) {
+    const int number = value.count(lowest);
+    if (number > highest) value.place().fail(fmt::format("expected {} .. {}", lowest, highest));
+    return number;
+  };
+}
 
 class ProjectReader {
  public:
@@ -139,8 +148,11 @@ class ProjectReader {
       }
       columns->finish();
     }
-    set(format.torque_gain, table.find("torque_gain"),
-        [this](const Value& v) { return v.numbers(joints(), per_joint()); });
+    set(format.torque_gain, table.find("torque_gain"), [this](const Value& v) {
+      const std::vector<double> gains = v.numbers(joints(), per_joint());
+      if (std::count(gains.begin(), gains.end(), 0.0) > 0) v.place().fail("a gain of 0 leaves no torque");
+      return gains;
+    });
     return format;
   }
 
@@ -162,6 +174,7 @@ class ProjectReader {
       Names names;
       for (const Value& item : effects->items()) {
         names.push_back(item.name(known_effects(), "effect"));
+        if (std::count(names.begin(), names.end(), names.back()) > 1) item.place().fail(fmt::format("'{}' is there twice", names.back()));
       }
       project_.identify.effects = names;
     }
@@ -178,8 +191,8 @@ class ProjectReader {
     set(train.enabled, table.find("enabled"), as_boolean);
     set(train.seed, table.find("seed"), [](const Value& v) { return static_cast<std::uint64_t>(v.integer(0)); });
     set(train.inputs, table.find("inputs"), [](const Value& v) { return v.name(input_names, "inputs"); });
-    set(train.windows, table.find("windows"), as_count);
-    set(train.nodes, table.find("nodes"), as_count);
+    set(train.windows, table.find("windows"), between(1, 100));
+    set(train.nodes, table.find("nodes"), between(1, 300));
     set(train.enhancement, table.find("enhancement"), as_count);
     set(train.activation, table.find("activation"), as_string);
     set(train.ridge, table.find("ridge"), as_positive);
@@ -211,7 +224,10 @@ class ProjectReader {
 
   void read_target(Table& table) {
     set(project_.target.board, table.find("board"), [](const Value& v) { return v.name(board_names, "board"); });
-    set(project_.target.tick_s, table.find("tick_s"), as_positive);
+    if (const auto tick = table.find("tick_s")) {
+      project_.target.tick_s = tick->positive();
+      if (project_.target.tick_s < 1e-5 || project_.target.tick_s > 0.1) tick->place().fail("expected 1e-5 .. 0.1 s");
+    }
     table.find("joints");  // "all" or a list
     table.finish();
   }
@@ -278,12 +294,12 @@ class ProjectReader {
 fs::path simulated(const LogEntry& entry, const Project& project, const fs::path& directory) {
   const fs::path folder = directory / "logs" / entry.scenario->stem();
   const fs::path file = folder / (entry.scenario_log + ".csv");
-  const auto current = [&] {
-    return fs::exists(file) && fs::last_write_time(file) >= fs::last_write_time(*entry.scenario);
-  };
-  if (!current()) {
-    fs::create_directories(folder);
+  // Of the scenario and its URDF, not the time stamps: a checkout or a copy changes those.
+  const std::string hash = scenario_hash(*entry.scenario);
+  const fs::path hash_file = folder / "scenario.hash";
+  if (!fs::exists(file) || !fs::exists(hash_file) || read_file(hash_file) != hash) {
     simulate(*entry.scenario, folder);
+    write_file(hash_file, hash);
   }
   if (!fs::exists(file)) {
     throw InputError(fmt::format("{}:{}: scenario {} has no log '{}'", project.file.string(), entry.line,

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "host_tools/error.hpp"
 #include "host_tools/files.hpp"
 #include "host_tools/model/effects.hpp"
@@ -110,6 +112,14 @@ EffectFit to_effect(const json& j) {
   return fit;
 }
 
+Formats to_formats(const json& j) {
+  Formats formats;
+  for (std::size_t i = 0; i < quantity_count; ++i) formats.quantity[i] = j.at(std::string(quantity_names[i]));
+  formats.force_sum = j.at("force_sum");
+  formats.torque_sum = j.at("torque_sum");
+  return formats;
+}
+
 json joint_json(const Robot& robot, std::size_t index, const JointFit& fit) {
   const Joint& joint = robot.joints[index];
   const bool prismatic = joint.type == JointType::prismatic;
@@ -182,6 +192,14 @@ LinkInertia<Real> to_inertia(const std::array<double, parameters_per_link>& v) {
   return {v[0], {v[1], v[2], v[3]}, v[4], v[5], v[6], v[7], v[8], v[9]};
 }
 
+json formats_json(const Formats& formats) {
+  json out;
+  for (std::size_t i = 0; i < quantity_count; ++i) out[std::string(quantity_names[i])] = formats.quantity[i];
+  out["force_sum"] = formats.force_sum;
+  out["torque_sum"] = formats.torque_sum;
+  return out;
+}
+
 json to_json(const IdentifiedModel& model) {
   json base = json::array();
   for (const BaseParameter& p : model.base) {
@@ -199,7 +217,12 @@ json to_json(const IdentifiedModel& model) {
   for (const LogReference& log : model.logs) {
     logs.push_back({{"file", log.file}, {"role", log.role}, {"from_s", log.from_s}, {"to_s", log.to_s}, {"hash", log.hash}});
   }
-  return {{"schema", "fxdyn.model/1"},
+  json log_formats = json::object();
+  for (const auto& [file, format] : model.log_formats) {
+    log_formats[file] = {{"columns", format.columns}, {"torque_gain", format.torque_gain}};
+  }
+  json out = {{"schema", "fxdyn.model/1"},
+          {"stage", model.stage},
           {"tool_version", version},
           {"project", model.project},
           {"project_hash", model.project_hash},
@@ -213,8 +236,13 @@ json to_json(const IdentifiedModel& model) {
            {{"position_cutoff_hz", model.filter.position_cutoff_hz},
             {"torque_cutoff_hz", model.filter.torque_cutoff_hz},
             {"edge_s", model.filter.edge_s}}},
-          {"log_format", {{"columns", model.format.columns}, {"torque_gain", model.format.torque_gain}}},
+          {"log_formats", log_formats},
           {"logs", logs}};
+  if (model.formats) {
+    out["formats"] = formats_json(*model.formats);
+    out["tables_crc"] = model.tables_crc;
+  }
+  return out;
 }
 
 IdentifiedModel read_model(const std::filesystem::path& file) {
@@ -237,8 +265,15 @@ IdentifiedModel read_model(const std::filesystem::path& file) {
       model.base.push_back({p.at("column"), p.at("name"), p.at("value"), p.at("std")});
     }
     model.filter = {j.at("filter").at("position_cutoff_hz"), j.at("filter").at("torque_cutoff_hz"), j.at("filter").at("edge_s")};
-    model.format.columns = j.at("log_format").at("columns").get<std::map<std::string, std::string>>();
-    model.format.torque_gain = j.at("log_format").at("torque_gain").get<std::vector<double>>();
+    for (const auto& [name, format] : j.at("log_formats").items()) {
+      model.log_formats[name] = {format.at("columns").get<std::map<std::string, std::string>>(),
+                                 format.at("torque_gain").get<std::vector<double>>()};
+    }
+    model.stage = j.at("stage");
+    if (j.contains("formats")) {
+      model.formats = to_formats(j.at("formats"));
+      model.tables_crc = j.at("tables_crc");
+    }
     for (const json& log : j.at("logs")) {
       model.logs.push_back({log.at("file"), log.at("role"), log.at("hash"), log.at("from_s"), log.at("to_s")});
     }

@@ -3,12 +3,13 @@
 #include <Eigen/Dense>
 #include <array>
 #include <filesystem>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "host_tools/log/log.hpp"
+#include "host_tools/numbers/formats.hpp"
 #include "host_tools/robot/robot.hpp"
 
 namespace fxdyn {
@@ -63,14 +64,21 @@ struct IdentifiedModel {
   std::vector<BaseParameter> base;
   std::vector<JointFit> joints;
   FilterFit filter;
-  LogFormat format;
+  /// How to read logs, by file name; "" stands for logs that the project does not name.
+  std::map<std::string, LogFormat> log_formats;
   double tick_s = 0.002;
   std::uint64_t seed = 1;
   std::string project, project_hash;
   std::vector<LogReference> logs;
+  std::string stage = "identified";  ///< or "trained"
+  /// Of the exported tables; a stage that changes the model drops them.
+  std::optional<Formats> formats;
+  std::uint32_t tables_crc = 0;
 };
 
 nlohmann::json to_json(const IdentifiedModel& model);
+/// Formats as in model.json and export.json.
+nlohmann::json formats_json(const Formats& formats);
 /// @throws InputError naming the file and the missing or wrong key.
 IdentifiedModel read_model(const std::filesystem::path& file);
 

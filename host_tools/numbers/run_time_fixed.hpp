@@ -4,6 +4,7 @@
 #include <cmath>
 #include <compare>
 
+#include "host_tools/error.hpp"
 #include "host_tools/numbers/formats.hpp"
 #include "model/math.hpp"
 #include "model/numbers.hpp"
@@ -13,12 +14,25 @@
 
 namespace fxdyn {
 
+/// 64-bit sums must not wrap: the choice of formats sees to it, and the host checks every one.
+[[noreturn]] inline void sum_overflow() {
+  throw DataError("a 64-bit sum overflows in fixed point: limits or parameters are too far apart in size; check the project's limits");
+}
+
 struct RunTimeWide {
   std::int64_t raw = 0;
   int bits = 0;
 
-  friend RunTimeWide operator+(RunTimeWide a, RunTimeWide b) { return assert(a.bits == b.bits), RunTimeWide{a.raw + b.raw, a.bits}; }
-  friend RunTimeWide operator-(RunTimeWide a, RunTimeWide b) { return assert(a.bits == b.bits), RunTimeWide{a.raw - b.raw, a.bits}; }
+  friend RunTimeWide operator+(RunTimeWide a, RunTimeWide b) {
+    assert(a.bits == b.bits);
+    if (__builtin_add_overflow(a.raw, b.raw, &a.raw)) sum_overflow();
+    return a;
+  }
+  friend RunTimeWide operator-(RunTimeWide a, RunTimeWide b) {
+    assert(a.bits == b.bits);
+    if (__builtin_sub_overflow(a.raw, b.raw, &a.raw)) sum_overflow();
+    return a;
+  }
   friend RunTimeWide operator-(RunTimeWide a) { return {-a.raw, a.bits}; }
 };
 
@@ -53,7 +67,9 @@ struct RunTimeFixed {
 
 inline RunTimeWide align(RunTimeWide x, RunTimeWide like) {
   assert(like.bits >= x.bits);
-  return {raw::shift_right(x.raw, x.bits - like.bits), like.bits};
+  const std::int64_t shifted = raw::shift_right(x.raw, x.bits - like.bits);
+  if (shifted >> (like.bits - x.bits) != x.raw) sum_overflow();
+  return {shifted, like.bits};
 }
 template <Kind kind>
 RunTimeWide align(RunTimeFixed<kind> x, RunTimeWide like) { return align(RunTimeWide{x.raw, x.bits()}, like); }

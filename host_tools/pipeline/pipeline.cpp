@@ -1,5 +1,7 @@
 #include "host_tools/pipeline/pipeline.hpp"
 
+#include <nlohmann/json.hpp>
+
 #include <fmt/format.h>
 
 #include "host_tools/error.hpp"
@@ -14,15 +16,29 @@ namespace fxdyn {
 using nlohmann::json;
 namespace fs = std::filesystem;
 
+namespace {
+
+/// |fixed - double| on the logs beyond which tables are refused, of rated torque.
+constexpr double largest_error = 1e-3;
+
+const LogFormat& format_of(const IdentifiedModel& model, const fs::path& log) {
+  for (const std::string& name : {log.filename().string(), std::string()}) {
+    if (const auto found = model.log_formats.find(name); found != model.log_formats.end()) return found->second;
+  }
+  throw InputError(fmt::format("{}: the project's logs have different columns or gains, and this one is none of them; name it like one",
+                               log.string()));
+}
+
+}  // namespace
+
 Pipeline::Pipeline(const fs::path& project, fs::path directory) : project_(read_project(project)), directory_(std::move(directory)) {}
 
-const GateData& Pipeline::data() {
+GateData& Pipeline::data() {
   if (!data_) {
     progress_.stage("reading and filtering the logs", 1);
     data_ = std::make_unique<GateData>(read_gate_data(project_, directory_));
     progress_.step();
     progress_.done();
-    for (const std::string& note : data_->notes) fmt::print(stderr, "note: {}\n", note);
   }
   return *data_;
 }
@@ -52,7 +68,8 @@ json Pipeline::stage_metrics(const IdentifiedModel& model, const std::string& st
 }
 
 void Pipeline::finish(const Fitter& fitter, Stage stage, const json& training) {
-  const IdentifiedModel model = finish_model(fitter, project_, data());
+  IdentifiedModel model = finish_model(fitter, project_, data());
+  model.stage = stage == Stage::trained ? "trained" : "identified";
   // The same structure with less: what friction and BLS are worth is seen on the same logs.
   const auto reduced = [&](bool friction) {
     Fitter less = fitter;
@@ -74,10 +91,11 @@ void Pipeline::finish(const Fitter& fitter, Stage stage, const json& training) {
                   {"logs", stages.back()["logs"]},
                   {"stages", stages}};
   if (!training.is_null()) metrics["training"] = training;
-  json document = to_json(model);
-  document["stage"] = stage == Stage::trained ? "trained" : "identified";
-  write_file(directory_ / "model.json", document.dump(1) + "\n");
+  write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
   write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
+  if (stage == Stage::identified) {
+    for (const std::string& note : data().notes) fmt::print(stderr, "note: {}\n", note);
+  }
 }
 
 std::unique_ptr<Fitter> Pipeline::fitter_from(const IdentifiedModel& model) {
@@ -118,14 +136,14 @@ IdentifiedModel Pipeline::model() {
   const fs::path file = directory_ / "model.json";
   if (fs::exists(file)) {
     IdentifiedModel model = read_model(file);
-    if (is_current(model) && json::parse(read_file(file)).value("stage", "") == "trained") return model;
+    if (is_current(model) && model.stage == "trained") return model;
   }
   train();
   return read_model(file);
 }
 
 void Pipeline::export_tables() {
-  const IdentifiedModel model = this->model();
+  IdentifiedModel model = this->model();
   progress_.stage("choosing formats, writing tables", 1);
   std::vector<TickStates> states, judged;
   for (const ProcessedLog& log : data().logs) states.push_back(at_ticks(log, model.tick_s));
@@ -134,7 +152,16 @@ void Pipeline::export_tables() {
   for (std::size_t i = 0; i < states.size(); ++i) judged.push_back(perturbed(states[i], model, 1000 + i));
   const QuantisationError clean = quantisation_error(model, formats, states);
   const QuantisationError error = quantisation_error(model, formats, judged);
-  write_tables(model, formats, error, directory_);
+  for (std::size_t j = 0; j < model.joints.size(); ++j) {
+    const double share = clean.largest[static_cast<Eigen::Index>(j)] / model.joints[j].rated_torque;
+    if (!(share <= largest_error)) {
+      throw DataError(fmt::format("joint {} ({}): fixed point is off by {:.1g} of rated torque on the logs, more than {:.0g}: narrow the "
+                                  "project's limits to what the robot does",
+                                  j + 1, model.robot.joints[j].name, share, largest_error));
+    }
+  }
+  model.tables_crc = write_tables(model, formats, error, directory_);
+  model.formats = formats;
   json joints = json::array();
   for (std::size_t j = 0; j < model.joints.size(); ++j) {
     const auto k = static_cast<Eigen::Index>(j);
@@ -151,18 +178,23 @@ void Pipeline::export_tables() {
   const json document = {{"schema", "fxdyn.export/1"},
                          {"tick_s", model.tick_s},
                          {"board", project_.target.board},
+                         {"tables_crc", model.tables_crc},
                          {"formats", formats_json(formats)},
                          {"joints", joints},
                          {"saturations_on_logs", clean.saturations},
                          {"table_bytes", fs::file_size(directory_ / "tables.bin")}};
   write_file(directory_ / "export.json", document.dump(1) + "\n");
+  write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
   progress_.step();
   progress_.done();
 }
 
 void Pipeline::report() {
-  const IdentifiedModel model = this->model();
-  if (!fs::exists(directory_ / "export.json")) export_tables();
+  IdentifiedModel model = this->model();
+  if (!model.formats || !fs::exists(directory_ / "export.json")) {
+    export_tables();
+    model = this->model();
+  }
   progress_.stage("drawing the report", 1);
   std::vector<ProcessedLog> shown = logs(Role::test);
   if (shown.empty()) shown = logs(Role::validate);
@@ -173,6 +205,7 @@ void Pipeline::report() {
 }
 
 void Pipeline::run() {
+  fs::create_directories(directory_);  // fails now rather than after the work
   identify();
   train();
   export_tables();
@@ -184,14 +217,20 @@ void predict_log(const fs::path& model_file, const fs::path& log_file, bool fixe
   const Robot& robot = model.robot;
   std::vector<bool> revolute;
   for (const Joint& joint : robot.joints) revolute.push_back(joint.type == JointType::revolute);
-  const Log log = read_log(log_file, robot.size(), revolute, model.format, {}, {}, false);
+  // The run's own metrics.json must survive.
+  if (fs::exists(directory / "model.json")) {
+    throw InputError(fmt::format("{}: holds a model and its metrics; choose another --out", directory.string()));
+  }
+  Log log = read_log(log_file, robot.size(), revolute, format_of(model, log_file), {}, {}, false);
+  log.role = Role::test;
   const ProcessedLog processed = process(log, model.filter);
 
   Eigen::MatrixXd torque;
   if (fixed) {
-    const fs::path export_file = model_file.parent_path() / "export.json";
-    if (!fs::exists(export_file)) throw InputError(fmt::format("{}: not there; run `fxdyn export` first", export_file.string()));
-    torque = predict_fixed(model, read_formats(export_file), {processed.name, processed.t, processed.q, processed.dq, processed.ddq});
+    if (!model.formats) throw InputError(fmt::format("{}: has no fixed-point formats; run `fxdyn export` first", model_file.string()));
+    // At the drive's ticks, as the firmware computes; then back to the log's samples.
+    const TickStates ticks = at_ticks(processed, model.tick_s, true);
+    torque = interpolate(predict_fixed(model, *model.formats, ticks), ticks.t, processed.t);
   } else {
     torque = predict(model, processed.q, processed.dq, processed.ddq, processed.step_s);
   }

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 #include "host_tools/identify/identify.hpp"
 
@@ -28,7 +28,7 @@ class Pipeline {
 
  private:
   enum class Stage { identified, trained };
-  const GateData& data();
+  GateData& data();
   bool is_current(const IdentifiedModel& model);
   std::unique_ptr<Fitter> fitter_from(const IdentifiedModel& model);
   void finish(const Fitter& fitter, Stage stage, const nlohmann::json& training);

@@ -6,6 +6,8 @@
 #include "host_tools/hil/qemu_target.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
 
+#include <nlohmann/json.hpp>
+
 namespace fxdyn {
 namespace {
 
@@ -83,11 +85,11 @@ json to_json(const Replayed& replayed, const TickStates& states, const Identifie
 
 bool replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index max_ticks) {
   const IdentifiedModel model = pipeline.model();
-  const std::filesystem::path export_file = pipeline.directory() / "export.json";
-  if (!std::filesystem::exists(export_file)) {
-    throw InputError(fmt::format("{}: not there; run `fxdyn export` and build the image from its tables.hpp", export_file.string()));
+  if (!model.formats) {
+    throw InputError(fmt::format("{}: no tables of this model there; run `fxdyn export` and build the image from its tables.hpp",
+                                 pipeline.directory().string()));
   }
-  FixedModel fixed(model, read_formats(export_file));
+  FixedModel fixed(model, *model.formats);
   std::vector<TickStates> streams;
   for (const Role role : {Role::test, Role::validate}) {
     for (const ProcessedLog& log : pipeline.logs(role)) streams.push_back(at_ticks(log, model.tick_s));
@@ -100,9 +102,10 @@ bool replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index
   QemuTarget target(image);
   const serial::Identity identity = target.hello();
   if (identity.state != serial::NodeState::ready) throw InputError(fmt::format("{}: the image refuses its tables (CRC or layout)", image.string()));
-  if (identity.layout_hash != fixed.layout_hash()) {
-    throw InputError(fmt::format("{}: holds another model (layout {:08x}, expected {:08x}); build it from {}", image.string(),
-                                 identity.layout_hash, fixed.layout_hash(), (pipeline.directory() / "tables.hpp").string()));
+  if (identity.layout_hash != fixed.layout_hash() || identity.tables_crc != model.tables_crc) {
+    throw InputError(fmt::format("{}: holds other tables (layout {:08x}, CRC {:08x}; expected {:08x}, {:08x}); build it from {}",
+                                 image.string(), identity.layout_hash, identity.tables_crc, fixed.layout_hash(), model.tables_crc,
+                                 (pipeline.directory() / "tables.hpp").string()));
   }
   Progress progress;
   progress.stage("replaying on the firmware", streams.size());
@@ -115,7 +118,7 @@ bool replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index
     progress.step();
   }
   progress.done();
-  json document = {{"schema", "fxdyn.replay/1"}, {"image", image.filename().string()}, {"bit_exact", same}, {"logs", logs}};
+  json document = {{"schema", "fxdyn.replay/1"}, {"image", image.filename().string()}, {"tables_crc", model.tables_crc}, {"bit_exact", same}, {"logs", logs}};
   const std::filesystem::path size_file = image.parent_path() / "size.json";
   if (std::filesystem::exists(size_file)) document["size"] = json::parse(read_file(size_file));
   write_file(pipeline.directory() / "replay.json", document.dump(1) + "\n");

@@ -1,5 +1,7 @@
 #include "host_tools/report/metrics.hpp"
 
+#include <nlohmann/json.hpp>
+
 namespace fxdyn {
 
 std::vector<JointMetrics> judge(const ProcessedLog& log, const Eigen::MatrixXd& torque) {

@@ -16,10 +16,11 @@ namespace fs = std::filesystem;
 
 json read_json(const fs::path& file) { return fs::exists(file) ? json::parse(read_file(file)) : json(); }
 
-/// Null where the file is missing or older than what it was made from.
-json read_newer(const fs::path& file, const fs::path& origin) {
-  if (!fs::exists(file) || (fs::exists(origin) && fs::last_write_time(file) < fs::last_write_time(origin))) return {};
-  return read_json(file);
+/// Null where the file is missing or of other tables than the model's.
+json read_of_tables(const fs::path& file, const json& model) {
+  json content = read_json(file);
+  const bool same = !content.is_null() && model.contains("tables_crc") && content.value("tables_crc", json()) == model.at("tables_crc");
+  return same ? content : json();
 }
 
 std::string shown_role(const json& logs) {
@@ -45,10 +46,9 @@ std::string processor_of(const std::string& image) {
 Results read_results(const fs::path& directory) {
   Results results;
   results.metrics = read_json(directory / "metrics.json");
-  results.exported = read_newer(directory / "export.json", directory / "model.json");
-  if (!results.exported.is_null()) {
-    results.replayed = read_newer(directory / "replay.json", directory / "tables.bin");
-  }
+  const json model = read_json(directory / "model.json");
+  results.exported = read_of_tables(directory / "export.json", model);
+  results.replayed = read_of_tables(directory / "replay.json", model);
   if (!results.metrics.is_null()) results.role = shown_role(results.metrics.at("logs"));
   return results;
 }

@@ -6,8 +6,8 @@
 
 namespace fxdyn {
 
-/// What the stages left in DIR, as far as it belongs together: an export older than the model or a replay older than
-/// the tables is of another model and counts as missing (null).
+/// What the stages left in DIR, as far as it belongs together: an export or a replay of other tables
+/// than the model's (CRC) counts as missing (null).
 struct Results {
   nlohmann::json metrics, exported, replayed;
   std::string role;  ///< of the logs that a reader wants to see: test, else validate, else train

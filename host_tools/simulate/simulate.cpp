@@ -1,5 +1,7 @@
 #include "host_tools/simulate/simulate.hpp"
 
+#include <nlohmann/json.hpp>
+
 #include <cmath>
 #include <numbers>
 
@@ -194,6 +196,13 @@ fs::path simulate_log(const Scenario& scenario, std::size_t index, const fs::pat
 }
 
 }  // namespace
+
+std::string scenario_hash(const fs::path& scenario) {
+  const toml::table root = toml_input::parse(scenario);
+  const auto urdf = root["robot"]["urdf"].value<std::string>();
+  const fs::path robot = scenario.parent_path() / urdf.value_or("");
+  return hash_of(read_file(scenario) + (fs::is_regular_file(robot) ? read_file(robot) : ""));
+}
 
 std::vector<fs::path> simulate(const fs::path& scenario_file, const fs::path& directory) {
   const Scenario scenario = read_scenario(scenario_file);

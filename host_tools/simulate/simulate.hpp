@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 namespace fxdyn {
@@ -10,5 +11,8 @@ namespace fxdyn {
 /// @return the paths of the logs, in the scenario's order.
 /// @throws InputError with file and line.
 std::vector<std::filesystem::path> simulate(const std::filesystem::path& scenario, const std::filesystem::path& directory);
+
+/// Of the scenario file and its URDF: the logs made from them are still theirs while it is the same.
+std::string scenario_hash(const std::filesystem::path& scenario);
 
 }  // namespace fxdyn

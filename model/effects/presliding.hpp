@@ -5,11 +5,12 @@
 namespace fxdyn {
 
 /// Presliding: friction follows the Dahl state z instead of the Coulomb sign, tau = amplitude * (z - s). With amplitude
-/// equal to Coulomb's, friction is amplitude * z: it builds up over `distance` after each reversal. Joint side of the gearbox.
+/// equal to Coulomb's, friction is amplitude * z: it builds up over `distance` after each reversal, milliradians in gears and
+/// bearings. Joint side of the gearbox.
 struct Presliding {
   static constexpr std::string_view name = "presliding";
   static constexpr std::string_view equation = "amplitude (z - s), dz/dt = dq / distance (1 - sign(dq) z)";
-  static constexpr std::array shape{ParameterInfo{"distance", "rad", "m", 1e-7, 1, Quantity::inverse_path,
+  static constexpr std::array shape{ParameterInfo{"distance", "rad", "m", 1e-7, 0.03, Quantity::inverse_path,
                                                   "Dahl 1968; Han, Wu, Hui 2025, Eq. 20"}};
   static constexpr std::array linear{
       ParameterInfo{"amplitude", "N*m", "N", 0, unbounded, Quantity::unit, "Han, Wu, Hui 2025, Eq. 20"}};

@@ -35,7 +35,7 @@ URDF
 # make FILE AMPLITUDE_OF_JOINT_2 SAMPLES [FACTOR]
 make() {
   awk -v a="$2" -v n="$3" -v f="${4:-1}" 'BEGIN { print "t,q1,q2,tau1,tau2"; for (k = 0; k < n; k++) { t = k * 0.002;
-    printf "%.4f,%.9f,%.9f,%.6f,%.6f\n", t, f * sin(3 * t), f * a * sin(4 * t + 1), -9 * sin(3 * t), -16 * a * sin(4 * t + 1) } }' >"$work/$1"
+    printf "%.4f,%.9f,%.9f,%.6f,%.6f\n", t, f * sin(3 * t), f * a * sin(4 * t + 1), -9 * sin(3 * t), -16 * a * sin(4 * t + 1) + 0.1 * sin(7 * t) } }' >"$work/$1"
 }
 project() {  # project NAME LINES...
   local name=$1
@@ -47,11 +47,19 @@ run() { expect "$1" "$2" run "$work/$3" --out "$work/out"; }
 
 make good.csv 0.7 5000
 project good.toml '[[log]]' 'file = "good.csv"' 'role = "train"' 'to_s = 7.0' '[[log]]' 'file = "good.csv"' 'role = "test"' 'from_s = 7.0'
+"$fxdyn" identify "$work/good.toml" --out "$work/fresh" >/dev/null 2>&1
 "$fxdyn" run "$work/good.toml" --out "$work/good" >/dev/null 2>&1 || { echo "FAILED: a good project"; failures=$((failures + 1)); }
 
 make still.csv 0 5000
 project still.toml '[[log]]' 'file = "still.csv"' 'role = "train"'
 run 1 "joint 2 (second) never moves" still.toml
+awk -F, 'BEGIN { OFS = "," } NR > 1 { $5 = 0 } { print }' "$work/good.csv" >"$work/zero.csv"
+project zero.toml '[[log]]' 'file = "zero.csv"' 'role = "train"'
+run 1 "torque of joint 2 (second) never changes" zero.toml
+project few.toml '[signals]' 'position_cutoff_hz = 100' 'torque_cutoff_hz = 100' 'edge_s = 0.001' '[[log]]' 'file = "good.csv"' 'role = "train"' 'to_s = 0.026'
+run 1 "parameters" few.toml
+project twice.toml '[identify]' 'effects = ["viscous", "viscous"]' '[[log]]' 'file = "good.csv"' 'role = "train"'
+run 2 "there twice" twice.toml
 make short.csv 0.7 12
 project short.toml '[[log]]' 'file = "short.csv"' 'role = "train"'
 run 1 "short.csv" short.toml
@@ -80,8 +88,10 @@ run 2 "rls" rls.toml
 
 echo '{"schema": "fxdyn.model/1"}' >"$work/model.json"
 expect 2 "model.json" predict --model "$work/model.json" --log "$work/good.csv" --out "$work/out"
-expect 2 "prediction" predict --model "$work/good/model.json" --log "$work/good.csv" --out "$work"
-expect 2 "not there" replay "$work/good.toml" --image "$work/none.elf" --out "$work/fresh"
+mkdir "$work/apart" && cp "$work/good.csv" "$work/apart"
+expect 2 "prediction" predict --model "$work/good/model.json" --log "$work/apart/good.csv" --out "$work/apart"
+expect 2 "holds a model" predict --model "$work/good/model.json" --log "$work/good.csv" --out "$work/good"
+expect 2 "fxdyn export" replay "$work/good.toml" --image "$work/none.elf" --out "$work/fresh"
 
 [ $failures -eq 0 ] && echo "all refused as they should be"
 exit $failures

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "host_tools/simulate/simulate.hpp"
 #include "tests/support/files.hpp"
 
 namespace fxdyn {
@@ -198,14 +199,14 @@ TEST(Project, JointsWithStopsDoNotTurnFarBeyondThem) {
                        [&] { read_logs(read_project(file), Role::train, testing::TempDir()); });
 }
 
-TEST(Project, ALogNewerThanItsScenarioIsNotSimulatedAgain) {
+TEST(Project, ALogOfTheSameScenarioIsNotSimulatedAgain) {
   const auto file =
       write_project("scenario", robot + "[[log]]\nscenario = \"s.toml\"\nlog = \"slow\"\nrole = \"train\"\n");
   const auto directory = file.parent_path() / "out";
   std::filesystem::create_directories(directory / "logs/s");
   std::filesystem::copy_file(file.parent_path() / "a.csv", directory / "logs/s/slow.csv",
                              std::filesystem::copy_options::overwrite_existing);
-  std::filesystem::last_write_time(directory / "logs/s/slow.csv", std::filesystem::file_time_type::clock::now());
+  test::write("out/logs/s/scenario.hash", scenario_hash(file.parent_path() / "s.toml"));
   const Project project = read_project(file);
   EXPECT_EQ(read_logs(project, Role::train, directory).at(0).samples(), 100);
 }
