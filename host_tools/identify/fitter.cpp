@@ -399,6 +399,23 @@ void Fitter::reweight() {
   }
 }
 
+namespace {
+
+/// The standard parameters that make up base parameter `row`, in columns' order.
+std::string expression(const BaseSet& base, Eigen::Index row) {
+  std::string text;
+  for (Eigen::Index column = 0; column < base.grouping.cols(); ++column) {
+    const double factor = base.grouping(row, column);
+    if (std::fabs(factor) < 1e-9) continue;
+    text += text.empty() ? (factor < 0 ? "-" : "") : (factor < 0 ? " - " : " + ");
+    if (std::fabs(std::fabs(factor) - 1) > 1e-9) text += fmt::format("{:.6g} ", std::fabs(factor));
+    text += parameter_name(column);
+  }
+  return text;
+}
+
+}  // namespace
+
 IdentifiedModel Fitter::to_model(const Solution& solution) const {
   IdentifiedModel model;
   model.robot = robot_;
@@ -408,7 +425,7 @@ IdentifiedModel Fitter::to_model(const Solution& solution) const {
     const auto k = static_cast<Eigen::Index>(i);
     links[column / parameters_per_link][column % parameters_per_link] = solution.beta[k];
     model.base.push_back({column, parameter_name(base_.columns[i]), solution.beta[k],
-                          solution.beta_std.size() > 0 ? solution.beta_std[k] : 0.0});
+                          solution.beta_std.size() > 0 ? solution.beta_std[k] : 0.0, expression(base_, k)});
   }
   for (const auto& link : links) model.inertia.push_back(to_inertia(link));
   for (std::size_t j = 0; j < joints(); ++j) {

@@ -13,7 +13,7 @@ struct GateData {
   std::vector<ProcessedLog> logs;
   std::vector<LogReference> references;
   std::vector<std::string> notes;             ///< what a reader should know of the data
-  Eigen::VectorXd largest_torque;             ///< raw, over the train logs [N*m | N]
+  Eigen::VectorXd largest_torque;             ///< raw, over the train and validate logs [N*m | N]
   Eigen::VectorXd q_lower, q_upper, dq, ddq;  ///< largest of the filtered motion
 };
 GateData read_gate_data(const Project& project, const std::filesystem::path& directory);

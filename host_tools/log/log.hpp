@@ -36,7 +36,7 @@ struct LogFormat {
 };
 
 /// Reads `joints` joints. Irregular stamps (jitter > 1 % of the median step) are resampled to the median step by
-/// monotone-safe linear interpolation and `resampled` is set; a gap > 10 steps is an error. Continuous revolute joints
+/// monotone-safe linear interpolation and `resampled` is set; a gap > 10 steps is an error. Revolute joints
 /// are unwrapped where q jumps by about 2 pi between samples.
 /// @throws InputError naming file, line and column: missing column (names the nearest existing one), NaN or a non-number,
 /// time going backwards or standing still, a row with another number of fields, fewer than 2 rows; revolute q that looks

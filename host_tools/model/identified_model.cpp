@@ -205,6 +205,7 @@ json to_json(const IdentifiedModel& model) {
   for (const BaseParameter& p : model.base) {
     base.push_back({{"name", p.name},
                     {"column", p.column},
+                    {"expression", p.expression},
                     {"value", p.value},
                     {"std", p.std},
                     {"relative_std", p.value != 0 ? std::fabs(p.std / p.value) : 0.0}});
@@ -262,7 +263,7 @@ IdentifiedModel read_model(const std::filesystem::path& file) {
       throw InputError("robot, inertia and joints differ in length");
     }
     for (const json& p : j.at("base_parameters")) {
-      model.base.push_back({p.at("column"), p.at("name"), p.at("value"), p.at("std")});
+      model.base.push_back({p.at("column"), p.at("name"), p.at("value"), p.at("std"), p.at("expression")});
     }
     model.filter = {j.at("filter").at("position_cutoff_hz"), j.at("filter").at("torque_cutoff_hz"), j.at("filter").at("edge_s")};
     for (const auto& [name, format] : j.at("log_formats").items()) {

@@ -41,11 +41,12 @@ struct JointFit {
   const EffectFit* find(std::string_view effect) const;
 };
 
-/// A base parameter: the standard parameter that stands for its group, see `expression` in model.json.
+/// A base parameter: the standard parameter that stands for its group.
 struct BaseParameter {
   std::size_t column = 0;  ///< 10 * link + parameter (model/rigid_body.hpp)
   std::string name;        ///< e.g. "hx3": first moment of link 3 about x, DH frame
   double value = 0, std = 0;
+  std::string expression;  ///< the sum of standard parameters that it is, e.g. "Jzz1 + Jxx2 + 0.18 m3"
 };
 
 struct FilterFit {

@@ -110,6 +110,11 @@ void Pipeline::identify() {
 }
 
 void Pipeline::train() {
+  const TrainSettings& settings = project_.train;
+  if (settings.enabled && (settings.inputs != "physical" || settings.activation != "tanh")) {
+    throw InputError(fmt::format("{}: train.inputs = \"{}\" with activation \"{}\" is not built yet; use \"physical\" and \"tanh\"",
+                                 project_.file.string(), settings.inputs, settings.activation));
+  }
   const fs::path file = directory_ / "model.json";
   if (!fs::exists(file) || !is_current(read_model(file))) identify();
   // Always from the file: `fxdyn run` gives the same bytes as the verbs one by one.

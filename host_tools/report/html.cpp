@@ -110,7 +110,7 @@ std::string data_section(const json& model, const json& metrics, const std::stri
   std::string out = section("Data") + logs.html();
   out += paragraph(
       "Choices were gated on: " + text(metrics.at("gate")) + ". The errors below are on the " + role + " logs" +
-      (role == "test" ? ", which no stage has read before." : ", since there is no test log: they are optimistic."));
+      (role == "test" ? ", which decided nothing." : ", since there is no test log: they are optimistic."));
   for (const json& note : metrics.value("notes", json::array())) out += paragraph("Note: " + text(note) + ".");
   const json& filter = model.at("filter");
   out += paragraph(
