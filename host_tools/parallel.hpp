@@ -10,8 +10,8 @@
 
 namespace fxdyn {
 
-/// work(i) for i = 0 .. count-1 on all cores. Each i writes its own result, so the outcome does not depend on the number
-/// of threads. The first exception is thrown again here.
+/// work(i) for i = 0 .. count-1 on all cores. Each i writes its own result, so the outcome does not depend on the
+/// number of threads. The first exception is thrown again here.
 template <class Work>
 void parallel_for(std::size_t count, Work&& work) {
   const std::size_t threads = std::min<std::size_t>(count, std::max(1U, std::thread::hardware_concurrency()));

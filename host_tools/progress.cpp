@@ -36,7 +36,8 @@ void Progress::step() {
 void Progress::draw(std::size_t steps) {
   const std::lock_guard lock(drawing);
   const std::size_t filled = total_ == 0 ? width : width * std::min(steps, total_) / total_;
-  fmt::print(stderr, "\r{:<34} [{:#<{}}{:<{}}] {}/{} ", name_, "", filled, "", width - filled, std::min(steps, total_), total_);
+  fmt::print(stderr, "\r{:<34} [{:#<{}}{:<{}}] {}/{} ", name_, "", filled, "", width - filled, std::min(steps, total_),
+             total_);
   std::fflush(stderr);
 }
 

@@ -16,8 +16,8 @@
 #include "host_tools/error.hpp"
 #include "host_tools/nearest.hpp"
 
-/// Strict reading of TOML files: every key is asked for, others are refused with the nearest known one, and each complaint
-/// names file, line and key.
+/// Strict reading of TOML files: every key is asked for, others are refused with the nearest known one, and each
+/// complaint names file, line and key.
 namespace fxdyn::toml_input {
 
 using Names = std::vector<std::string>;

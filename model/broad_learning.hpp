@@ -4,13 +4,14 @@
 
 namespace fxdyn {
 
-/// Broad Learning System on physical inputs with memory, as an effect of one joint (paper Eqs. 22-29; inputs: see below).
+/// Broad Learning System on physical inputs with memory, as an effect of one joint (paper Eqs. 22-29; inputs: see
+/// below).
 ///   u   = [asinh(dq / reference velocity), z_1, z_2, z_3]      z: Dahl states of three presliding distances
 ///   h_k = tanh(sum_i w_ki u_i + b_k)                           k = 1 .. nodes
 ///   tau = sum_i c_i u_i + sum_k c_k h_k
 /// The feature layer of the paper (Eq. 23) is linear here, so it folds into w and into the output weights c_i (Z W_h =
-/// u W_z W_h); what is left of it are the inputs themselves. A friction force depends on where the joint came from, so the
-/// inputs carry memory; x = [q, dq, ddq] (Eq. 22) has none.
+/// u W_z W_h); what is left of it are the inputs themselves. A friction force depends on where the joint came from, so
+/// the inputs carry memory; x = [q, dq, ddq] (Eq. 22) has none.
 ///
 /// Words: inverse reference velocity, three tick/distance, then per node w_k1 .. w_k4, b_k, then the coefficients
 /// c_1 .. c_4 (inputs), c_1 .. c_nodes (activations).

@@ -26,7 +26,9 @@ using Catalogue = EffectList<Viscous, Coulomb, Offset, RotorInertia, Stribeck, P
 
 namespace detail {
 template <class... Effects>
-constexpr bool all_are_effects(EffectList<Effects...>) { return (Effect<Effects, Real> && ...); }
+constexpr bool all_are_effects(EffectList<Effects...>) {
+  return (Effect<Effects, Real> && ...);
+}
 static_assert(all_are_effects(Catalogue{}));
 }  // namespace detail
 

@@ -9,9 +9,10 @@
 #include "model/math.hpp"
 #include "model/numbers.hpp"
 
-// An effect is a contribution to one joint's torque, tau = theta^T phi(u; shape, state): theta linear coefficients, shape
-// nonlinear parameters, state what it remembers from tick to tick. Each effect stands in one file of model/effects and is
-// the only definition of its formula: firmware and simulator sum coefficient * phi, the identifier takes phi as columns.
+// An effect is a contribution to one joint's torque, tau = theta^T phi(u; shape, state): theta linear coefficients,
+// shape nonlinear parameters, state what it remembers from tick to tick. Each effect stands in one file of
+// model/effects and is the only definition of its formula: firmware and simulator sum coefficient * phi, the identifier
+// takes phi as columns.
 
 namespace fxdyn {
 
@@ -82,8 +83,8 @@ concept Effect = requires(const JointInput<N>& u, Words<N> words, typename E::te
 
 /// theta^T phi of one effect for this tick; steps its state.
 template <class E, class N>
-constexpr typename N::TorqueSum contribution(const JointInput<N>& u, Words<N> words, typename E::template State<N>& state,
-                                             Saturations& saturations) {
+constexpr typename N::TorqueSum contribution(const JointInput<N>& u, Words<N> words,
+                                             typename E::template State<N>& state, Saturations& saturations) {
   const Words<N> coefficients{words.data + E::shape.size()};
   auto sum = N::no_torque();
   E::template basis<N>(u, words, state, saturations, [&](auto tag, std::size_t i, auto phi) {

@@ -23,8 +23,8 @@ namespace raw {
 inline constexpr std::int64_t max32 = std::numeric_limits<std::int32_t>::max();
 inline constexpr std::int64_t min32 = std::numeric_limits<std::int32_t>::min();
 
-/// x * 2^-shift, rounded half up (towards +infinity on a tie) for shift > 0, exact for shift <= 0. The rounding term is added to the value
-/// above the last dropped bit, so it can't overflow.
+/// x * 2^-shift, rounded half up (towards +infinity on a tie) for shift > 0, exact for shift <= 0. The rounding term is
+/// added to the value above the last dropped bit, so it can't overflow.
 constexpr std::int64_t shift_right(std::int64_t x, int shift) {
   if (shift <= 0) return static_cast<std::int64_t>(static_cast<std::uint64_t>(x) << -shift);
   return ((x >> (shift - 1)) + 1) >> 1;

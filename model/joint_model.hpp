@@ -36,14 +36,15 @@ namespace detail {
 /// x within [lower, upper]; counts when it was not.
 template <class T>
 constexpr T limit(T x, T lower, T upper, Saturations& saturations) {
-  const bool below = x < lower, above = x > upper;
+  const bool below = x<lower, above = x> upper;
   saturations.count += static_cast<std::uint32_t>(below) + static_cast<std::uint32_t>(above);
   return below ? lower : (above ? upper : x);
 }
 }  // namespace detail
 
 template <class N>
-constexpr JointState<N> limit_setpoint(const JointState<N>& state, const JointLimits<N>& limits, Saturations& saturations) {
+constexpr JointState<N> limit_setpoint(const JointState<N>& state, const JointLimits<N>& limits,
+                                       Saturations& saturations) {
   return {detail::limit(state.q, limits.q_lower, limits.q_upper, saturations),
           detail::limit(state.dq, limits.dq_lower, limits.dq_upper, saturations),
           detail::limit(state.ddq, limits.ddq_lower, limits.ddq_upper, saturations)};
@@ -52,8 +53,9 @@ constexpr JointState<N> limit_setpoint(const JointState<N>& state, const JointLi
 /// Torque of one joint: structural (RNEA) + sum of its effects, within the joint's torque limits [N*m | N].
 /// `contributions(u)` returns that sum as N::TorqueSum.
 template <class N, class Contributions>
-constexpr Torque<N> joint_feedforward(const JointState<N>& joint, Torque<N> structural, const JointConstants<N>& constants,
-                                      Contributions&& contributions, Saturations& saturations) {
+constexpr Torque<N> joint_feedforward(const JointState<N>& joint, Torque<N> structural,
+                                      const JointConstants<N>& constants, Contributions&& contributions,
+                                      Saturations& saturations) {
   JointInput<N> u{joint.q, joint.dq, joint.ddq, {}, structural};
   u.sign = tanh_of(N::template clamp<Argument<N>>(joint.dq * constants.inverse_width));
   const auto sum = align(structural, N::no_torque()) + contributions(u);
@@ -75,7 +77,8 @@ struct JointEffects {
   }
   static constexpr void hash(LayoutHash& hash) {
     hash.add(static_cast<std::int32_t>(sizeof...(Effects)));
-    ((hash.add(Effects::name), hash.add(static_cast<std::int32_t>(Effects::shape.size() + Effects::linear.size()))), ...);
+    ((hash.add(Effects::name), hash.add(static_cast<std::int32_t>(Effects::shape.size() + Effects::linear.size()))),
+     ...);
   }
 
  private:
@@ -145,7 +148,9 @@ struct RobotModel {
     const typename N::Word* data = parameters.words.data();
     ((tau[i] = joint_feedforward<N>(
           limited[i], structural[i], parameters.constants[i],
-          [&](const JointInput<N>& u) { return Joints::template sum<N>(u, data, std::get<i>(state.effects), saturations); },
+          [&](const JointInput<N>& u) {
+            return Joints::template sum<N>(u, data, std::get<i>(state.effects), saturations);
+          },
           saturations),
       data += Joints::words),
      ...);

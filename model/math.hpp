@@ -8,8 +8,8 @@
 #include "model/fixed.hpp"
 #include "model/numbers.hpp"
 
-// sin, cos, tanh, exp(-x), asinh. In fixed point: tables made by the compiler and a short series around the nearest node,
-// constant time, no division. Each function states its largest error.
+// sin, cos, tanh, exp(-x), asinh. In fixed point: tables made by the compiler and a short series around the nearest
+// node, constant time, no division. Each function states its largest error.
 
 namespace fxdyn {
 
@@ -18,7 +18,8 @@ struct SineCosine {
   U sine, cosine;
 };
 
-// ---- double ----------------------------------------------------------------------------------------------------------
+// ---- double
+// ----------------------------------------------------------------------------------------------------------
 inline SineCosine<double> sin_cos(double q) { return {std::sin(q), std::cos(q)}; }
 inline double tanh_of(double x) { return std::tanh(x); }
 /// exp(-x) for x >= 0
@@ -28,7 +29,8 @@ constexpr double magnitude(double x) { return x < 0 ? -x : x; }
 /// sign(x): -1, 0 or 1
 constexpr double sign_of(double x) { return static_cast<double>((x > 0) - (x < 0)); }
 
-// ---- raw integers: shared by all fixed formats -------------------------------------------------------------------------
+// ---- raw integers: shared by all fixed formats
+// -------------------------------------------------------------------------
 namespace raw {
 
 /// Series for the compiler's use only (the standard library's functions are not constexpr).
@@ -83,14 +85,14 @@ inline constexpr auto sine_table = [] {
 /// Sine and cosine (30 bits) of q [rad] with `bits` fractional bits, |error| < 4e-9 + 2^-(bits + 1). From the nearest
 /// node a: sin(a + h) = sin a cos h + cos a sin h with |h| <= pi / 256, cos h = 1 - h^2/2, sin h = h - h^3/6.
 constexpr SineCosine<std::int32_t> sin_cos(std::int32_t q, int bits) {
-  constexpr std::int64_t inverse_two_pi = 1367130551;  // 2^33 / (2 pi)
-  constexpr std::int64_t two_pi = 1686629713;          // 2 pi * 2^28
+  constexpr std::int64_t inverse_two_pi = 1367130551;                                        // 2^33 / (2 pi)
+  constexpr std::int64_t two_pi = 1686629713;                                                // 2 pi * 2^28
   const auto phase = static_cast<std::uint32_t>(shift_right(q * inverse_two_pi, bits + 1));  // 2^-32 turns, wraps
   const std::uint32_t nearest = phase + (1U << 23);
   const std::uint32_t node = nearest >> 24;
   const auto offset = static_cast<std::int32_t>(nearest & 0x00ffffffU) - (1 << 23);
-  const std::int64_t h = (offset * two_pi) >> 26;         // 34 bits
-  const std::int64_t half_square = (h * h) >> 35;         // h^2 / 2, 34 bits
+  const std::int64_t h = (offset * two_pi) >> 26;                                   // 34 bits
+  const std::int64_t half_square = (h * h) >> 35;                                   // h^2 / 2, 34 bits
   const std::int64_t sine_h = h - ((h * ((half_square * 715827883) >> 31)) >> 34);  // h - h (h^2/2) / 3
   const std::int64_t s = sine_table[node];
   const std::int64_t c = sine_table[node + 64];
@@ -105,8 +107,8 @@ inline constexpr auto tanh_table = [] {
   return table;
 }();
 
-/// tanh (30 bits) of x with `argument_bits`, |error| < 1.5e-6; constant beyond |x| = 8. From the nearest node t = tanh(a):
-/// tanh(a + d) = t + d (1 - t^2) (1 - d t) + O(d^3 / 3), |d| <= 1/64.
+/// tanh (30 bits) of x with `argument_bits`, |error| < 1.5e-6; constant beyond |x| = 8. From the nearest node t =
+/// tanh(a): tanh(a + d) = t + d (1 - t^2) (1 - d t) + O(d^3 / 3), |d| <= 1/64.
 constexpr std::int32_t tanh(std::int32_t x) {
   const std::int32_t sign = x >> 31;
   std::uint32_t size = static_cast<std::uint32_t>(x ^ sign) - static_cast<std::uint32_t>(sign);
@@ -136,8 +138,8 @@ constexpr std::int32_t exp_negative(std::int32_t x) {
   const int k = static_cast<int>(y >> argument_bits);
   const auto node = static_cast<std::uint32_t>(y >> (argument_bits - 6)) & 63U;
   const std::int64_t r = y & ((std::int64_t{1} << (argument_bits - 6)) - 1);
-  const std::int64_t u = (r * 1488522236) >> 24;                // r ln 2 (31 bits), result with 34 bits
-  const std::int64_t square = (u * u) >> 35;                    // u^2 / 2
+  const std::int64_t u = (r * 1488522236) >> 24;  // r ln 2 (31 bits), result with 34 bits
+  const std::int64_t square = (u * u) >> 35;      // u^2 / 2
   const std::int64_t cube = (u * ((square * 715827883) >> 31)) >> 34;
   const std::int64_t value = power_table[node];
   const std::int64_t full = value - ((value * (u - square + cube)) >> 34);
@@ -169,7 +171,8 @@ inline constexpr auto asinh_table = [] {
 constexpr std::int32_t asinh(std::int32_t x) {
   const std::int32_t sign = x >> 31;
   // 1 + |x|, at most 129 * 2^24: fits unsigned
-  const std::uint32_t shifted = (static_cast<std::uint32_t>(x ^ sign) - static_cast<std::uint32_t>(sign)) + (1U << ratio_bits);
+  const std::uint32_t shifted =
+      (static_cast<std::uint32_t>(x ^ sign) - static_cast<std::uint32_t>(sign)) + (1U << ratio_bits);
   const int e = 31 - ratio_bits - std::countl_zero(shifted);
   const std::uint32_t mantissa = shifted << (31 - ratio_bits - e);  // leading one at bit 31
   const Parabola& piece = asinh_table[static_cast<std::uint32_t>(e) * 16 + ((mantissa >> 27) & 15U)];
@@ -189,7 +192,8 @@ constexpr std::int32_t sign(std::int32_t x) { return ((x > 0) - (x < 0)) * (1 <<
 
 }  // namespace raw
 
-// ---- fixed point -----------------------------------------------------------------------------------------------------
+// ---- fixed point
+// -----------------------------------------------------------------------------------------------------
 template <int bits>
 constexpr SineCosine<Fixed<unit_bits>> sin_cos(Fixed<bits> q) {
   const auto result = raw::sin_cos(q.raw, bits);
@@ -199,8 +203,12 @@ constexpr Fixed<unit_bits> tanh_of(Fixed<argument_bits> x) { return {raw::tanh(x
 constexpr Fixed<unit_bits> exp_negative(Fixed<argument_bits> x) { return {raw::exp_negative(x.raw)}; }
 constexpr Fixed<argument_bits> asinh_of(Fixed<ratio_bits> x) { return {raw::asinh(x.raw)}; }
 template <int bits>
-constexpr Fixed<bits> magnitude(Fixed<bits> x) { return {raw::magnitude(x.raw)}; }
+constexpr Fixed<bits> magnitude(Fixed<bits> x) {
+  return {raw::magnitude(x.raw)};
+}
 template <int bits>
-constexpr Fixed<unit_bits> sign_of(Fixed<bits> x) { return {raw::sign(x.raw)}; }
+constexpr Fixed<unit_bits> sign_of(Fixed<bits> x) {
+  return {raw::sign(x.raw)};
+}
 
 }  // namespace fxdyn

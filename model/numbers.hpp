@@ -30,39 +30,60 @@ struct Real {
   using Word = double;
 
   template <class T>
-  static constexpr T load(Word word) { return word; }
+  static constexpr T load(Word word) {
+    return word;
+  }
   static constexpr TorqueSum no_torque() { return 0; }
   static constexpr double one() { return 1; }
   template <class T>
-  static constexpr T narrow(double x, Saturations&) { return x; }
+  static constexpr T narrow(double x, Saturations&) {
+    return x;
+  }
   template <class T>
-  static constexpr T clamp(double x) { return x; }
+  static constexpr T clamp(double x) {
+    return x;
+  }
   template <class T>
-  static constexpr T convert(double x, Saturations&) { return x; }
+  static constexpr T convert(double x, Saturations&) {
+    return x;
+  }
 };
 
 constexpr double align(double x, double) { return x; }
 
 /// Fixed point with formats known at compile time. `Formats` is a generated struct of static constexpr int: one
-/// member per name in `quantity_names` (but for `unit`, `argument` and `ratio`), `force_sum` (fractional bits of the sums that
-/// give forces) and `torque_sum` (of the sum of all contributions to a joint's torque).
+/// member per name in `quantity_names` (but for `unit`, `argument` and `ratio`), `force_sum` (fractional bits of the
+/// sums that give forces) and `torque_sum` (of the sum of all contributions to a joint's torque).
 template <class Formats>
 struct FixedNumbers {
   static constexpr int bits(Quantity quantity) {
     switch (quantity) {
-      case Quantity::position: return Formats::position;
-      case Quantity::velocity: return Formats::velocity;
-      case Quantity::acceleration: return Formats::acceleration;
-      case Quantity::linear_acceleration: return Formats::linear_acceleration;
-      case Quantity::length: return Formats::length;
-      case Quantity::force: return Formats::force;
-      case Quantity::torque: return Formats::torque;
-      case Quantity::unit: return unit_bits;
-      case Quantity::argument: return argument_bits;
-      case Quantity::ratio: return ratio_bits;
-      case Quantity::inverse_velocity: return Formats::inverse_velocity;
-      case Quantity::inverse_path: return Formats::inverse_path;
-      case Quantity::weight: return Formats::weight;
+      case Quantity::position:
+        return Formats::position;
+      case Quantity::velocity:
+        return Formats::velocity;
+      case Quantity::acceleration:
+        return Formats::acceleration;
+      case Quantity::linear_acceleration:
+        return Formats::linear_acceleration;
+      case Quantity::length:
+        return Formats::length;
+      case Quantity::force:
+        return Formats::force;
+      case Quantity::torque:
+        return Formats::torque;
+      case Quantity::unit:
+        return unit_bits;
+      case Quantity::argument:
+        return argument_bits;
+      case Quantity::ratio:
+        return ratio_bits;
+      case Quantity::inverse_velocity:
+        return Formats::inverse_velocity;
+      case Quantity::inverse_path:
+        return Formats::inverse_path;
+      case Quantity::weight:
+        return Formats::weight;
     }
     return 0;
   }
@@ -79,7 +100,9 @@ struct FixedNumbers {
   using Word = std::int32_t;
 
   template <class T>
-  static constexpr T load(Word word) { return {word}; }
+  static constexpr T load(Word word) {
+    return {word};
+  }
   static constexpr TorqueSum no_torque() { return {}; }
   static constexpr Fixed<unit_bits> one() { return {1 << unit_bits}; }
   template <class Hash>
@@ -113,19 +136,32 @@ struct FixedNumbers {
 };
 
 /// The names that formulas use.
-template <class N> using Position = typename N::template Of<Quantity::position>;
-template <class N> using Velocity = typename N::template Of<Quantity::velocity>;
-template <class N> using Acceleration = typename N::template Of<Quantity::acceleration>;
-template <class N> using LinearAcceleration = typename N::template Of<Quantity::linear_acceleration>;
-template <class N> using Length = typename N::template Of<Quantity::length>;
-template <class N> using Force = typename N::template Of<Quantity::force>;
-template <class N> using Torque = typename N::template Of<Quantity::torque>;
-template <class N> using Unit = typename N::template Of<Quantity::unit>;
-template <class N> using Argument = typename N::template Of<Quantity::argument>;
-template <class N> using Ratio = typename N::template Of<Quantity::ratio>;
-template <class N> using InverseVelocity = typename N::template Of<Quantity::inverse_velocity>;
-template <class N> using InversePath = typename N::template Of<Quantity::inverse_path>;
-template <class N> using Weight = typename N::template Of<Quantity::weight>;
+template <class N>
+using Position = typename N::template Of<Quantity::position>;
+template <class N>
+using Velocity = typename N::template Of<Quantity::velocity>;
+template <class N>
+using Acceleration = typename N::template Of<Quantity::acceleration>;
+template <class N>
+using LinearAcceleration = typename N::template Of<Quantity::linear_acceleration>;
+template <class N>
+using Length = typename N::template Of<Quantity::length>;
+template <class N>
+using Force = typename N::template Of<Quantity::force>;
+template <class N>
+using Torque = typename N::template Of<Quantity::torque>;
+template <class N>
+using Unit = typename N::template Of<Quantity::unit>;
+template <class N>
+using Argument = typename N::template Of<Quantity::argument>;
+template <class N>
+using Ratio = typename N::template Of<Quantity::ratio>;
+template <class N>
+using InverseVelocity = typename N::template Of<Quantity::inverse_velocity>;
+template <class N>
+using InversePath = typename N::template Of<Quantity::inverse_path>;
+template <class N>
+using Weight = typename N::template Of<Quantity::weight>;
 
 template <class N>
 concept NumberSystem = requires(Velocity<N> v, Unit<N> u, Saturations& saturations) {

@@ -28,8 +28,8 @@ enum class Quantity : std::uint8_t {
 inline constexpr std::size_t quantity_count = 13;
 
 inline constexpr std::array<std::string_view, quantity_count> quantity_names{
-    "position", "velocity", "acceleration", "linear_acceleration", "length",           "force",
-    "torque",   "unit",     "argument",     "ratio",    "inverse_velocity",    "inverse_path", "weight"};
+    "position", "velocity", "acceleration", "linear_acceleration", "length",       "force", "torque",
+    "unit",     "argument", "ratio",        "inverse_velocity",    "inverse_path", "weight"};
 
 /// Fractional bits that are the same for every robot: quantities without a unit have a known range.
 inline constexpr int unit_bits = 30;      ///< [-2, 2)

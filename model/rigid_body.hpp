@@ -8,12 +8,12 @@
 #include "model/numbers.hpp"
 #include "model/vector.hpp"
 
-// Rigid-body inverse dynamics of a serial chain: one recursive Newton-Euler algorithm (RNEA), used by the simulator, the
-// regressor and the firmware.
+// Rigid-body inverse dynamics of a serial chain: one recursive Newton-Euler algorithm (RNEA), used by the simulator,
+// the regressor and the firmware.
 //
-// Frames: modified Denavit-Hartenberg (Craig, Introduction to Robotics, ch. 3). Frame i is fixed to link i, its z axis is
-// joint axis i, R_i = Rx(alpha) Rz(theta) turns vectors of frame i into frame i-1, p_i = (a, -d sin(alpha), d cos(alpha)) is
-// the origin of frame i in frame i-1. Revolute: theta = q + offset. Prismatic: d = q + offset.
+// Frames: modified Denavit-Hartenberg (Craig, Introduction to Robotics, ch. 3). Frame i is fixed to link i, its z axis
+// is joint axis i, R_i = Rx(alpha) Rz(theta) turns vectors of frame i into frame i-1, p_i = (a, -d sin(alpha), d
+// cos(alpha)) is the origin of frame i in frame i-1. Revolute: theta = q + offset. Prismatic: d = q + offset.
 //
 // Inertial parameters of a link, ten, in its own frame and about its origin: mass m [kg], first moment h = m c [kg m],
 // second moment J = integral of r r^T dm [kg m^2]. They are the entries of the pseudo-inertia matrix (Wensing, Kim,
@@ -103,8 +103,8 @@ constexpr Vector3<T> narrow(const Vector3<W>& v, Saturations& saturations) {
 
 /// K = [omega_dot]x + [omega]x [omega]x = [omega_dot]x + omega omega^T - |omega|^2 1
 template <class N>
-constexpr Matrix3<Acceleration<N>> acceleration_matrix(const Vector3<Velocity<N>>& w, const Vector3<Acceleration<N>>& wd,
-                                                       Saturations& saturations) {
+constexpr Matrix3<Acceleration<N>> acceleration_matrix(const Vector3<Velocity<N>>& w,
+                                                       const Vector3<Acceleration<N>>& wd, Saturations& saturations) {
   const auto entry = [&](auto wide) { return N::template narrow<Acceleration<N>>(wide, saturations); };
   const auto xx = w.x * w.x, yy = w.y * w.y, zz = w.z * w.z;
   const auto xy = w.x * w.y, xz = w.x * w.z, yz = w.y * w.z;
@@ -116,8 +116,8 @@ constexpr Matrix3<Acceleration<N>> acceleration_matrix(const Vector3<Velocity<N>
 
 }  // namespace detail
 
-/// The base at rest. `up` is minus the gravity vector in the frame that joint 1's alpha, a and d refer to [m/s^2]: a base
-/// that accelerates upwards gives every link its weight.
+/// The base at rest. `up` is minus the gravity vector in the frame that joint 1's alpha, a and d refer to [m/s^2]: a
+/// base that accelerates upwards gives every link its weight.
 template <class N>
 constexpr LinkMotion<N> base_motion(const Vector3<LinearAcceleration<N>>& up) {
   LinkMotion<N> base;
@@ -129,8 +129,8 @@ constexpr LinkMotion<N> base_motion(const Vector3<LinearAcceleration<N>>& up) {
 ///   omega_i = R^T omega_{i-1} + dq z,  omega_dot_i = R^T omega_dot_{i-1} + R^T omega_{i-1} x dq z + ddq z   (revolute)
 ///   a_i = R^T (a_{i-1} + K_{i-1} p_i)  [+ 2 omega_i x dq z + ddq z for a prismatic joint]
 template <class N>
-constexpr LinkMotion<N> link_motion(const LinkGeometry<N>& link, const LinkMotion<N>& parent, const JointState<N>& joint,
-                                    Saturations& saturations) {
+constexpr LinkMotion<N> link_motion(const LinkGeometry<N>& link, const LinkMotion<N>& parent,
+                                    const JointState<N>& joint, Saturations& saturations) {
   using V = Velocity<N>;
   using W = Acceleration<N>;
   using A = LinearAcceleration<N>;
@@ -175,7 +175,8 @@ constexpr LinkMotion<N> link_motion(const LinkGeometry<N>& link, const LinkMotio
 template <class N>
 constexpr Wrench<N> link_wrench(const LinkInertia<N>& link, const LinkMotion<N>& motion, Saturations& saturations) {
   using SecondMoment = typename N::SecondMoment;
-  const Vector3<SecondMoment> jx{link.xx, link.xy, link.xz}, jy{link.xy, link.yy, link.yz}, jz{link.xz, link.yz, link.zz};
+  const Vector3<SecondMoment> jx{link.xx, link.xy, link.xz}, jy{link.xy, link.yy, link.yz},
+      jz{link.xz, link.yz, link.zz};
   const auto& k = motion.k;
   const auto lever = cross(link.h, motion.a);
   return {detail::narrow<N, Force<N>>(scale(link.m, motion.a) + k * link.h, saturations),
@@ -193,8 +194,7 @@ constexpr void add_to_parent(Wrench<N>& parent, const Wrench<N>& child, const Li
   const auto moment = detail::to_parent<N>(link, motion, child.moment, saturations);
   const auto lever = cross(motion.p, force);
   parent.force = detail::narrow<N, Force<N>>(parent.force + force, saturations);
-  parent.moment =
-      detail::narrow<N, Torque<N>>(align(parent.moment, lever) + align(moment, lever) + lever, saturations);
+  parent.moment = detail::narrow<N, Torque<N>>(align(parent.moment, lever) + align(moment, lever) + lever, saturations);
 }
 
 /// The wrench's component along the joint's axis: what the drive has to give [N*m | N].

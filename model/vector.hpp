@@ -39,7 +39,9 @@ struct Matrix3 {
 };
 
 template <class A, class B>
-constexpr auto dot(const Vector3<A>& a, const Vector3<B>& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+constexpr auto dot(const Vector3<A>& a, const Vector3<B>& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
 
 template <class A, class B>
 constexpr auto operator*(const Matrix3<A>& m, const Vector3<B>& v) {

@@ -40,14 +40,16 @@ void print_effects(bool as_json) {
   for (const auto& effect : list) {
     fmt::print("{:<16} tau = {}\n", effect["effect"].get<std::string>(), effect["equation"].get<std::string>());
     for (const auto& p : effect["parameters"]) {
-      fmt::print("{:<16}   {} [{}] ({})\n", "", p["name"].get<std::string>(), p["unit"].get<std::string>(), p["source"].get<std::string>());
+      fmt::print("{:<16}   {} [{}] ({})\n", "", p["name"].get<std::string>(), p["unit"].get<std::string>(),
+                 p["source"].get<std::string>());
     }
   }
 }
 
 int run(int argc, char** argv) {
-  CLI::App app{"fxdyn: from a robot's measured log to torque feedforward on its drive controllers.\n"
-               "Example: fxdyn run robot.toml --out out/robot"};
+  CLI::App app{
+      "fxdyn: from a robot's measured log to torque feedforward on its drive controllers.\n"
+      "Example: fxdyn run robot.toml --out out/robot"};
   app.set_version_flag("--version", version);
   app.require_subcommand(1);
 
@@ -55,32 +57,41 @@ int run(int argc, char** argv) {
   bool as_json = false;
   Eigen::Index ticks = 5000;
   const auto stage = [&](const char* name, const char* what) {
-    CLI::App* verb = app.add_subcommand(name, fmt::format("{}\nExample: fxdyn {} robot.toml --out out/robot", what, name));
+    CLI::App* verb =
+        app.add_subcommand(name, fmt::format("{}\nExample: fxdyn {} robot.toml --out out/robot", what, name));
     verb->add_option("PROJECT", project, "project file (TOML)")->required();
     verb->add_option("--out", out, "directory for the results")->required();
     return verb;
   };
   const CLI::App* run_verb = stage("run", "identify, train, export and report in one go.");
-  const CLI::App* identify_verb = stage("identify", "Structure and friction from the train logs: model.json, metrics.json.");
-  const CLI::App* train_verb = stage("train", "Fit a Broad Learning System on what is left; keep it where validation improves.");
-  const CLI::App* export_verb = stage("export", "Choose fixed-point formats, write tables.hpp, tables.bin, export.json.");
+  const CLI::App* identify_verb =
+      stage("identify", "Structure and friction from the train logs: model.json, metrics.json.");
+  const CLI::App* train_verb =
+      stage("train", "Fit a Broad Learning System on what is left; keep it where validation improves.");
+  const CLI::App* export_verb =
+      stage("export", "Choose fixed-point formats, write tables.hpp, tables.bin, export.json.");
   const CLI::App* report_verb = stage("report", "Draw report.html from what the other stages wrote.");
-  CLI::App* replay_verb = stage("replay", "Stream the held-out logs to a firmware image in QEMU and compare bit for bit: replay.json.");
+  CLI::App* replay_verb =
+      stage("replay", "Stream the held-out logs to a firmware image in QEMU and compare bit for bit: replay.json.");
   replay_verb->add_option("--image", image, "firmware image (.elf) made by toolchains/build_image.sh")->required();
   replay_verb->add_option("--ticks", ticks, "at most this many ticks of each log")->capture_default_str();
 
-  CLI::App* simulate_verb = app.add_subcommand("simulate", "Make logs from a scenario.\nExample: fxdyn simulate scenario.toml --out out/logs");
+  CLI::App* simulate_verb = app.add_subcommand(
+      "simulate", "Make logs from a scenario.\nExample: fxdyn simulate scenario.toml --out out/logs");
   simulate_verb->add_option("SCENARIO", scenario, "scenario file (TOML)")->required();
   simulate_verb->add_option("--out", out, "directory for the logs")->required();
-  CLI::App* predict_verb = app.add_subcommand(
-      "predict", "Torque of a model over a log: CSV and metrics.json.\nExample: fxdyn predict --model out/robot/model.json --log run.csv --out out/prediction");
+  CLI::App* predict_verb =
+      app.add_subcommand("predict",
+                         "Torque of a model over a log: CSV and metrics.json.\nExample: fxdyn predict --model "
+                         "out/robot/model.json --log run.csv --out out/prediction");
   predict_verb->add_option("--model", model, "model.json")->required();
   predict_verb->add_option("--log", log, "log (CSV); without torque there are no metrics")->required();
   predict_verb->add_option("--numbers", numbers, "real (double) or fixed (as the firmware computes)")
       ->check(CLI::IsMember({"real", "fixed"}))
       ->capture_default_str();
   predict_verb->add_option("--out", out, "directory for the prediction")->required();
-  CLI::App* effects_verb = app.add_subcommand("effects", "List the effects that the model knows.\nExample: fxdyn effects --json");
+  CLI::App* effects_verb =
+      app.add_subcommand("effects", "List the effects that the model knows.\nExample: fxdyn effects --json");
   effects_verb->add_flag("--json", as_json, "for machines");
 
   try {

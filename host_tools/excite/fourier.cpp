@@ -49,8 +49,8 @@ FourierJoint random_fourier(std::uint64_t seed, int order, double period_s, cons
     acceleration = std::max(acceleration, std::fabs(state.ddq));
   }
   const double range = bounds.upper - bounds.lower;
-  const double scale = std::min({0.95 * range / (high - low), speed * bounds.velocity / velocity,
-                                 speed * bounds.acceleration / acceleration});
+  const double scale = std::min(
+      {0.95 * range / (high - low), speed * bounds.velocity / velocity, speed * bounds.acceleration / acceleration});
   joint.a *= scale;
   joint.b *= scale;
   const double first = bounds.lower + 0.02 * range - scale * low, last = bounds.upper - 0.02 * range - scale * high;

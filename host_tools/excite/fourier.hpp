@@ -6,8 +6,8 @@
 
 namespace fxdyn {
 
-/// Fourier series of one joint with zero velocity and acceleration at the start and the end of every period, and position
-/// `centre` there (paper Sec. 3.4, with its boundary conditions met):
+/// Fourier series of one joint with zero velocity and acceleration at the start and the end of every period, and
+/// position `centre` there (paper Sec. 3.4, with its boundary conditions met):
 ///   q(t)   = centre + sum_k a_k / (k w) sin(k w t) - b_k / (k w) cos(k w t)
 ///   dq(t)  = sum_k a_k cos(k w t) + b_k sin(k w t)
 ///   ddq(t) = sum_k -a_k k w sin(k w t) + b_k k w cos(k w t),   w = 2 pi / period.
@@ -27,8 +27,8 @@ void project_onto_boundary_conditions(FourierJoint& joint);
 struct FourierBounds {
   double lower, upper, velocity, acceleration;
 };
-/// Random coefficients on the boundary conditions, scaled until the tightest of the limits is met at `speed` (0..1] times
-/// its value; the centre is random within what the position limits leave.
+/// Random coefficients on the boundary conditions, scaled until the tightest of the limits is met at `speed` (0..1]
+/// times its value; the centre is random within what the position limits leave.
 FourierJoint random_fourier(std::uint64_t seed, int order, double period_s, const FourierBounds& bounds, double speed);
 
 }  // namespace fxdyn

@@ -42,9 +42,9 @@ class FixedModel {
   Evaluator<RunTimeNumbers> evaluator_;
 };
 
-/// Chooses the formats: ranges observed when the model runs over the given states and over 4000 random states within the
-/// joint limits, with a factor of two in reserve; 64-bit sums bounded by the sum of the magnitudes of their terms. Not a
-/// proof: whatever exceeds a number's format saturates and is counted.
+/// Chooses the formats: ranges observed when the model runs over the given states and over 4000 random states within
+/// the joint limits, with a factor of two in reserve; 64-bit sums bounded by the sum of the magnitudes of their terms.
+/// Not a proof: whatever exceeds a number's format saturates and is counted.
 /// @throws DataError where the joints' parameters are too far apart in size for common sums.
 Formats choose_formats(const IdentifiedModel& model, const std::vector<TickStates>& states);
 
@@ -53,14 +53,14 @@ struct QuantisationError {
   Eigen::VectorXd largest, rms;
   std::uint32_t saturations = 0;
 };
-QuantisationError quantisation_error(const IdentifiedModel& model, const Formats& formats, const std::vector<TickStates>& states);
+QuantisationError quantisation_error(const IdentifiedModel& model, const Formats& formats,
+                                     const std::vector<TickStates>& states);
 
 /// Torques of the fixed-point model over a log at its own states, samples x joints [N*m | N].
 Eigen::MatrixXd predict_fixed(const IdentifiedModel& model, const Formats& formats, const TickStates& states);
 
 /// Writes tables.hpp and tables.bin; returns the CRC-32 of the parameters.
 std::uint32_t write_tables(const IdentifiedModel& model, const Formats& formats, const QuantisationError& error,
-                  const std::filesystem::path& directory);
-
+                           const std::filesystem::path& directory);
 
 }  // namespace fxdyn

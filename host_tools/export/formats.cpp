@@ -13,7 +13,9 @@ namespace fxdyn {
 namespace {
 
 /// Largest number of fractional bits with which +-range fits into `width` bits and a sign.
-int fitting_bits(double range, int width) { return width - static_cast<int>(std::ceil(std::log2(std::max(range, 1e-9)))); }
+int fitting_bits(double range, int width) {
+  return width - static_cast<int>(std::ceil(std::log2(std::max(range, 1e-9))));
+}
 
 Ranges observe(const IdentifiedModel& model, const std::vector<TickStates>& states) {
   Ranges ranges;
@@ -37,7 +39,8 @@ Ranges observe(const IdentifiedModel& model, const std::vector<TickStates>& stat
     for (std::size_t j = 0; j < n; ++j) {
       const JointFit& joint = model.joints[j];
       // Velocity and acceleration at their limits with either sign: the extremes lie at corners.
-      const double dq = (random.uniform() < 0.5 ? -1 : 1) * joint.dq_limit, ddq = (random.uniform() < 0.5 ? -1 : 1) * joint.ddq_limit;
+      const double dq = (random.uniform() < 0.5 ? -1 : 1) * joint.dq_limit,
+                   ddq = (random.uniform() < 0.5 ? -1 : 1) * joint.ddq_limit;
       state[j] = {{random.uniform(joint.q_lower, joint.q_upper)}, {dq}, {ddq}};
     }
     evaluator.tick(state, ignored);
@@ -76,10 +79,11 @@ Formats choose_formats(const IdentifiedModel& model, const std::vector<TickState
   at_most(Q::torque, bits(Q::length) + bits(Q::force));
 
   const int fa = bits(Q::linear_acceleration), fw = bits(Q::acceleration);
-  formats.force_sum = std::min({fitting_bits(ranges.mass, 31) + fa, fitting_bits(ranges.first_moment, 31) + fw,
-                                fitting_bits(ranges.second_moment, 31) + 2 * fw - fa,
-                                fitting_bits(2 * (ranges.mass * a + 3 * w * ranges.first_moment), 62),
-                                fitting_bits(2 * (2 * ranges.first_moment * a + 6 * w * ranges.second_moment), 62) + fw - fa});
+  formats.force_sum =
+      std::min({fitting_bits(ranges.mass, 31) + fa, fitting_bits(ranges.first_moment, 31) + fw,
+                fitting_bits(ranges.second_moment, 31) + 2 * fw - fa,
+                fitting_bits(2 * (ranges.mass * a + 3 * w * ranges.first_moment), 62),
+                fitting_bits(2 * (2 * ranges.first_moment * a + 6 * w * ranges.second_moment), 62) + fw - fa});
   at_most(Q::force, formats.force_sum);
   at_most(Q::torque, std::min(formats.force_sum - fw + fa, bits(Q::length) + bits(Q::force)));
 
@@ -103,7 +107,8 @@ Formats choose_formats(const IdentifiedModel& model, const std::vector<TickState
     }
   }
   if (formats.torque_sum < formats[Quantity::torque]) {
-    throw DataError("the joints' coefficients differ too much in size for one sum: leave out the joint's BLS or raise train.ridge");
+    throw DataError(
+        "the joints' coefficients differ too much in size for one sum: leave out the joint's BLS or raise train.ridge");
   }
   return formats;
 }
@@ -112,8 +117,8 @@ TickStates at_ticks(const ProcessedLog& log, double tick_s, bool whole) {
   const Eigen::Index first = whole ? 0 : log.first, last = whole ? log.t.size() : log.last;
   const double from = log.t[first], to = log.t[last - 1];
   const auto ticks = static_cast<Eigen::Index>(std::floor((to - from) / tick_s + 1e-9)) + 1;
-  TickStates out{log.name, Eigen::VectorXd(ticks), Eigen::MatrixXd(ticks, log.q.cols()), Eigen::MatrixXd(ticks, log.q.cols()),
-                 Eigen::MatrixXd(ticks, log.q.cols())};
+  TickStates out{log.name, Eigen::VectorXd(ticks), Eigen::MatrixXd(ticks, log.q.cols()),
+                 Eigen::MatrixXd(ticks, log.q.cols()), Eigen::MatrixXd(ticks, log.q.cols())};
   for (Eigen::Index k = 0; k < ticks; ++k) {
     const double t = from + tick_s * static_cast<double>(k);
     const double place = (t - from) / log.step_s;

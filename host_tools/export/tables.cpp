@@ -56,7 +56,8 @@ class Printer {
   void block(std::size_t count, const std::string& comment) {
     text += "    // " + comment + "\n";
     for (std::size_t i = 0; i < count; ++i) {
-      text += (i % 10 == 0 ? "    " : "") + fmt::format("{},", literal(words_[at_++])) + (i % 10 == 9 || i + 1 == count ? "\n" : " ");
+      text += (i % 10 == 0 ? "    " : "") + fmt::format("{},", literal(words_[at_++])) +
+              (i % 10 == 9 || i + 1 == count ? "\n" : " ");
     }
   }
   std::string text;
@@ -75,13 +76,15 @@ std::string parameters_text(const IdentifiedModel& model, const std::vector<std:
   printer.group(3, "minus gravity in the first DH frame [m/s^2]");
   for (std::size_t i = 0; i < model.robot.size(); ++i) {
     printer.joint_kind(model.robot.joints[i].type);
-    printer.group(6, fmt::format("{}: cos alpha, sin alpha, a, d [m], cos theta, sin theta", model.robot.joints[i].name));
+    printer.group(6,
+                  fmt::format("{}: cos alpha, sin alpha, a, d [m], cos theta, sin theta", model.robot.joints[i].name));
   }
   for (std::size_t i = 0; i < model.robot.size(); ++i) {
     printer.group(10, fmt::format("link {}: m [kg], h [kg m], Jxx Jyy Jzz Jxy Jxz Jyz [kg m^2]", i + 1));
   }
   for (std::size_t i = 0; i < model.robot.size(); ++i) {
-    printer.group(9, fmt::format("{}: limits of q, dq, ddq, tau (lower, upper), 1 / width of the Coulomb sign", model.robot.joints[i].name));
+    printer.group(9, fmt::format("{}: limits of q, dq, ddq, tau (lower, upper), 1 / width of the Coulomb sign",
+                                 model.robot.joints[i].name));
   }
   for (std::size_t i = 0; i < model.robot.size(); ++i) {
     const Joint& joint = model.robot.joints[i];
@@ -91,7 +94,8 @@ std::string parameters_text(const IdentifiedModel& model, const std::vector<std:
       std::string comment = fmt::format("{}: {} = {};", joint.name, fit.effect, info.equation);
       const auto describe = [&](std::span<const ParameterInfo> infos, const std::vector<double>& values) {
         for (std::size_t k = 0; k < infos.size(); ++k) {
-          comment += fmt::format(" {} {:.6g} {}", infos[k].name, values[k], prismatic ? infos[k].unit_prismatic : infos[k].unit);
+          comment += fmt::format(" {} {:.6g} {}", infos[k].name, values[k],
+                                 prismatic ? infos[k].unit_prismatic : infos[k].unit);
         }
       };
       describe(info.shape, fit.shape);
@@ -101,7 +105,8 @@ std::string parameters_text(const IdentifiedModel& model, const std::vector<std:
     if (const auto& bls = model.joints[i].bls) {
       const auto nodes = static_cast<std::size_t>(bls->nodes());
       printer.block(broad_learning_shape_words(nodes) + broad_learning_coefficients(nodes),
-                    fmt::format("{}: BLS, {} nodes: 1 / reference velocity, tick / distances, weights, coefficients", joint.name, nodes));
+                    fmt::format("{}: BLS, {} nodes: 1 / reference velocity, tick / distances, weights, coefficients",
+                                joint.name, nodes));
     }
   }
   return printer.text;
@@ -115,7 +120,8 @@ FixedModel::FixedModel(const IdentifiedModel& model, const Formats& formats)
 std::vector<std::int32_t> FixedModel::tick(const std::vector<std::int32_t>& states, Saturations& saturations) {
   const FormatScope scope(formats_);
   std::vector<JointState<RunTimeNumbers>> joints(evaluator_.joints());
-  for (std::size_t j = 0; j < joints.size(); ++j) joints[j] = {{states[3 * j]}, {states[3 * j + 1]}, {states[3 * j + 2]}};
+  for (std::size_t j = 0; j < joints.size(); ++j)
+    joints[j] = {{states[3 * j]}, {states[3 * j + 1]}, {states[3 * j + 2]}};
   std::vector<std::int32_t> torques;
   for (const auto tau : evaluator_.tick(joints, saturations)) torques.push_back(tau.raw);
   return torques;
@@ -145,7 +151,8 @@ std::uint32_t FixedModel::layout_hash() const {
   return hash.value();
 }
 
-QuantisationError quantisation_error(const IdentifiedModel& model, const Formats& formats, const std::vector<TickStates>& states) {
+QuantisationError quantisation_error(const IdentifiedModel& model, const Formats& formats,
+                                     const std::vector<TickStates>& states) {
   FixedModel fixed(model, formats);
   Evaluator<Real> exact(model, model.tick_s);
   const auto n = static_cast<Eigen::Index>(model.robot.size());
@@ -159,7 +166,8 @@ QuantisationError quantisation_error(const IdentifiedModel& model, const Formats
     for (Eigen::Index k = 0; k < log.t.size(); ++k, ++count) {
       const std::vector<std::int32_t> raw = raw_states(log, k, formats);
       for (std::size_t j = 0; j < state.size(); ++j) {
-        state[j] = {from_raw(raw[3 * j], formats[Quantity::position]), from_raw(raw[3 * j + 1], formats[Quantity::velocity]),
+        state[j] = {from_raw(raw[3 * j], formats[Quantity::position]),
+                    from_raw(raw[3 * j + 1], formats[Quantity::velocity]),
                     from_raw(raw[3 * j + 2], formats[Quantity::acceleration])};
       }
       const std::vector<std::int32_t> torques = fixed.tick(raw, saturations);
@@ -183,13 +191,14 @@ Eigen::MatrixXd predict_fixed(const IdentifiedModel& model, const Formats& forma
   Saturations ignored;
   for (Eigen::Index k = 0; k < out.rows(); ++k) {
     const std::vector<std::int32_t> torques = fixed.tick(raw_states(states, k, formats), ignored);
-    for (Eigen::Index j = 0; j < out.cols(); ++j) out(k, j) = from_raw(torques[static_cast<std::size_t>(j)], formats[Quantity::torque]);
+    for (Eigen::Index j = 0; j < out.cols(); ++j)
+      out(k, j) = from_raw(torques[static_cast<std::size_t>(j)], formats[Quantity::torque]);
   }
   return out;
 }
 
 std::uint32_t write_tables(const IdentifiedModel& model, const Formats& formats, const QuantisationError& error,
-                  const std::filesystem::path& directory) {
+                           const std::filesystem::path& directory) {
   const FixedModel fixed(model, formats);
   const std::vector<std::int32_t> words = fixed.words();
   Crc32 crc;
@@ -202,14 +211,16 @@ std::uint32_t write_tables(const IdentifiedModel& model, const Formats& formats,
     if (quantity == Quantity::unit || quantity == Quantity::argument || quantity == Quantity::ratio) continue;
     format_lines += fmt::format("  static constexpr int {} = {};\n", quantity_names[i], formats.quantity[i]);
   }
-  format_lines += fmt::format("  static constexpr int force_sum = {};\n  static constexpr int torque_sum = {};\n", formats.force_sum, formats.torque_sum);
+  format_lines += fmt::format("  static constexpr int force_sum = {};\n  static constexpr int torque_sum = {};\n",
+                              formats.force_sum, formats.torque_sum);
   for (std::size_t j = 0; j < model.joints.size(); ++j) {
     model_lines += fmt::format(",\n                         {}", joint_type(model.joints[j]));
     const auto k = static_cast<Eigen::Index>(j);
     error_lines += fmt::format("//   {}: {:.3g} {}, {:.2g} of rated\n", model.robot.joints[j].name, error.largest[k],
                                model.robot.joints[j].torque_unit(), error.largest[k] / model.joints[j].rated_torque);
   }
-  for (const LogReference& log : model.logs) log_lines += fmt::format("//   {} {} [{}, {}) s, hash {}\n", log.role, log.file, log.from_s, log.to_s, log.hash);
+  for (const LogReference& log : model.logs)
+    log_lines += fmt::format("//   {} {} [{}, {}) s, hash {}\n", log.role, log.file, log.from_s, log.to_s, log.hash);
 
   const std::string text = fmt::format(
       R"(// Generated by fxdyn {} export from project {} (hash {}). Do not edit: make it anew.
@@ -238,8 +249,8 @@ inline constexpr const Model::Parameters& parameters = page.parameters;
 
 }}  // namespace fxdyn::tables
 )",
-      version, model.project, model.project_hash, model.tick_s, log_lines, error_lines, format_lines, model_lines, header.magic,
-      header.layout_hash, header.words, header.crc32, parameters_text(model, words));
+      version, model.project, model.project_hash, model.tick_s, log_lines, error_lines, format_lines, model_lines,
+      header.magic, header.layout_hash, header.words, header.crc32, parameters_text(model, words));
   write_file(directory / "tables.hpp", text);
 
   std::string bytes(sizeof header + 4 * words.size(), '\0');

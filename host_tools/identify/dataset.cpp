@@ -60,7 +60,8 @@ Eigen::MatrixXd ProcessedLog::decimate(const Eigen::Ref<const Eigen::MatrixXd>& 
 /// Whether velocity holds anything above the cut-off: noise, or motion that a filter would bend.
 static bool is_noisy(const Eigen::MatrixXd& velocity, double cutoff_hz, double step_s) {
   const Eigen::MatrixXd above = velocity - ZeroPhaseFilter(cutoff_hz, step_s).apply(velocity);
-  const Eigen::Index edge = std::min<Eigen::Index>(velocity.rows() / 4, static_cast<Eigen::Index>(2 / (cutoff_hz * step_s)));
+  const Eigen::Index edge =
+      std::min<Eigen::Index>(velocity.rows() / 4, static_cast<Eigen::Index>(2 / (cutoff_hz * step_s)));
   const Eigen::Index rows = velocity.rows() - 2 * edge;
   return above.middleRows(edge, rows).norm() > 1e-6 * velocity.middleRows(edge, rows).norm();
 }
@@ -78,7 +79,8 @@ FilterFit choose_filter(const std::vector<Log>& logs, const SignalSettings& sett
   bool noisy = false;
   for (std::size_t i = 0; i < velocities.size(); ++i) noisy |= is_noisy(velocities[i], position, logs[i].step_s);
   FilterFit filter;
-  filter.position_cutoff_hz = settings.position_cutoff_hz.value_or(noisy ? position : rate / 2);  // half the rate: no filter
+  filter.position_cutoff_hz =
+      settings.position_cutoff_hz.value_or(noisy ? position : rate / 2);  // half the rate: no filter
   filter.torque_cutoff_hz = settings.torque_cutoff_hz.value_or(std::min(0.4 * rate, std::max(5 * excited, 10.0)));
   filter.edge_s = settings.edge_s.value_or(3 / std::min(filter.torque_cutoff_hz, filter.position_cutoff_hz));
   return filter;
@@ -96,16 +98,18 @@ ProcessedLog process(const Log& log, const FilterFit& filter) {
   const ZeroPhaseFilter motion(filter.position_cutoff_hz, log.step_s);
   out.q = motion.apply(log.q);
   out.dq = log.dq.size() > 0 ? motion.apply(log.dq) : differentiate(out.q, log.step_s);
-  out.ddq = log.ddq.size() > 0 ? motion.apply(log.ddq)
-                               : (log.dq.size() > 0 ? differentiate(out.dq, log.step_s) : differentiate_twice(out.q, log.step_s));
+  out.ddq = log.ddq.size() > 0
+                ? motion.apply(log.ddq)
+                : (log.dq.size() > 0 ? differentiate(out.dq, log.step_s) : differentiate_twice(out.q, log.step_s));
   out.tau_raw = log.tau;
   if (log.tau.size() > 0) out.tau = out.filter_columns(log.tau);
   const auto edge = static_cast<Eigen::Index>(std::ceil(filter.edge_s / log.step_s));
   out.first = edge;
   out.last = log.samples() - edge;
   if (out.last - out.first < 10) {
-    throw DataError(fmt::format("{}: {:.2f} s from {} s is too short: {:.2f} s at either end go to the filters; take a longer window",
-                                out.name, static_cast<double>(log.samples()) * log.step_s, log.from_s, filter.edge_s));
+    throw DataError(fmt::format(
+        "{}: {:.2f} s from {} s is too short: {:.2f} s at either end go to the filters; take a longer window", out.name,
+        static_cast<double>(log.samples()) * log.step_s, log.from_s, filter.edge_s));
   }
   const auto inside = [&](const Eigen::MatrixXd& m) { return m.middleRows(out.first, out.last - out.first); };
   out.q_range = (inside(out.q).colwise().maxCoeff() - inside(out.q).colwise().minCoeff()).transpose();

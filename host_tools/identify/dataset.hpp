@@ -17,8 +17,8 @@ struct ProcessedLog {
   Role role = Role::train;
   double from_s = 0, to_s = 0, step_s = 0;
   Eigen::VectorXd t;
-  Eigen::MatrixXd q, dq, ddq;     ///< full rate, filtered
-  Eigen::MatrixXd tau_raw, tau;   ///< empty without torque
+  Eigen::MatrixXd q, dq, ddq;        ///< full rate, filtered
+  Eigen::MatrixXd tau_raw, tau;      ///< empty without torque
   Eigen::VectorXd q_range, q_noise;  ///< per joint: range of the filtered position, RMS of what its filter took out
   Eigen::Index first = 0, last = 0;  ///< [first, last) is free of filter transients
   Eigen::Index decimation = 1;       ///< rows for fitting: first, first + decimation, ...
@@ -31,14 +31,15 @@ struct ProcessedLog {
 };
 
 /// Cut-offs: the project's, else chosen from the logs: ten times the frequency below which 99.9 % of the power of the
-/// velocity lies (five times for torque: friction reverses faster than the motion), at most 0.4 of the sampling rate. Motion
-/// without noise (simulated, exact) is not filtered.
+/// velocity lies (five times for torque: friction reverses faster than the motion), at most 0.4 of the sampling rate.
+/// Motion without noise (simulated, exact) is not filtered.
 FilterFit choose_filter(const std::vector<Log>& logs, const SignalSettings& settings);
 
 /// @throws DataError where the log is shorter than the edges that the filter needs.
 ProcessedLog process(const Log& log, const FilterFit& filter);
 
-/// RMS of the noise that stays in the filtered torque, estimated from what lies above the cut-off (white noise assumed).
+/// RMS of the noise that stays in the filtered torque, estimated from what lies above the cut-off (white noise
+/// assumed).
 Eigen::VectorXd noise_floor(const ProcessedLog& log);
 
 }  // namespace fxdyn

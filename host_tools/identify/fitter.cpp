@@ -24,15 +24,17 @@ Eigen::MatrixXd bls_columns(const BroadLearningFit& bls, double sign_width, cons
   Saturations none;
   for (Eigen::Index k = 0; k < series.q.size(); ++k) {
     const JointInput<Real> u{series.q[k], series.dq[k], series.ddq[k], tanh_of(series.dq[k] / sign_width), 0.0};
-    broad_learning_basis<Real>(nodes, u, Words<Real>{words.data()}, state, none,
-                               [&](auto, std::size_t i, double phi) { columns(k, static_cast<Eigen::Index>(i)) = phi; });
+    broad_learning_basis<Real>(nodes, u, Words<Real>{words.data()}, state, none, [&](auto, std::size_t i, double phi) {
+      columns(k, static_cast<Eigen::Index>(i)) = phi;
+    });
   }
   return columns;
 }
 
 Eigen::Index own_count(const JointFit& design) {
   Eigen::Index count = 0;
-  for (const EffectFit& fit : design.effects) count += static_cast<Eigen::Index>(find_effect(fit.effect)->linear.size());
+  for (const EffectFit& fit : design.effects)
+    count += static_cast<Eigen::Index>(find_effect(fit.effect)->linear.size());
   if (design.bls) count += design.bls->nodes() + static_cast<Eigen::Index>(BroadLearningInputs::count);
   return count;
 }
@@ -70,9 +72,10 @@ Fitter::Fitter(const Robot& robot, std::vector<ProcessedLog> logs, std::vector<J
       moves |= log.q_range[j] > std::max(1e-4, 20 * log.q_noise[j]);
     }
     if (!moves) {
-      throw DataError(fmt::format("joint {} ({}) never moves in the train logs (range {:.1e} {}): record a log in which it does",
-                                  j + 1, robot_.joints[static_cast<std::size_t>(j)].name, range,
-                                  robot_.joints[static_cast<std::size_t>(j)].position_unit()));
+      throw DataError(
+          fmt::format("joint {} ({}) never moves in the train logs (range {:.1e} {}): record a log in which it does",
+                      j + 1, robot_.joints[static_cast<std::size_t>(j)].name, range,
+                      robot_.joints[static_cast<std::size_t>(j)].position_unit()));
     }
   }
   for (const ProcessedLog& log : logs_) {
@@ -83,7 +86,8 @@ Fitter::Fitter(const Robot& robot, std::vector<ProcessedLog> logs, std::vector<J
     for (Eigen::Index k = 0; k < log.q.rows(); ++k) {
       const Eigen::MatrixXd& y = regressor(log.q.row(k), log.dq.row(k), log.ddq.row(k));
       for (Eigen::Index j = 0; j < n; ++j) {
-        for (Eigen::Index c = 0; c < nb; ++c) full[static_cast<std::size_t>(j)](k, c) = y(j, base_.columns[static_cast<std::size_t>(c)]);
+        for (Eigen::Index c = 0; c < nb; ++c)
+          full[static_cast<std::size_t>(j)](k, c) = y(j, base_.columns[static_cast<std::size_t>(c)]);
       }
     }
     const Eigen::MatrixXd tau = log.decimate(log.tau);
@@ -99,7 +103,7 @@ Fitter::Fitter(const Robot& robot, std::vector<ProcessedLog> logs, std::vector<J
   for (const ProcessedLog& log : logs_) split_.has_validation |= log.role == Role::validate;
   const bool by_log = !split_.has_validation && logs_.size() > 1;
   split_.kind = split_.has_validation ? "validate logs"
-                : by_log ? "each train log judged by a fit of the others (no log has the role validate)"
+                : by_log              ? "each train log judged by a fit of the others (no log has the role validate)"
                          : "blocks of the train log (no log has the role validate, and there is one trajectory only)";
   const int parts = split_.has_validation || by_log ? 1 : blocks_of_one_log;
   for (std::size_t l = 0; l < logs_.size(); ++l) {
@@ -121,7 +125,8 @@ Fitter::Fitter(const Robot& robot, std::vector<ProcessedLog> logs, std::vector<J
   Eigen::Index parameters = nb;
   for (const JointFit& joint : design_) parameters += own_count(joint);
   if (train_rows * n < 2 * parameters) {
-    throw DataError(fmt::format("{} rows (after filtering) for {} parameters: record a longer log", train_rows * n, parameters));
+    throw DataError(
+        fmt::format("{} rows (after filtering) for {} parameters: record a longer log", train_rows * n, parameters));
   }
   weights_ = Eigen::VectorXd::Ones(n);
   moments_.resize(joints());
@@ -155,8 +160,8 @@ std::vector<Moments> Fitter::moments(std::size_t joint, const JointFit& design) 
 }
 
 std::vector<Fitter::Dependent> Fitter::dependent_effects() const {
-  // Cholesky of the normalised gram in the order base, joint 1, joint 2, ..: a column whose pivot vanishes is a sum of those
-  // before it.
+  // Cholesky of the normalised gram in the order base, joint 1, joint 2, ..: a column whose pivot vanishes is a sum of
+  // those before it.
   const auto nb = static_cast<Eigen::Index>(base_.columns.size());
   std::vector<Dependent> found;
   Eigen::MatrixXd base = Eigen::MatrixXd::Zero(nb, nb);
@@ -194,14 +199,16 @@ void Fitter::set_design(std::size_t joint, JointFit design) {
 
 Eigen::VectorXd Fitter::ridge_of(const JointFit& design, double ridge, Eigen::Index count) {
   Eigen::VectorXd out = Eigen::VectorXd::Zero(count);
-  if (design.bls) out.tail(design.bls->nodes() + static_cast<Eigen::Index>(BroadLearningInputs::count)).setConstant(ridge);
+  if (design.bls)
+    out.tail(design.bls->nodes() + static_cast<Eigen::Index>(BroadLearningInputs::count)).setConstant(ridge);
   return out;
 }
 
 namespace {
 
-/// Whether the linear parameters of the last effect keep their bounds. Only those: viscous friction that is zero in truth comes
-/// out a little negative, and that must not keep another effect out. (With a BLS beside it, one coefficient means nothing.)
+/// Whether the linear parameters of the last effect keep their bounds. Only those: viscous friction that is zero in
+/// truth comes out a little negative, and that must not keep another effect out. (With a BLS beside it, one coefficient
+/// means nothing.)
 bool last_is_physical(const JointFit& design, const Eigen::VectorXd& theta) {
   if (design.effects.empty() || design.bls) return true;
   const auto& parameters = find_effect(design.effects.back().effect)->linear;
@@ -248,13 +255,14 @@ Solution Fitter::solve(const std::vector<std::size_t>& blocks, const std::vector
       rows += m.count;
     }
     // Paper Eq. 30: mean square error + ridge |W|^2
-    ridge.segment(at, own) = w * static_cast<double>(rows) * ridge_of(*design[j], design[j]->bls ? design[j]->bls->ridge : 0, own);
+    ridge.segment(at, own) =
+        w * static_cast<double>(rows) * ridge_of(*design[j], design[j]->bls ? design[j]->bls->ridge : 0, own);
   }
   gram.triangularView<Eigen::StrictlyLower>() = gram.transpose();
   gram.diagonal() += ridge;
 
-  // Equal scales; the small diagonal keeps directions that the data does not excite finite, and the refinement takes its
-  // effect out of all others.
+  // Equal scales; the small diagonal keeps directions that the data does not excite finite, and the refinement takes
+  // its effect out of all others.
   Eigen::VectorXd scale = gram.diagonal().cwiseSqrt();
   for (Eigen::Index i = 0; i < p; ++i) scale[i] = scale[i] > 0 ? 1 / scale[i] : 0;
   const Eigen::MatrixXd scaled = scale.asDiagonal() * gram * scale.asDiagonal();
@@ -267,11 +275,13 @@ Solution Fitter::solve(const std::vector<std::size_t>& blocks, const std::vector
 
   Solution solution;
   solution.beta = x.head(nb);
-  for (std::size_t j = 0; j < joints(); ++j) solution.theta.emplace_back(x.segment(offset[j], offset[j + 1] - offset[j]));
+  for (std::size_t j = 0; j < joints(); ++j)
+    solution.theta.emplace_back(x.segment(offset[j], offset[j + 1] - offset[j]));
   if (with_std) {
     // Sandwich: the residual's variance of each joint, whatever the weights were. Filtered samples are correlated: only
     // two in a period of the cut-off are independent.
-    const Eigen::MatrixXd inverse = scale.asDiagonal() * ldlt.solve(Eigen::MatrixXd::Identity(p, p)) * scale.asDiagonal();
+    const Eigen::MatrixXd inverse =
+        scale.asDiagonal() * ldlt.solve(Eigen::MatrixXd::Identity(p, p)) * scale.asDiagonal();
     Eigen::MatrixXd middle = Eigen::MatrixXd::Zero(p, p);
     for (std::size_t j = 0; j < joints(); ++j) {
       const double w = weights_[static_cast<Eigen::Index>(j)];
@@ -296,7 +306,8 @@ Solution Fitter::solve(const std::vector<std::size_t>& blocks, const std::vector
     const double correlated = std::max(1.0, row_rate / (2 * log.filter.torque_cutoff_hz));
     const Eigen::VectorXd std = (correlated * (inverse * middle * inverse).diagonal().cwiseMax(0)).cwiseSqrt();
     solution.beta_std = std.head(nb);
-    for (std::size_t j = 0; j < joints(); ++j) solution.theta_std.emplace_back(std.segment(offset[j], offset[j + 1] - offset[j]));
+    for (std::size_t j = 0; j < joints(); ++j)
+      solution.theta_std.emplace_back(std.segment(offset[j], offset[j + 1] - offset[j]));
   }
   return solution;
 }
@@ -308,7 +319,8 @@ bool Judgement::beats(const Judgement& other, double worth) const {
   return blocks_of_one_log ? better == blocks.size() : 4 * better >= 3 * blocks.size();
 }
 
-std::vector<Judgement> Fitter::judged(std::size_t first, std::size_t last, const std::vector<const std::vector<Moments>*>& all,
+std::vector<Judgement> Fitter::judged(std::size_t first, std::size_t last,
+                                      const std::vector<const std::vector<Moments>*>& all,
                                       const std::vector<const JointFit*>& design) const {
   std::vector<Judgement> out(last - first);
   std::vector<double> sum(out.size(), 0), count(out.size(), 0);
@@ -347,7 +359,8 @@ std::vector<Judgement> Fitter::held_out() const {
   return judged(0, joints(), all, design);
 }
 
-std::vector<Judgement> Fitter::held_out_with(std::size_t joint, const JointFit& candidate, const std::vector<double>& ridges) const {
+std::vector<Judgement> Fitter::held_out_with(std::size_t joint, const JointFit& candidate,
+                                             const std::vector<double>& ridges) const {
   const std::vector<Moments> own = moments(joint, candidate);
   JointFit design = candidate;
   std::vector<const std::vector<Moments>*> all;

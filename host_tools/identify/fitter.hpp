@@ -25,8 +25,8 @@ struct Solution {
   std::vector<Eigen::VectorXd> theta_std;
 };
 
-/// Which blocks fit and which judge. With `validate` logs: train fits, validate judges. Without: every train log is judged
-/// by a fit of the others; a single one is cut into five contiguous blocks.
+/// Which blocks fit and which judge. With `validate` logs: train fits, validate judges. Without: every train log is
+/// judged by a fit of the others; a single one is cut into five contiguous blocks.
 struct Split {
   std::vector<std::vector<std::size_t>> fit, judge;  ///< block numbers, one entry a fold
   bool has_validation = false;
@@ -35,12 +35,13 @@ struct Split {
 
 /// How one joint did on the rows that judge.
 struct Judgement {
-  double rmse = 1e300;             ///< of the residual over all judging blocks [N*m | N]
-  std::vector<double> blocks;      ///< RMSE of each judging block
-  bool physical = true;            ///< the effect that was added last keeps its bounds in every fold
-  double coefficient_sum = 0;      ///< sum of |c| of the BLS, most of any fold [N*m | N]
+  double rmse = 1e300;         ///< of the residual over all judging blocks [N*m | N]
+  std::vector<double> blocks;  ///< RMSE of each judging block
+  bool physical = true;        ///< the effect that was added last keeps its bounds in every fold
+  double coefficient_sum = 0;  ///< sum of |c| of the BLS, most of any fold [N*m | N]
 
-  bool blocks_of_one_log = false;  ///< the blocks resemble the fit's data: four times the improvement is asked for, on every block
+  bool blocks_of_one_log =
+      false;  ///< the blocks resemble the fit's data: four times the improvement is asked for, on every block
 
   /// Better by `worth` over all, better at all on three blocks in four, and physical.
   bool beats(const Judgement& other, double worth) const;
@@ -76,7 +77,8 @@ class Fitter {
   /// Each joint on the judging blocks.
   std::vector<Judgement> held_out() const;
   /// One joint with another design in place of the current one, for each ridge value of its BLS.
-  std::vector<Judgement> held_out_with(std::size_t joint, const JointFit& design, const std::vector<double>& ridges) const;
+  std::vector<Judgement> held_out_with(std::size_t joint, const JointFit& design,
+                                       const std::vector<double>& ridges) const;
 
   /// The fit on all train rows.
   Solution fit() const;
@@ -94,7 +96,8 @@ class Fitter {
   Solution solve(const std::vector<std::size_t>& blocks, const std::vector<const std::vector<Moments>*>& moments,
                  const std::vector<const JointFit*>& design, bool with_std) const;
   /// Joints `first` .. `last` - 1.
-  std::vector<Judgement> judged(std::size_t first, std::size_t last, const std::vector<const std::vector<Moments>*>& moments,
+  std::vector<Judgement> judged(std::size_t first, std::size_t last,
+                                const std::vector<const std::vector<Moments>*>& moments,
                                 const std::vector<const JointFit*>& design) const;
   std::vector<std::size_t> train_blocks() const;
 

@@ -68,8 +68,8 @@ Candidate search_effect(const Fitter& fitter, std::size_t joint, std::string_vie
   fit.shape.resize(info.shape.size());
   design.effects.push_back(fit);
   if (info.shape.empty()) return {design, fitter.held_out_with(joint, design, {0.0})[0]};
-  // Every shape of the catalogue so far is one velocity or one distance. Stribeck's is low by nature: a wide one is only
-  // a second viscous term.
+  // Every shape of the catalogue so far is one velocity or one distance. Stribeck's is low by nature: a wide one is
+  // only a second viscous term.
   const bool velocity = info.shape[0].quantity == Quantity::inverse_velocity;
   const double from = velocity ? 3e-3 * scales.velocity : 1e-6 * scales.range;
   const double to = std::min(info.shape[0].upper, velocity ? 0.15 * scales.velocity : 0.1 * scales.range);
@@ -90,26 +90,33 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
   data.q_lower = Eigen::VectorXd::Constant(n, 1e300);
   data.q_upper = -data.q_lower;
   if (project.limits.position.empty() || project.limits.velocity.empty() || project.limits.acceleration.empty()) {
-    data.notes.push_back("limits not in the project: 1.2 times the largest in the logs (URDF limits where they are within a factor of ten)");
+    data.notes.push_back(
+        "limits not in the project: 1.2 times the largest in the logs (URDF limits where they are within a factor of "
+        "ten)");
   }
-  if (project.rated_torque.empty()) data.notes.push_back("robot.rated_torque not in the project: the largest measured torque stands for it");
+  if (project.rated_torque.empty())
+    data.notes.push_back("robot.rated_torque not in the project: the largest measured torque stands for it");
   for (const Log& log : logs) {
     if (log.resampled) {
-      data.notes.push_back(fmt::format("{}: irregular time stamps, resampled to {:.6g} s", log.file.filename().string(), log.step_s));
+      data.notes.push_back(
+          fmt::format("{}: irregular time stamps, resampled to {:.6g} s", log.file.filename().string(), log.step_s));
     }
     for (Eigen::Index j = 0; j < log.tau.cols(); ++j) {
       if (log.tau.col(j).maxCoeff() > log.tau.col(j).minCoeff()) continue;
-      throw DataError(fmt::format("{}: torque of joint {} ({}) never changes: check the column and its gain", log.file.string(),
-                                  j + 1, project.robot.joints[static_cast<std::size_t>(j)].name));
+      throw DataError(fmt::format("{}: torque of joint {} ({}) never changes: check the column and its gain",
+                                  log.file.string(), j + 1, project.robot.joints[static_cast<std::size_t>(j)].name));
     }
     ProcessedLog processed = process(log, data.filter);
     data.largest_torque = data.largest_torque.cwiseMax(log.tau.cwiseAbs().colwise().maxCoeff().transpose());
-    const auto inside = [&](const Eigen::MatrixXd& m) { return m.middleRows(processed.first, processed.last - processed.first); };
+    const auto inside = [&](const Eigen::MatrixXd& m) {
+      return m.middleRows(processed.first, processed.last - processed.first);
+    };
     data.q_lower = data.q_lower.cwiseMin(inside(processed.q).colwise().minCoeff().transpose());
     data.q_upper = data.q_upper.cwiseMax(inside(processed.q).colwise().maxCoeff().transpose());
     data.dq = data.dq.cwiseMax(inside(processed.dq).cwiseAbs().colwise().maxCoeff().transpose());
     data.ddq = data.ddq.cwiseMax(inside(processed.ddq).cwiseAbs().colwise().maxCoeff().transpose());
-    data.references.push_back({log.file.filename().string(), to_string(log.role), hash_of(read_file(log.file)), log.from_s, log.to_s});
+    data.references.push_back(
+        {log.file.filename().string(), to_string(log.role), hash_of(read_file(log.file)), log.from_s, log.to_s});
     data.logs.push_back(std::move(processed));
   }
   return data;
@@ -131,7 +138,8 @@ std::vector<JointFit> initial_joints(const Project& project, const GateData& dat
     joint.rated_torque = project.rated_torque.empty() ? data.largest_torque[k] : project.rated_torque[j];
     joint.dq_limit = choose(given.velocity, urdf ? urdf->velocity : 0, data.dq[k]);
     joint.ddq_limit = choose(given.acceleration, 0, data.ddq[k]);
-    joint.tau_limit = choose(given.torque, urdf ? urdf->effort : 0, std::max(data.largest_torque[k], joint.rated_torque));
+    joint.tau_limit =
+        choose(given.torque, urdf ? urdf->effort : 0, std::max(data.largest_torque[k], joint.rated_torque));
     if (!given.position.empty()) {
       joint.q_lower = given.position[j][0];
       joint.q_upper = given.position[j][1];
@@ -151,12 +159,14 @@ std::vector<JointFit> initial_joints(const Project& project, const GateData& dat
 
 std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progress& progress) {
   if (project.identify.method == "irls" || project.identify.method == "rls") {
-    throw InputError(fmt::format("{}: identify.method = \"{}\" is not built yet; use \"wls\" or \"ls\"", project.file.string(), project.identify.method));
+    throw InputError(fmt::format("{}: identify.method = \"{}\" is not built yet; use \"wls\" or \"ls\"",
+                                 project.file.string(), project.identify.method));
   }
-  const std::vector<std::string> nominal = project.identify.effects.value_or(
-      std::vector<std::string>{"viscous", "coulomb", "offset", "rotor_inertia"});
-  const std::vector<std::string_view> optional =
-      project.identify.effects ? std::vector<std::string_view>{} : std::vector<std::string_view>{"presliding", "stribeck"};
+  const std::vector<std::string> nominal =
+      project.identify.effects.value_or(std::vector<std::string>{"viscous", "coulomb", "offset", "rotor_inertia"});
+  const std::vector<std::string_view> optional = project.identify.effects
+                                                     ? std::vector<std::string_view>{}
+                                                     : std::vector<std::string_view>{"presliding", "stribeck"};
 
   const std::size_t n = project.robot.size();
   const DhChain chain = to_dh(project.robot);
@@ -180,8 +190,9 @@ std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progres
   const auto dependent = fitter->dependent_effects();
   for (auto d = dependent.rbegin(); d != dependent.rend(); ++d) {
     JointFit joint = fitter->design(d->joint);
-    data.notes.push_back(fmt::format("{}: {} left out, these logs can't tell it from the base parameters and the other effects",
-                                     project.robot.joints[d->joint].name, joint.effects[d->effect].effect));
+    data.notes.push_back(
+        fmt::format("{}: {} left out, these logs can't tell it from the base parameters and the other effects",
+                    project.robot.joints[d->joint].name, joint.effects[d->effect].effect));
     joint.effects.erase(joint.effects.begin() + static_cast<std::ptrdiff_t>(d->effect));
     fitter->set_design(d->joint, joint);
   }
@@ -211,7 +222,8 @@ std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progres
     improve("is there " + std::string(effect) + "?", false,
             [&](std::size_t j) { return search_effect(*fitter, j, effect, scales[j]); });
   }
-  if (!optional.empty()) improve("width of the Coulomb sign", true, [&](std::size_t j) { return search_width(*fitter, j, scales[j]); });
+  if (!optional.empty())
+    improve("width of the Coulomb sign", true, [&](std::size_t j) { return search_width(*fitter, j, scales[j]); });
   progress.done();
   return fitter;
 }

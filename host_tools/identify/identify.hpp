@@ -18,12 +18,12 @@ struct GateData {
 };
 GateData read_gate_data(const Project& project, const std::filesystem::path& directory);
 
-/// Limits and ratings of each joint: the project's, else 1.2 times the largest in the logs; URDF limits where the logs come
-/// within a factor of ten of them.
+/// Limits and ratings of each joint: the project's, else 1.2 times the largest in the logs; URDF limits where the logs
+/// come within a factor of ten of them.
 std::vector<JointFit> initial_joints(const Project& project, const GateData& data);
 
-/// Structure and friction: widths and shapes searched on the gate data, coefficients by (weighted) least squares. Returns
-/// the fitter with the chosen designs. What it leaves out for want of data goes into data.notes.
+/// Structure and friction: widths and shapes searched on the gate data, coefficients by (weighted) least squares.
+/// Returns the fitter with the chosen designs. What it leaves out for want of data goes into data.notes.
 std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progress& progress);
 
 /// Of the project file and its URDF.

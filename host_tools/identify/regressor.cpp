@@ -53,7 +53,8 @@ RandomMotions random_motions(const DhChain& chain) {
   const Eigen::Index n = regressor.joints();
   constexpr Eigen::Index motions = 60;
   Random random(1);
-  RandomMotions out{Eigen::MatrixXd(motions * n, n * static_cast<Eigen::Index>(parameters_per_link)), Eigen::MatrixXd(motions, n)};
+  RandomMotions out{Eigen::MatrixXd(motions * n, n * static_cast<Eigen::Index>(parameters_per_link)),
+                    Eigen::MatrixXd(motions, n)};
   for (Eigen::Index k = 0; k < motions; ++k) {
     Eigen::VectorXd q(n), dq(n), ddq(n);
     for (Eigen::Index i = 0; i < n; ++i) {
@@ -100,7 +101,8 @@ bool rotor_inertia_is_absorbed(const DhChain& chain, const BaseSet& base, Eigen:
   Eigen::VectorXd column = Eigen::VectorXd::Zero(motions.y.rows());
   for (Eigen::Index k = 0; k < motions.ddq.rows(); ++k) column[k * n + joint] = motions.ddq(k, joint);
   const Eigen::MatrixXd y = motions.y(Eigen::all, base.columns);
-  const Eigen::VectorXd rest = column - y * Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(y).solve(Eigen::MatrixXd(column)).col(0);
+  const Eigen::VectorXd rest =
+      column - y * Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(y).solve(Eigen::MatrixXd(column)).col(0);
   return rest.norm() < 1e-8 * column.norm();
 }
 

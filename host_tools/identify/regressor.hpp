@@ -8,8 +8,8 @@
 
 namespace fxdyn {
 
-/// The torque regressor Y, n x 10 n, tau = Y pi, pi the standard parameters of model/rigid_body.hpp link by link. Column j
-/// is the same link_wrench() as in RNEA with the unit parameter e_j (paper Eq. 7).
+/// The torque regressor Y, n x 10 n, tau = Y pi, pi the standard parameters of model/rigid_body.hpp link by link.
+/// Column j is the same link_wrench() as in RNEA with the unit parameter e_j (paper Eq. 7).
 class Regressor {
  public:
   explicit Regressor(const DhChain& chain);
@@ -33,8 +33,8 @@ struct BaseSet {
 /// Column-normalised pivoted QR of Y at 60 random motions (fixed seed). Rank: relative 1e-9.
 BaseSet find_base(const DhChain& chain);
 
-/// Whether rotor inertia of the joint (ddq in the joint's own row) lies in the span of the base columns, as on the first
-/// joints of most arms: then it can't be told from link inertia and has no column of its own.
+/// Whether rotor inertia of the joint (ddq in the joint's own row) lies in the span of the base columns, as on the
+/// first joints of most arms: then it can't be told from link inertia and has no column of its own.
 bool rotor_inertia_is_absorbed(const DhChain& chain, const BaseSet& base, Eigen::Index joint);
 
 /// "m3", "hx3", "Jxy3" for column 10 * (link - 1) + parameter.

@@ -14,8 +14,8 @@ namespace fxdyn {
 enum class Role { baseline, train, validate, test };
 std::string to_string(Role role);
 
-/// A measured or simulated log on a uniform time grid, SI units, joint side of the gearbox. Matrices are samples x joints.
-/// Signals that the file does not have are empty (0 x 0).
+/// A measured or simulated log on a uniform time grid, SI units, joint side of the gearbox. Matrices are samples x
+/// joints. Signals that the file does not have are empty (0 x 0).
 struct Log {
   std::filesystem::path file;
   Role role = Role::train;
@@ -38,12 +38,13 @@ struct LogFormat {
 /// Reads `joints` joints. Irregular stamps (jitter > 1 % of the median step) are resampled to the median step by
 /// monotone-safe linear interpolation and `resampled` is set; a gap > 10 steps is an error. Revolute joints
 /// are unwrapped where q jumps by about 2 pi between samples.
-/// @throws InputError naming file, line and column: missing column (names the nearest existing one), NaN or a non-number,
-/// time going backwards or standing still, a row with another number of fields, fewer than 2 rows; revolute q that looks
-/// like degrees (says "looks like degrees, multiply by pi/180"), window outside the file.
+/// @throws InputError naming file, line and column: missing column (names the nearest existing one), NaN or a
+/// non-number, time going backwards or standing still, a row with another number of fields, fewer than 2 rows; revolute
+/// q that looks like degrees (says "looks like degrees, multiply by pi/180"), window outside the file.
 /// `torque_required`: predict reads logs without torque.
-Log read_log(const std::filesystem::path& file, std::size_t joints, const std::vector<bool>& revolute, const LogFormat& format,
-             std::optional<double> from_s, std::optional<double> to_s, bool torque_required = true);
+Log read_log(const std::filesystem::path& file, std::size_t joints, const std::vector<bool>& revolute,
+             const LogFormat& format, std::optional<double> from_s, std::optional<double> to_s,
+             bool torque_required = true);
 
 /// Writes t, q, dq?, ddq?, tau? with 17 significant digits (to a temporary file, then renamed).
 void write_log(const std::filesystem::path& file, const Log& log);

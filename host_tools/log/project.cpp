@@ -174,7 +174,8 @@ class ProjectReader {
       Names names;
       for (const Value& item : effects->items()) {
         names.push_back(item.name(known_effects(), "effect"));
-        if (std::count(names.begin(), names.end(), names.back()) > 1) item.place().fail(fmt::format("'{}' is there twice", names.back()));
+        if (std::count(names.begin(), names.end(), names.back()) > 1)
+          item.place().fail(fmt::format("'{}' is there twice", names.back()));
       }
       project_.identify.effects = names;
     }

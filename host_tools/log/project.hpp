@@ -67,9 +67,9 @@ struct Project {
   bool has_role(Role role) const;
 };
 
-/// @throws InputError with file and line: not TOML, an unknown key (names the nearest known one), a wrong type, a vector
-/// whose length is not the number of joints, no train log, an unknown role, board, effect or method, overlapping windows
-/// of the same file whatever their roles, a missing file.
+/// @throws InputError with file and line: not TOML, an unknown key (names the nearest known one), a wrong type, a
+/// vector whose length is not the number of joints, no train log, an unknown role, board, effect or method, overlapping
+/// windows of the same file whatever their roles, a missing file.
 Project read_project(const std::filesystem::path& file);
 
 /// The logs of the given role, read and checked against the robot. `directory`/logs receives simulated ones.

@@ -22,21 +22,28 @@ Evaluator<N>::Evaluator(const IdentifiedModel& model, double tick_s) {
   up_ = {up(chain.up.x()), up(chain.up.y()), up(chain.up.z())};
   for (std::size_t i = 0; i < n; ++i) {
     const LinkGeometry<Real>& link = chain.links[i];
-    geometry_.push_back({link.type, from_si<N, Quantity::unit>(link.cos_alpha), from_si<N, Quantity::unit>(link.sin_alpha),
-                         from_si<N, Quantity::length>(link.a), from_si<N, Quantity::length>(link.d),
-                         from_si<N, Quantity::unit>(link.cos_theta), from_si<N, Quantity::unit>(link.sin_theta)});
+    geometry_.push_back({link.type, from_si<N, Quantity::unit>(link.cos_alpha),
+                         from_si<N, Quantity::unit>(link.sin_alpha), from_si<N, Quantity::length>(link.a),
+                         from_si<N, Quantity::length>(link.d), from_si<N, Quantity::unit>(link.cos_theta),
+                         from_si<N, Quantity::unit>(link.sin_theta)});
     const LinkInertia<Real>& body = model.inertia[i];
     const auto first = [](double x) { return number<N, typename N::FirstMoment>({Kind::first_moment}, x); };
     const auto second = [](double x) { return number<N, typename N::SecondMoment>({Kind::second_moment}, x); };
-    inertia_.push_back({number<N, typename N::Mass>({Kind::mass}, body.m), {first(body.h.x), first(body.h.y), first(body.h.z)},
-                        second(body.xx), second(body.yy), second(body.zz), second(body.xy), second(body.xz), second(body.yz)});
+    inertia_.push_back({number<N, typename N::Mass>({Kind::mass}, body.m),
+                        {first(body.h.x), first(body.h.y), first(body.h.z)},
+                        second(body.xx),
+                        second(body.yy),
+                        second(body.zz),
+                        second(body.xy),
+                        second(body.xz),
+                        second(body.yz)});
     const JointFit& joint = model.joints[i];
     const auto q = [](double x) { return from_si<N, Quantity::position>(x); };
     const auto dq = [](double x) { return from_si<N, Quantity::velocity>(x); };
     const auto ddq = [](double x) { return from_si<N, Quantity::acceleration>(x); };
     const auto tau = [](double x) { return from_si<N, Quantity::torque>(x); };
-    constants_.push_back({{q(joint.q_lower), q(joint.q_upper), dq(-joint.dq_limit), dq(joint.dq_limit), ddq(-joint.ddq_limit),
-                           ddq(joint.ddq_limit), tau(-joint.tau_limit), tau(joint.tau_limit)},
+    constants_.push_back({{q(joint.q_lower), q(joint.q_upper), dq(-joint.dq_limit), dq(joint.dq_limit),
+                           ddq(-joint.ddq_limit), ddq(joint.ddq_limit), tau(-joint.tau_limit), tau(joint.tau_limit)},
                           from_si<N, Quantity::inverse_velocity>(1 / joint.sign_width)});
   }
   steps_.resize(n);
@@ -75,9 +82,11 @@ void Evaluator<N>::add_bls(std::size_t joint, const BroadLearningFit& fit, doubl
   step->nodes = static_cast<std::size_t>(fit.nodes());
   auto& words = step->words;
   words.push_back(word(Kind::number, Quantity::inverse_velocity, 1 / fit.reference_velocity));
-  for (const double distance : fit.distances) words.push_back(word(Kind::number, Quantity::inverse_path, tick_s / distance));
+  for (const double distance : fit.distances)
+    words.push_back(word(Kind::number, Quantity::inverse_path, tick_s / distance));
   for (Eigen::Index k = 0; k < fit.weights.rows(); ++k) {
-    for (Eigen::Index i = 0; i < fit.weights.cols(); ++i) words.push_back(word(Kind::number, Quantity::weight, fit.weights(k, i)));
+    for (Eigen::Index i = 0; i < fit.weights.cols(); ++i)
+      words.push_back(word(Kind::number, Quantity::weight, fit.weights(k, i)));
   }
   for (Eigen::Index i = 0; i < fit.coefficients.size(); ++i) {
     const bool input = i < static_cast<Eigen::Index>(BroadLearningInputs::count);
@@ -124,8 +133,8 @@ std::vector<typename N::Word> Evaluator<N>::words() const {
     }
     for (const auto& b : inertia_) add(b.m, b.h.x, b.h.y, b.h.z, b.xx, b.yy, b.zz, b.xy, b.xz, b.yz);
     for (const auto& c : constants_) {
-      add(c.limits.q_lower, c.limits.q_upper, c.limits.dq_lower, c.limits.dq_upper, c.limits.ddq_lower, c.limits.ddq_upper,
-          c.limits.tau_lower, c.limits.tau_upper, c.inverse_width);
+      add(c.limits.q_lower, c.limits.q_upper, c.limits.dq_lower, c.limits.dq_upper, c.limits.ddq_lower,
+          c.limits.ddq_upper, c.limits.tau_lower, c.limits.tau_upper, c.inverse_width);
     }
     for (const auto& joint : steps_) {
       for (const auto& step : joint) all.insert(all.end(), step->words.begin(), step->words.end());

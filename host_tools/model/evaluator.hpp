@@ -107,8 +107,8 @@ extern template class Evaluator<Real>;
 extern template class Evaluator<ObservedNumbers>;
 extern template class Evaluator<RunTimeNumbers>;
 
-/// Torques of the model in double precision over a log's states, samples x joints [N*m | N]. Limits do not apply: this is
-/// the model, not the feedforward that a drive may put out.
+/// Torques of the model in double precision over a log's states, samples x joints [N*m | N]. Limits do not apply: this
+/// is the model, not the feedforward that a drive may put out.
 Eigen::MatrixXd predict(const IdentifiedModel& model, const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,
                         const Eigen::MatrixXd& ddq, double step_s);
 

@@ -7,8 +7,8 @@
 #include "host_tools/error.hpp"
 #include "host_tools/files.hpp"
 #include "host_tools/model/effects.hpp"
-#include "model/broad_learning.hpp"
 #include "host_tools/version.hpp"
+#include "model/broad_learning.hpp"
 
 namespace fxdyn {
 namespace {
@@ -37,12 +37,13 @@ json robot_json(const Robot& robot) {
   json joints = json::array();
   for (std::size_t i = 0; i < robot.size(); ++i) {
     const Joint& joint = robot.joints[i];
-    joints.push_back({{"joint", joint.name},
-                      {"index", i + 1},
-                      {"link", joint.link},
-                      {"type", joint.type == JointType::prismatic ? "prismatic" : (joint.continuous ? "continuous" : "revolute")},
-                      {"origin", pose_json(joint.origin)},
-                      {"axis", vector_json(joint.axis)}});
+    joints.push_back(
+        {{"joint", joint.name},
+         {"index", i + 1},
+         {"link", joint.link},
+         {"type", joint.type == JointType::prismatic ? "prismatic" : (joint.continuous ? "continuous" : "revolute")},
+         {"origin", pose_json(joint.origin)},
+         {"axis", vector_json(joint.axis)}});
   }
   return {{"name", robot.name}, {"gravity", vector_json(robot.gravity)}, {"joints", joints}};
 }
@@ -69,7 +70,8 @@ json parameters_json(std::span<const ParameterInfo> infos, const std::vector<dou
                      const std::vector<double>& stds, bool prismatic) {
   json list = json::array();
   for (std::size_t i = 0; i < infos.size(); ++i) {
-    json entry = {{"name", infos[i].name}, {"value", values[i]}, {"unit", prismatic ? infos[i].unit_prismatic : infos[i].unit}};
+    json entry = {
+        {"name", infos[i].name}, {"value", values[i]}, {"unit", prismatic ? infos[i].unit_prismatic : infos[i].unit}};
     if (i < stds.size() && stds[i] > 0) entry["std"] = stds[i];
     list.push_back(entry);
   }
@@ -79,7 +81,8 @@ json parameters_json(std::span<const ParameterInfo> infos, const std::vector<dou
 json effect_json(const EffectFit& fit, double sign_width, bool prismatic) {
   const EffectInfo* info = find_effect(fit.effect);
   json parameters = parameters_json(info->shape, fit.shape, fit.shape_std, prismatic);
-  for (const json& entry : parameters_json(info->linear, fit.linear, fit.linear_std, prismatic)) parameters.push_back(entry);
+  for (const json& entry : parameters_json(info->linear, fit.linear, fit.linear_std, prismatic))
+    parameters.push_back(entry);
   if (fit.effect == "coulomb") {
     parameters.push_back({{"name", "width"}, {"value", sign_width}, {"unit", prismatic ? "m/s" : "rad/s"}});
   }
@@ -107,7 +110,8 @@ EffectFit to_effect(const json& j) {
     ++i;
   }
   if (fit.shape.size() != info->shape.size() || fit.linear.size() != info->linear.size()) {
-    throw InputError(fmt::format("effect '{}' has {} parameters, expected {}", fit.effect, i, info->shape.size() + info->linear.size()));
+    throw InputError(fmt::format("effect '{}' has {} parameters, expected {}", fit.effect, i,
+                                 info->shape.size() + info->linear.size()));
   }
   return fit;
 }
@@ -216,29 +220,30 @@ json to_json(const IdentifiedModel& model) {
   for (std::size_t i = 0; i < model.joints.size(); ++i) joints.push_back(joint_json(model.robot, i, model.joints[i]));
   json logs = json::array();
   for (const LogReference& log : model.logs) {
-    logs.push_back({{"file", log.file}, {"role", log.role}, {"from_s", log.from_s}, {"to_s", log.to_s}, {"hash", log.hash}});
+    logs.push_back(
+        {{"file", log.file}, {"role", log.role}, {"from_s", log.from_s}, {"to_s", log.to_s}, {"hash", log.hash}});
   }
   json log_formats = json::object();
   for (const auto& [file, format] : model.log_formats) {
     log_formats[file] = {{"columns", format.columns}, {"torque_gain", format.torque_gain}};
   }
   json out = {{"schema", "fxdyn.model/1"},
-          {"stage", model.stage},
-          {"tool_version", version},
-          {"project", model.project},
-          {"project_hash", model.project_hash},
-          {"seed", model.seed},
-          {"tick_s", model.tick_s},
-          {"robot", robot_json(model.robot)},
-          {"base_parameters", base},
-          {"inertia", inertia},
-          {"joints", joints},
-          {"filter",
-           {{"position_cutoff_hz", model.filter.position_cutoff_hz},
-            {"torque_cutoff_hz", model.filter.torque_cutoff_hz},
-            {"edge_s", model.filter.edge_s}}},
-          {"log_formats", log_formats},
-          {"logs", logs}};
+              {"stage", model.stage},
+              {"tool_version", version},
+              {"project", model.project},
+              {"project_hash", model.project_hash},
+              {"seed", model.seed},
+              {"tick_s", model.tick_s},
+              {"robot", robot_json(model.robot)},
+              {"base_parameters", base},
+              {"inertia", inertia},
+              {"joints", joints},
+              {"filter",
+               {{"position_cutoff_hz", model.filter.position_cutoff_hz},
+                {"torque_cutoff_hz", model.filter.torque_cutoff_hz},
+                {"edge_s", model.filter.edge_s}}},
+              {"log_formats", log_formats},
+              {"logs", logs}};
   if (model.formats) {
     out["formats"] = formats_json(*model.formats);
     out["tables_crc"] = model.tables_crc;
@@ -257,7 +262,8 @@ IdentifiedModel read_model(const std::filesystem::path& file) {
     model.project_hash = j.at("project_hash");
     model.seed = j.at("seed");
     model.tick_s = j.at("tick_s");
-    for (const json& link : j.at("inertia")) model.inertia.push_back(to_inertia(link.get<std::array<double, parameters_per_link>>()));
+    for (const json& link : j.at("inertia"))
+      model.inertia.push_back(to_inertia(link.get<std::array<double, parameters_per_link>>()));
     for (const json& joint : j.at("joints")) model.joints.push_back(to_joint(joint));
     if (model.inertia.size() != model.robot.size() || model.joints.size() != model.robot.size()) {
       throw InputError("robot, inertia and joints differ in length");
@@ -265,7 +271,8 @@ IdentifiedModel read_model(const std::filesystem::path& file) {
     for (const json& p : j.at("base_parameters")) {
       model.base.push_back({p.at("column"), p.at("name"), p.at("value"), p.at("std"), p.at("expression")});
     }
-    model.filter = {j.at("filter").at("position_cutoff_hz"), j.at("filter").at("torque_cutoff_hz"), j.at("filter").at("edge_s")};
+    model.filter = {j.at("filter").at("position_cutoff_hz"), j.at("filter").at("torque_cutoff_hz"),
+                    j.at("filter").at("edge_s")};
     for (const auto& [name, format] : j.at("log_formats").items()) {
       model.log_formats[name] = {format.at("columns").get<std::map<std::string, std::string>>(),
                                  format.at("torque_gain").get<std::vector<double>>()};
@@ -280,7 +287,8 @@ IdentifiedModel read_model(const std::filesystem::path& file) {
     }
     return model;
   } catch (const json::exception& error) {
-    throw InputError(fmt::format("{}: not a valid model: {}; make it anew with `fxdyn identify`", file.string(), error.what()));
+    throw InputError(
+        fmt::format("{}: not a valid model: {}; make it anew with `fxdyn identify`", file.string(), error.what()));
   } catch (const InputError& error) {
     throw InputError(fmt::format("{}: {}", file.string(), error.what()));
   }

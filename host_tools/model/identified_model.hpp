@@ -24,10 +24,10 @@ struct EffectFit {
 
 /// The BLS of one joint (model/broad_learning.hpp).
 struct BroadLearningFit {
-  double reference_velocity = 1;                                 ///< asinh(dq / reference) [rad/s | m/s]
-  std::array<double, 3> distances{1e-3, 3e-3, 9e-3};             ///< Dahl widths [rad | m]
-  Eigen::MatrixXd weights;                                       ///< nodes x 5: input weights, bias [-]
-  Eigen::VectorXd coefficients;                                  ///< 4 inputs, then nodes [N*m | N]
+  double reference_velocity = 1;                      ///< asinh(dq / reference) [rad/s | m/s]
+  std::array<double, 3> distances{1e-3, 3e-3, 9e-3};  ///< Dahl widths [rad | m]
+  Eigen::MatrixXd weights;                            ///< nodes x 5: input weights, bias [-]
+  Eigen::VectorXd coefficients;                       ///< 4 inputs, then nodes [N*m | N]
   double ridge = 0;
   Eigen::Index nodes() const { return weights.rows(); }
 };
@@ -36,7 +36,7 @@ struct JointFit {
   double sign_width = 0.01;  ///< s = tanh(dq / width) [rad/s | m/s]
   std::vector<EffectFit> effects;
   std::optional<BroadLearningFit> bls;
-  double rated_torque = 0;                    ///< [N*m | N]
+  double rated_torque = 0;  ///< [N*m | N]
   double q_lower = 0, q_upper = 0, dq_limit = 0, ddq_limit = 0, tau_limit = 0;
   const EffectFit* find(std::string_view effect) const;
 };

@@ -27,11 +27,16 @@ struct Kind {
 inline int bits_of(const Formats& formats, Kind kind) {
   const int a = formats[Quantity::linear_acceleration], w = formats[Quantity::acceleration];
   switch (kind.group) {
-    case Kind::number: return formats[kind.quantity];
-    case Kind::coefficient: return formats.torque_sum - formats[kind.quantity];
-    case Kind::mass: return formats.force_sum - a;
-    case Kind::first_moment: return formats.force_sum - w;
-    case Kind::second_moment: return formats.force_sum - 2 * w + a;
+    case Kind::number:
+      return formats[kind.quantity];
+    case Kind::coefficient:
+      return formats.torque_sum - formats[kind.quantity];
+    case Kind::mass:
+      return formats.force_sum - a;
+    case Kind::first_moment:
+      return formats.force_sum - w;
+    case Kind::second_moment:
+      return formats.force_sum - 2 * w + a;
   }
   return 0;
 }

@@ -8,8 +8,8 @@
 #include "model/math.hpp"
 #include "model/numbers.hpp"
 
-// Double precision that remembers the largest magnitude every quantity took: running the model in it over logs and corner
-// states tells which ranges the formats have to hold. The same templates of model/, no second copy of a formula.
+// Double precision that remembers the largest magnitude every quantity took: running the model in it over logs and
+// corner states tells which ranges the formats have to hold. The same templates of model/, no second copy of a formula.
 
 namespace fxdyn {
 
@@ -23,11 +23,16 @@ struct Ranges {
   }
   double& at(Kind kind) {
     switch (kind.group) {
-      case Kind::number: return number[static_cast<std::size_t>(kind.quantity)];
-      case Kind::coefficient: return coefficient[static_cast<std::size_t>(kind.quantity)];
-      case Kind::mass: return mass;
-      case Kind::first_moment: return first_moment;
-      case Kind::second_moment: return second_moment;
+      case Kind::number:
+        return number[static_cast<std::size_t>(kind.quantity)];
+      case Kind::coefficient:
+        return coefficient[static_cast<std::size_t>(kind.quantity)];
+      case Kind::mass:
+        return mass;
+      case Kind::first_moment:
+        return first_moment;
+      case Kind::second_moment:
+        return second_moment;
     }
     return mass;
   }
@@ -47,7 +52,9 @@ template <Kind kind>
 struct Observed {
   double value = 0;
   template <Kind other>
-  friend ObservedWide operator*(Observed a, Observed<other> b) { return {a.value * b.value}; }
+  friend ObservedWide operator*(Observed a, Observed<other> b) {
+    return {a.value * b.value};
+  }
   friend ObservedWide operator+(Observed a, Observed b) { return {a.value + b.value}; }
   friend ObservedWide operator-(Observed a, Observed b) { return {a.value - b.value}; }
   friend ObservedWide operator-(Observed a) { return {-a.value}; }
@@ -56,7 +63,9 @@ struct Observed {
 
 inline ObservedWide align(ObservedWide x, ObservedWide) { return x; }
 template <Kind kind>
-ObservedWide align(Observed<kind> x, ObservedWide) { return {x.value}; }
+ObservedWide align(Observed<kind> x, ObservedWide) {
+  return {x.value};
+}
 
 struct ObservedNumbers {
   template <Quantity quantity>
@@ -70,16 +79,24 @@ struct ObservedNumbers {
   using Word = double;
 
   template <class T>
-  static T load(Word word) { return {word}; }
+  static T load(Word word) {
+    return {word};
+  }
   static TorqueSum no_torque() { return {}; }
   static Of<Quantity::unit> one() { return {1}; }
 
   template <class T>
-  static T narrow(ObservedWide x, Saturations&) { return see(T{x.value}); }
+  static T narrow(ObservedWide x, Saturations&) {
+    return see(T{x.value});
+  }
   template <class T>
-  static T clamp(ObservedWide x) { return {x.value}; }
+  static T clamp(ObservedWide x) {
+    return {x.value};
+  }
   template <class T, Kind kind>
-  static T convert(Observed<kind> x, Saturations&) { return see(T{x.value}); }
+  static T convert(Observed<kind> x, Saturations&) {
+    return see(T{x.value});
+  }
 
  private:
   template <Kind kind>
@@ -90,13 +107,25 @@ struct ObservedNumbers {
 };
 
 template <Kind kind>
-SineCosine<ObservedNumbers::Of<Quantity::unit>> sin_cos(Observed<kind> q) { return {{std::sin(q.value)}, {std::cos(q.value)}}; }
-inline ObservedNumbers::Of<Quantity::unit> tanh_of(ObservedNumbers::Of<Quantity::argument> x) { return {std::tanh(x.value)}; }
-inline ObservedNumbers::Of<Quantity::unit> exp_negative(ObservedNumbers::Of<Quantity::argument> x) { return {std::exp(-x.value)}; }
-inline ObservedNumbers::Of<Quantity::argument> asinh_of(ObservedNumbers::Of<Quantity::ratio> x) { return {std::asinh(x.value)}; }
+SineCosine<ObservedNumbers::Of<Quantity::unit>> sin_cos(Observed<kind> q) {
+  return {{std::sin(q.value)}, {std::cos(q.value)}};
+}
+inline ObservedNumbers::Of<Quantity::unit> tanh_of(ObservedNumbers::Of<Quantity::argument> x) {
+  return {std::tanh(x.value)};
+}
+inline ObservedNumbers::Of<Quantity::unit> exp_negative(ObservedNumbers::Of<Quantity::argument> x) {
+  return {std::exp(-x.value)};
+}
+inline ObservedNumbers::Of<Quantity::argument> asinh_of(ObservedNumbers::Of<Quantity::ratio> x) {
+  return {std::asinh(x.value)};
+}
 template <Kind kind>
-Observed<kind> magnitude(Observed<kind> x) { return {std::fabs(x.value)}; }
+Observed<kind> magnitude(Observed<kind> x) {
+  return {std::fabs(x.value)};
+}
 template <Kind kind>
-ObservedNumbers::Of<Quantity::unit> sign_of(Observed<kind> x) { return {sign_of(x.value)}; }
+ObservedNumbers::Of<Quantity::unit> sign_of(Observed<kind> x) {
+  return {sign_of(x.value)};
+}
 
 }  // namespace fxdyn

@@ -9,14 +9,16 @@
 #include "model/math.hpp"
 #include "model/numbers.hpp"
 
-// The firmware's fixed point on the host, with formats that are known only at run time: the same templates of model/, the
-// same functions on raw integers (namespace raw), hence the same bits. A test replays both side by side.
+// The firmware's fixed point on the host, with formats that are known only at run time: the same templates of model/,
+// the same functions on raw integers (namespace raw), hence the same bits. A test replays both side by side.
 
 namespace fxdyn {
 
 /// 64-bit sums must not wrap: the choice of formats sees to it, and the host checks every one.
 [[noreturn]] inline void sum_overflow() {
-  throw DataError("a 64-bit sum overflows in fixed point: limits or parameters are too far apart in size; check the project's limits");
+  throw DataError(
+      "a 64-bit sum overflows in fixed point: limits or parameters are too far apart in size; check the project's "
+      "limits");
 }
 
 struct RunTimeWide {
@@ -72,7 +74,9 @@ inline RunTimeWide align(RunTimeWide x, RunTimeWide like) {
   return {shifted, like.bits};
 }
 template <Kind kind>
-RunTimeWide align(RunTimeFixed<kind> x, RunTimeWide like) { return align(RunTimeWide{x.raw, x.bits()}, like); }
+RunTimeWide align(RunTimeFixed<kind> x, RunTimeWide like) {
+  return align(RunTimeWide{x.raw, x.bits()}, like);
+}
 
 struct RunTimeNumbers {
   template <Quantity quantity>
@@ -86,7 +90,9 @@ struct RunTimeNumbers {
   using Word = std::int32_t;
 
   template <class T>
-  static T load(Word word) { return {word}; }
+  static T load(Word word) {
+    return {word};
+  }
   static TorqueSum no_torque() { return {0, current_formats->torque_sum}; }
   static Of<Quantity::unit> one() { return {1 << unit_bits}; }
 
@@ -117,18 +123,29 @@ SineCosine<RunTimeNumbers::Of<Quantity::unit>> sin_cos(RunTimeFixed<kind> q) {
   const auto result = raw::sin_cos(q.raw, q.bits());
   return {{result.sine}, {result.cosine}};
 }
-inline RunTimeNumbers::Of<Quantity::unit> tanh_of(RunTimeNumbers::Of<Quantity::argument> x) { return {raw::tanh(x.raw)}; }
-inline RunTimeNumbers::Of<Quantity::unit> exp_negative(RunTimeNumbers::Of<Quantity::argument> x) { return {raw::exp_negative(x.raw)}; }
-inline RunTimeNumbers::Of<Quantity::argument> asinh_of(RunTimeNumbers::Of<Quantity::ratio> x) { return {raw::asinh(x.raw)}; }
+inline RunTimeNumbers::Of<Quantity::unit> tanh_of(RunTimeNumbers::Of<Quantity::argument> x) {
+  return {raw::tanh(x.raw)};
+}
+inline RunTimeNumbers::Of<Quantity::unit> exp_negative(RunTimeNumbers::Of<Quantity::argument> x) {
+  return {raw::exp_negative(x.raw)};
+}
+inline RunTimeNumbers::Of<Quantity::argument> asinh_of(RunTimeNumbers::Of<Quantity::ratio> x) {
+  return {raw::asinh(x.raw)};
+}
 template <Kind kind>
-RunTimeFixed<kind> magnitude(RunTimeFixed<kind> x) { return {raw::magnitude(x.raw)}; }
+RunTimeFixed<kind> magnitude(RunTimeFixed<kind> x) {
+  return {raw::magnitude(x.raw)};
+}
 template <Kind kind>
-RunTimeNumbers::Of<Quantity::unit> sign_of(RunTimeFixed<kind> x) { return {raw::sign(x.raw)}; }
+RunTimeNumbers::Of<Quantity::unit> sign_of(RunTimeFixed<kind> x) {
+  return {raw::sign(x.raw)};
+}
 
 /// The nearest fixed-point number with `bits` fractional bits; saturates.
 inline std::int32_t to_raw(double value, int bits) {
   const double scaled = std::floor(std::ldexp(value, bits) + 0.5);
-  return static_cast<std::int32_t>(std::clamp(scaled, static_cast<double>(raw::min32), static_cast<double>(raw::max32)));
+  return static_cast<std::int32_t>(
+      std::clamp(scaled, static_cast<double>(raw::min32), static_cast<double>(raw::max32)));
 }
 inline double from_raw(std::int32_t raw_value, int bits) { return std::ldexp(static_cast<double>(raw_value), -bits); }
 

@@ -25,13 +25,15 @@ const LogFormat& format_of(const IdentifiedModel& model, const fs::path& log) {
   for (const std::string& name : {log.filename().string(), std::string()}) {
     if (const auto found = model.log_formats.find(name); found != model.log_formats.end()) return found->second;
   }
-  throw InputError(fmt::format("{}: the project's logs have different columns or gains, and this one is none of them; name it like one",
-                               log.string()));
+  throw InputError(fmt::format(
+      "{}: the project's logs have different columns or gains, and this one is none of them; name it like one",
+      log.string()));
 }
 
 }  // namespace
 
-Pipeline::Pipeline(const fs::path& project, fs::path directory) : project_(read_project(project)), directory_(std::move(directory)) {}
+Pipeline::Pipeline(const fs::path& project, fs::path directory)
+    : project_(read_project(project)), directory_(std::move(directory)) {}
 
 GateData& Pipeline::data() {
   if (!data_) {
@@ -84,12 +86,9 @@ void Pipeline::finish(const Fitter& fitter, Stage stage, const json& training) {
   };
   json stages = json::array({stage_metrics(reduced(false), "rigid"), stage_metrics(reduced(true), "friction")});
   if (stage == Stage::trained) stages.push_back(stage_metrics(model, "bls"));
-  json metrics = {{"schema", "fxdyn.metrics/1"},
-                  {"gate", fitter.gate()},
-                  {"base_parameters", fitter.base().columns.size()},
-                  {"notes", data().notes},
-                  {"logs", stages.back()["logs"]},
-                  {"stages", stages}};
+  json metrics = {
+      {"schema", "fxdyn.metrics/1"}, {"gate", fitter.gate()},         {"base_parameters", fitter.base().columns.size()},
+      {"notes", data().notes},       {"logs", stages.back()["logs"]}, {"stages", stages}};
   if (!training.is_null()) metrics["training"] = training;
   write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
   write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
@@ -112,8 +111,9 @@ void Pipeline::identify() {
 void Pipeline::train() {
   const TrainSettings& settings = project_.train;
   if (settings.enabled && (settings.inputs != "physical" || settings.activation != "tanh")) {
-    throw InputError(fmt::format("{}: train.inputs = \"{}\" with activation \"{}\" is not built yet; use \"physical\" and \"tanh\"",
-                                 project_.file.string(), settings.inputs, settings.activation));
+    throw InputError(
+        fmt::format("{}: train.inputs = \"{}\" with activation \"{}\" is not built yet; use \"physical\" and \"tanh\"",
+                    project_.file.string(), settings.inputs, settings.activation));
   }
   const fs::path file = directory_ / "model.json";
   if (!fs::exists(file) || !is_current(read_model(file))) identify();
@@ -160,9 +160,10 @@ void Pipeline::export_tables() {
   for (std::size_t j = 0; j < model.joints.size(); ++j) {
     const double share = clean.largest[static_cast<Eigen::Index>(j)] / model.joints[j].rated_torque;
     if (!(share <= largest_error)) {
-      throw DataError(fmt::format("joint {} ({}): fixed point is off by {:.1g} of rated torque on the logs, more than {:.0g}: narrow the "
-                                  "project's limits to what the robot does",
-                                  j + 1, model.robot.joints[j].name, share, largest_error));
+      throw DataError(fmt::format(
+          "joint {} ({}): fixed point is off by {:.1g} of rated torque on the logs, more than {:.0g}: narrow the "
+          "project's limits to what the robot does",
+          j + 1, model.robot.joints[j].name, share, largest_error));
     }
   }
   model.tables_crc = write_tables(model, formats, error, directory_);
@@ -232,7 +233,8 @@ void predict_log(const fs::path& model_file, const fs::path& log_file, bool fixe
 
   Eigen::MatrixXd torque;
   if (fixed) {
-    if (!model.formats) throw InputError(fmt::format("{}: has no fixed-point formats; run `fxdyn export` first", model_file.string()));
+    if (!model.formats)
+      throw InputError(fmt::format("{}: has no fixed-point formats; run `fxdyn export` first", model_file.string()));
     // At the drive's ticks, as the firmware computes; then back to the log's samples.
     const TickStates ticks = at_ticks(processed, model.tick_s, true);
     torque = interpolate(predict_fixed(model, *model.formats, ticks), ticks.t, processed.t);
@@ -250,7 +252,8 @@ void predict_log(const fs::path& model_file, const fs::path& log_file, bool fixe
   write_log(out, result);
   json logs = json::array();
   if (processed.tau.size() > 0) logs.push_back(metrics_json(processed, robot, judge(processed, torque)));
-  write_file(directory / "metrics.json", json{{"schema", "fxdyn.metrics/1"}, {"numbers", fixed ? "fixed" : "real"}, {"logs", logs}}.dump(1) + "\n");
+  write_file(directory / "metrics.json",
+             json{{"schema", "fxdyn.metrics/1"}, {"numbers", fixed ? "fixed" : "real"}, {"logs", logs}}.dump(1) + "\n");
 }
 
 }  // namespace fxdyn

@@ -7,8 +7,8 @@
 
 namespace fxdyn {
 
-/// The stages of `fxdyn run`, each continuing from DIR/model.json where project and logs are still those it was made from,
-/// and running the missing stages first otherwise.
+/// The stages of `fxdyn run`, each continuing from DIR/model.json where project and logs are still those it was made
+/// from, and running the missing stages first otherwise.
 class Pipeline {
  public:
   Pipeline(const std::filesystem::path& project, std::filesystem::path directory);
@@ -41,7 +41,8 @@ class Pipeline {
 };
 
 /// `fxdyn predict`: torque of the model over one log.
-void predict_log(const std::filesystem::path& model, const std::filesystem::path& log, bool fixed, const std::filesystem::path& directory);
+void predict_log(const std::filesystem::path& model, const std::filesystem::path& log, bool fixed,
+                 const std::filesystem::path& directory);
 
 /// `fxdyn replay`: streams the test logs (and a perturbed copy) to the firmware image under QEMU.
 /// @return false if a bit differs.

@@ -20,7 +20,8 @@ struct Replayed {
   Eigen::VectorXd largest_error;  ///< |target - double| [N*m | N]
 };
 
-Replayed play(QemuTarget& target, const IdentifiedModel& model, FixedModel& fixed, const TickStates& states, Eigen::Index ticks) {
+Replayed play(QemuTarget& target, const IdentifiedModel& model, FixedModel& fixed, const TickStates& states,
+              Eigen::Index ticks) {
   std::vector<std::int32_t> stream;
   for (Eigen::Index k = 0; k < ticks; ++k) {
     for (const std::int32_t word : raw_states(states, k, fixed.formats())) stream.push_back(word);
@@ -44,7 +45,8 @@ Replayed play(QemuTarget& target, const IdentifiedModel& model, FixedModel& fixe
     out.different_ticks += expected != replies[k].torques || saturations.count != replies[k].saturations;
     const auto& formats = fixed.formats();
     for (std::size_t j = 0; j < state.size(); ++j) {
-      state[j] = {from_raw(words[3 * j], formats[Quantity::position]), from_raw(words[3 * j + 1], formats[Quantity::velocity]),
+      state[j] = {from_raw(words[3 * j], formats[Quantity::position]),
+                  from_raw(words[3 * j + 1], formats[Quantity::velocity]),
                   from_raw(words[3 * j + 2], formats[Quantity::acceleration])};
     }
     const auto reference = exact.tick(state, ignored);
@@ -77,7 +79,8 @@ json to_json(const Replayed& replayed, const TickStates& states, const Identifie
           {"instructions_per_tick",
            {{"fewest", replayed.fewest},
             {"most", replayed.most},
-            {"mean", static_cast<double>(replayed.instructions) / static_cast<double>(std::max<Eigen::Index>(1, replayed.ticks))}}},
+            {"mean", static_cast<double>(replayed.instructions) /
+                         static_cast<double>(std::max<Eigen::Index>(1, replayed.ticks))}}},
           {"joints", joints}};
 }
 
@@ -86,8 +89,9 @@ json to_json(const Replayed& replayed, const TickStates& states, const Identifie
 bool replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index max_ticks) {
   const IdentifiedModel model = pipeline.model();
   if (!model.formats) {
-    throw InputError(fmt::format("{}: no tables of this model there; run `fxdyn export` and build the image from its tables.hpp",
-                                 pipeline.directory().string()));
+    throw InputError(
+        fmt::format("{}: no tables of this model there; run `fxdyn export` and build the image from its tables.hpp",
+                    pipeline.directory().string()));
   }
   FixedModel fixed(model, *model.formats);
   std::vector<TickStates> streams;
@@ -101,11 +105,13 @@ bool replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index
 
   QemuTarget target(image);
   const serial::Identity identity = target.hello();
-  if (identity.state != serial::NodeState::ready) throw InputError(fmt::format("{}: the image refuses its tables (CRC or layout)", image.string()));
+  if (identity.state != serial::NodeState::ready)
+    throw InputError(fmt::format("{}: the image refuses its tables (CRC or layout)", image.string()));
   if (identity.layout_hash != fixed.layout_hash() || identity.tables_crc != model.tables_crc) {
-    throw InputError(fmt::format("{}: holds other tables (layout {:08x}, CRC {:08x}; expected {:08x}, {:08x}); build it from {}",
-                                 image.string(), identity.layout_hash, identity.tables_crc, fixed.layout_hash(), model.tables_crc,
-                                 (pipeline.directory() / "tables.hpp").string()));
+    throw InputError(
+        fmt::format("{}: holds other tables (layout {:08x}, CRC {:08x}; expected {:08x}, {:08x}); build it from {}",
+                    image.string(), identity.layout_hash, identity.tables_crc, fixed.layout_hash(), model.tables_crc,
+                    (pipeline.directory() / "tables.hpp").string()));
   }
   Progress progress;
   progress.stage("replaying on the firmware", streams.size());
@@ -118,7 +124,11 @@ bool replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index
     progress.step();
   }
   progress.done();
-  json document = {{"schema", "fxdyn.replay/1"}, {"image", image.filename().string()}, {"tables_crc", model.tables_crc}, {"bit_exact", same}, {"logs", logs}};
+  json document = {{"schema", "fxdyn.replay/1"},
+                   {"image", image.filename().string()},
+                   {"tables_crc", model.tables_crc},
+                   {"bit_exact", same},
+                   {"logs", logs}};
   const std::filesystem::path size_file = image.parent_path() / "size.json";
   if (std::filesystem::exists(size_file)) document["size"] = json::parse(read_file(size_file));
   write_file(pipeline.directory() / "replay.json", document.dump(1) + "\n");

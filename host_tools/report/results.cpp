@@ -19,7 +19,8 @@ json read_json(const fs::path& file) { return fs::exists(file) ? json::parse(rea
 /// Null where the file is missing or of other tables than the model's.
 json read_of_tables(const fs::path& file, const json& model) {
   json content = read_json(file);
-  const bool same = !content.is_null() && model.contains("tables_crc") && content.value("tables_crc", json()) == model.at("tables_crc");
+  const bool same = !content.is_null() && model.contains("tables_crc") &&
+                    content.value("tables_crc", json()) == model.at("tables_crc");
   return same ? content : json();
 }
 

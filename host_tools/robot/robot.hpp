@@ -16,7 +16,8 @@ struct Limits {
   double effort = 0;            ///< [N*m | N]
 };
 
-/// Inertia of a link in its URDF frame (fixed joints merged): mass [kg], centre of mass [m], tensor about the centre [kg m^2].
+/// Inertia of a link in its URDF frame (fixed joints merged): mass [kg], centre of mass [m], tensor about the centre
+/// [kg m^2].
 struct Inertial {
   double mass = 0;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
@@ -29,8 +30,9 @@ struct Joint {
   std::string link;  ///< the child link
   JointType type = JointType::revolute;
   bool continuous = false;  ///< no position limits
-  Eigen::Isometry3d origin = Eigen::Isometry3d::Identity();  ///< child frame in the previous moving link's frame, at q = 0
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();           ///< unit vector in the child frame
+  Eigen::Isometry3d origin =
+      Eigen::Isometry3d::Identity();                ///< child frame in the previous moving link's frame, at q = 0
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< unit vector in the child frame
   std::optional<Limits> limits;
   std::optional<Inertial> inertial;
 
@@ -42,8 +44,8 @@ struct Joint {
 /// A serial chain. Frames as in the URDF.
 struct Robot {
   std::string name;
-  std::vector<Joint> joints;                    ///< moving joints in chain order
-  Eigen::Vector3d gravity{0.0, 0.0, -9.81};     ///< in the base frame [m/s^2]
+  std::vector<Joint> joints;                 ///< moving joints in chain order
+  Eigen::Vector3d gravity{0.0, 0.0, -9.81};  ///< in the base frame [m/s^2]
   std::size_t size() const { return joints.size(); }
 };
 

@@ -34,9 +34,9 @@ struct Scenario {
   IdentifiedModel plant;
   std::vector<FourierBounds> bounds;
   double sample_s = 0.002;
-  int encoder_bits = 0;         ///< per turn of the joint, or per metre; 0: exact
-  double torque_noise = 0;      ///< white, share of rated torque
-  bool exact_motion = false;    ///< logs carry exact q, dq, ddq
+  int encoder_bits = 0;       ///< per turn of the joint, or per metre; 0: exact
+  double torque_noise = 0;    ///< white, share of rated torque
+  bool exact_motion = false;  ///< logs carry exact q, dq, ddq
   std::uint64_t seed = 1;
   std::vector<ScenarioLog> logs;
 };
@@ -54,7 +54,8 @@ void read_effect(Table table, Scenario& scenario) {
     joint_value.place().fail(fmt::format("the robot has {} joints", scenario.plant.robot.size()));
   }
   JointFit& target = scenario.plant.joints[joint - 1];
-  if (target.find(fit.effect) != nullptr) joint_value.place().fail(fmt::format("joint {} has {} already", joint, fit.effect));
+  if (target.find(fit.effect) != nullptr)
+    joint_value.place().fail(fmt::format("joint {} has {} already", joint, fit.effect));
   Table parameters(table.need("parameters", "as in { amplitude = 2.0 }"));
   const auto read = [&](const ParameterInfo& parameter) {
     const Value value = parameters.need(std::string(parameter.name), fmt::format("in {}", parameter.unit));
@@ -111,8 +112,9 @@ Scenario read_scenario(const fs::path& file) {
       plant.inertia.push_back(to_link_inertia(*joint.inertial, chain.urdf_in_dh[j]));
       plant.joints[j].rated_torque = rated[j];
       const bool turns = joint.continuous || !(joint.limits->upper > joint.limits->lower);
-      scenario.bounds.push_back({turns ? -std::numbers::pi : joint.limits->lower, turns ? std::numbers::pi : joint.limits->upper,
-                                 joint.limits->velocity, acceleration[j]});
+      scenario.bounds.push_back({turns ? -std::numbers::pi : joint.limits->lower,
+                                 turns ? std::numbers::pi : joint.limits->upper, joint.limits->velocity,
+                                 acceleration[j]});
     }
     table.finish();
   }
@@ -144,7 +146,8 @@ Motion play(const Scenario& scenario, const ScenarioLog& log, double step_s, Eig
   const auto cols = static_cast<Eigen::Index>(n);
   Motion motion{Eigen::MatrixXd(samples, cols), Eigen::MatrixXd(samples, cols), Eigen::MatrixXd(samples, cols)};
   for (std::size_t j = 0; j < n; ++j) {
-    const FourierJoint joint = random_fourier(log.seed * 1000 + j, log.order, log.period_s, scenario.bounds[j], log.speed);
+    const FourierJoint joint =
+        random_fourier(log.seed * 1000 + j, log.order, log.period_s, scenario.bounds[j], log.speed);
     const auto col = static_cast<Eigen::Index>(j);
     for (Eigen::Index k = 0; k < samples; ++k) {
       const FourierState state = evaluate(joint, log.period_s, step_s * static_cast<double>(k));

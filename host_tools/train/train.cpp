@@ -43,7 +43,8 @@ double span(const Fitter& fitter, std::size_t joint) {
 
 double top_speed(const Fitter& fitter, std::size_t joint) {
   double top = 0;
-  for (const ProcessedLog& log : fitter.logs()) top = std::max(top, log.dq.col(static_cast<Eigen::Index>(joint)).cwiseAbs().maxCoeff());
+  for (const ProcessedLog& log : fitter.logs())
+    top = std::max(top, log.dq.col(static_cast<Eigen::Index>(joint)).cwiseAbs().maxCoeff());
   return top;
 }
 
@@ -93,7 +94,8 @@ std::vector<TrainOutcome> train(Fitter& fitter, const TrainSettings& settings, P
     // Of those that are nearly as good, the one with the smallest coefficients: it leans least on its training data.
     for (const Choice& choice : tried) {
       if (choice.judgement.rmse > nearly * best->judgement.rmse) continue;
-      if (!chosen[j].design.bls || choice.judgement.coefficient_sum < chosen[j].judgement.coefficient_sum) chosen[j] = choice;
+      if (!chosen[j].design.bls || choice.judgement.coefficient_sum < chosen[j].judgement.coefficient_sum)
+        chosen[j] = choice;
     }
   });
 

@@ -11,9 +11,9 @@ struct TrainOutcome {
   bool kept = false;
 };
 
-/// Fits a BLS on every joint together with the structure (joint least squares, ridge on the BLS's coefficients), chooses
-/// presliding distances, weight scale, nodes and ridge by the held-out error, and keeps it only where that falls by at
-/// least 5 %. The fitter holds the chosen designs afterwards.
+/// Fits a BLS on every joint together with the structure (joint least squares, ridge on the BLS's coefficients),
+/// chooses presliding distances, weight scale, nodes and ridge by the held-out error, and keeps it only where that
+/// falls by at least 5 %. The fitter holds the chosen designs afterwards.
 std::vector<TrainOutcome> train(Fitter& fitter, const TrainSettings& settings, Progress& progress);
 
 }  // namespace fxdyn

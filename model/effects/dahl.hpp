@@ -4,8 +4,8 @@
 
 namespace fxdyn {
 
-/// State of the Dahl model, dz/dt = (dq / distance) (1 - sign(dq) z), |z| <= 1: the normalised friction force of contacts
-/// that bend before they slide. Stepped exactly for a velocity that is constant over the tick,
+/// State of the Dahl model, dz/dt = (dq / distance) (1 - sign(dq) z), |z| <= 1: the normalised friction force of
+/// contacts that bend before they slide. Stepped exactly for a velocity that is constant over the tick,
 ///   z <- z e + sign(dq) (1 - e),  e = exp(-|dq| tick / distance),
 /// since the explicit Euler step is unstable once |dq| tick > 2 distance. Dahl 1968; paper Eq. 20 with constant g.
 template <class N>

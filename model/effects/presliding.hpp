@@ -5,8 +5,8 @@
 namespace fxdyn {
 
 /// Presliding: friction follows the Dahl state z instead of the Coulomb sign, tau = amplitude * (z - s). With amplitude
-/// equal to Coulomb's, friction is amplitude * z: it builds up over `distance` after each reversal, milliradians in gears and
-/// bearings. Joint side of the gearbox.
+/// equal to Coulomb's, friction is amplitude * z: it builds up over `distance` after each reversal, milliradians in
+/// gears and bearings. Joint side of the gearbox.
 struct Presliding {
   static constexpr std::string_view name = "presliding";
   static constexpr std::string_view equation = "amplitude (z - s), dz/dt = dq / distance (1 - sign(dq) z)";

@@ -4,8 +4,8 @@
 
 namespace fxdyn {
 
-/// Inertia of the rotor and the gears in front of the load, tau = inertia * ddq, inertia = gear ratio squared times that of
-/// the motor side. Gyroscopic terms of the spinning rotor are left out, as is usual. Joint side of the gearbox.
+/// Inertia of the rotor and the gears in front of the load, tau = inertia * ddq, inertia = gear ratio squared times
+/// that of the motor side. Gyroscopic terms of the spinning rotor are left out, as is usual. Joint side of the gearbox.
 struct RotorInertia {
   static constexpr std::string_view name = "rotor_inertia";
   static constexpr std::string_view equation = "inertia ddq";

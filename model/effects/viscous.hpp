@@ -9,7 +9,8 @@ struct Viscous {
   static constexpr std::string_view name = "viscous";
   static constexpr std::string_view equation = "coefficient dq";
   static constexpr std::array<ParameterInfo, 0> shape{};
-  static constexpr std::array linear{ParameterInfo{"coefficient", "N*m*s/rad", "N*s/m", 0, unbounded, Quantity::velocity,
+  static constexpr std::array linear{ParameterInfo{"coefficient", "N*m*s/rad", "N*s/m", 0, unbounded,
+                                                   Quantity::velocity,
                                                    "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Eq. 1"}};
   template <class N>
   using State = NoState;

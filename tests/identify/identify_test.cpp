@@ -23,7 +23,8 @@ const std::string robot_lines = "urdf = \"" FXDYN_SOURCE_DIR "/host_tools/demo/p
 fs::path scenario(const std::string& name, const std::string& more) {
   std::string text = "seed = 1\n" + more + "[robot]\n" + robot_lines +
                      "rated_torque = [97.6, 186.4, 89.4, 24.2, 20.1, 21.3]\nacceleration = [10, 10, 10, 20, 20, 20]\n";
-  for (const char* log : {"a", "b", "c"}) text += std::string("[[log]]\nname = \"") + log + "\"\nduration_s = 10\nseed = " + std::to_string(log[0]) + "\n";
+  for (const char* log : {"a", "b", "c"})
+    text += std::string("[[log]]\nname = \"") + log + "\"\nduration_s = 10\nseed = " + std::to_string(log[0]) + "\n";
   return test::write(name, text);
 }
 
@@ -31,7 +32,8 @@ fs::path project(const std::string& name, const fs::path& scenario_file, const s
   std::string text = more + "[robot]\n" + robot_lines + "rated_torque = [97.6, 186.4, 89.4, 24.2, 20.1, 21.3]\n";
   const char* roles[] = {"train", "validate", "test"};
   for (int i = 0; i < 3; ++i) {
-    text += std::string("[[log]]\nscenario = \"") + scenario_file.filename().string() + "\"\nlog = \"" + "abc"[i] + "\"\nrole = \"" + roles[i] + "\"\n";
+    text += std::string("[[log]]\nscenario = \"") + scenario_file.filename().string() + "\"\nlog = \"" + "abc"[i] +
+            "\"\nrole = \"" + roles[i] + "\"\n";
   }
   return test::write(name, text);
 }
@@ -76,9 +78,10 @@ TEST(Identify, RecoversTheParametersThatMadeTheData) {
     effects += "[[effect]]\nname = \"offset\"\n" + joint + "parameters = { torque = 0.7 }\n";
     if (j >= 3) effects += "[[effect]]\nname = \"rotor_inertia\"\n" + joint + "parameters = { inertia = 0.3 }\n";
   }
-  const fs::path file = project("recover.toml", scenario("recover_s.toml", effects),
-                                "[identify]\neffects = [\"viscous\", \"offset\", \"rotor_inertia\"]\n[train]\nenabled = false\n"
-                                "[signals]\nposition_cutoff_hz = 1000\ntorque_cutoff_hz = 1000\n");  // no filter: exact data
+  const fs::path file =
+      project("recover.toml", scenario("recover_s.toml", effects),
+              "[identify]\neffects = [\"viscous\", \"offset\", \"rotor_inertia\"]\n[train]\nenabled = false\n"
+              "[signals]\nposition_cutoff_hz = 1000\ntorque_cutoff_hz = 1000\n");  // no filter: exact data
   const fs::path out = test::folder() / "recover";
   Pipeline(file, out).identify();
   const IdentifiedModel model = read_model(out / "model.json");
@@ -99,22 +102,27 @@ TEST(Identify, RecoversTheParametersThatMadeTheData) {
   }
   const Eigen::VectorXd beta = base.grouping * parameters;
   ASSERT_EQ(model.base.size(), base.columns.size());
-  for (std::size_t i = 0; i < model.base.size(); ++i) EXPECT_NEAR(model.base[i].value, beta[static_cast<Eigen::Index>(i)], 1e-7 * (1 + beta.cwiseAbs().maxCoeff())) << model.base[i].name;
+  for (std::size_t i = 0; i < model.base.size(); ++i)
+    EXPECT_NEAR(model.base[i].value, beta[static_cast<Eigen::Index>(i)], 1e-7 * (1 + beta.cwiseAbs().maxCoeff()))
+        << model.base[i].name;
 }
 
 TEST(Identify, ModelFileKeepsEverythingThatPredictionNeeds) {
-  const fs::path s = scenario("keep_s.toml", "[sensors]\nencoder_bits = 17\ntorque_noise = 0.01\n"
-                                             "[[effect]]\nname = \"coulomb\"\njoint = 2\nparameters = { amplitude = 8.0 }\n"
-                                             "[[effect]]\nname = \"presliding\"\njoint = 2\nparameters = { amplitude = 8.0, distance = 0.003 }\n");
+  const fs::path s =
+      scenario("keep_s.toml",
+               "[sensors]\nencoder_bits = 17\ntorque_noise = 0.01\n"
+               "[[effect]]\nname = \"coulomb\"\njoint = 2\nparameters = { amplitude = 8.0 }\n"
+               "[[effect]]\nname = \"presliding\"\njoint = 2\nparameters = { amplitude = 8.0, distance = 0.003 }\n");
   const fs::path out = test::folder() / "keep";
   Pipeline pipeline(project("keep.toml", s, "[train]\nnodes = 10\n"), out);
   pipeline.identify();
   pipeline.train();
   const IdentifiedModel model = read_model(out / "model.json");
   EXPECT_EQ(to_json(model).dump(), to_json([&] {
-              write_file(test::folder() / "copy.json", to_json(model).dump());
-              return read_model(test::folder() / "copy.json");
-            }()).dump());
+                                     write_file(test::folder() / "copy.json", to_json(model).dump());
+                                     return read_model(test::folder() / "copy.json");
+                                   }())
+                                       .dump());
   // predict: from model.json and a log alone, at the log's own time stamps, and never over the log itself.
   const fs::path log = out / "logs" / "keep_s" / "c.csv";
   predict_log(out / "model.json", log, false, test::folder() / "prediction");
@@ -158,8 +166,10 @@ TEST(Identify, FindsPreslidingWhereThereIsNoOtherFriction) {
 
 TEST(Export, FixedPredictionRunsAtTheDrivesTicks) {
   // Log at 1 ms, drive at 4 ms: presliding must not run at the log's rate.
-  const fs::path s = scenario("rate_s.toml", "[sensors]\nsample_s = 0.001\n[[effect]]\nname = \"coulomb\"\njoint = 1\nparameters = { amplitude = 8.0 }\n"
-                                             "[[effect]]\nname = \"presliding\"\njoint = 1\nparameters = { amplitude = 8.0, distance = 0.01 }\n");
+  const fs::path s = scenario(
+      "rate_s.toml",
+      "[sensors]\nsample_s = 0.001\n[[effect]]\nname = \"coulomb\"\njoint = 1\nparameters = { amplitude = 8.0 }\n"
+      "[[effect]]\nname = \"presliding\"\njoint = 1\nparameters = { amplitude = 8.0, distance = 0.01 }\n");
   const fs::path out = test::folder() / "rate";
   Pipeline(project("rate.toml", s, "[target]\ntick_s = 0.004\n[train]\nenabled = false\n"), out).export_tables();
   const fs::path log = out / "logs" / "rate_s" / "c.csv";
@@ -173,13 +183,16 @@ TEST(Export, FixedPredictionRunsAtTheDrivesTicks) {
 }
 
 TEST(Report, ExportsAgainWhenTheModelHasChanged) {
-  const fs::path s = scenario("stale_s.toml", "[sensors]\ntorque_noise = 0.01\n[[effect]]\nname = \"coulomb\"\njoint = 1\nparameters = { amplitude = 8.0 }\n");
+  const fs::path s = scenario(
+      "stale_s.toml",
+      "[sensors]\ntorque_noise = 0.01\n[[effect]]\nname = \"coulomb\"\njoint = 1\nparameters = { amplitude = 8.0 }\n");
   const fs::path out = test::folder() / "stale";
   Pipeline(project("stale.toml", s, "[train]\nenabled = false\n"), out).run();
   const std::string before = read_file(out / "tables.bin");
   Pipeline(project("stale.toml", s, "[train]\nenabled = false\n[identify]\neffects = [\"viscous\"]\n"), out).report();
   EXPECT_NE(read_file(out / "tables.bin"), before);
-  EXPECT_EQ(json::parse(read_file(out / "export.json")).at("tables_crc"), json::parse(read_file(out / "model.json")).at("tables_crc"));
+  EXPECT_EQ(json::parse(read_file(out / "export.json")).at("tables_crc"),
+            json::parse(read_file(out / "model.json")).at("tables_crc"));
 }
 
 TEST(Simulate, SameScenarioSameBytesAndTruthApart) {

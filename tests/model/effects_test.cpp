@@ -26,8 +26,8 @@ JointSeries random_series(std::uint64_t seed, int samples = 2000) {
   return s;
 }
 
-/// What each effect should give, written a second time on purpose and in another way where there is one: the Dahl state by
-/// its closed-form solution over travelled distance.
+/// What each effect should give, written a second time on purpose and in another way where there is one: the Dahl state
+/// by its closed-form solution over travelled distance.
 double expected(std::string_view effect, const JointSeries& s, int k, double& z) {
   const double sign = std::tanh(s.dq[k] / sign_width);
   if (effect == "viscous") return s.dq[k];
@@ -55,7 +55,8 @@ TEST(Effects, EveryOneFollowsItsIndependentFormula) {
     const JointSeries series = random_series(11);
     const Eigen::MatrixXd columns = effect_columns(effect, shape_of(effect), sign_width, series);
     double z = 0;
-    for (int k = 0; k < series.q.size(); ++k) ASSERT_NEAR(columns(k, 0), expected(effect, series, k, z), 1e-12) << effect;
+    for (int k = 0; k < series.q.size(); ++k)
+      ASSERT_NEAR(columns(k, 0), expected(effect, series, k, z), 1e-12) << effect;
   }
 }
 
@@ -87,7 +88,8 @@ IdentifiedModel one_joint() {
     EffectFit e;
     e.effect = effect;
     e.shape = shape_of(effect);
-    for (std::size_t i = 0; i < find_effect(effect)->linear.size(); ++i) e.linear.push_back(effect == "rotor_inertia" ? 0.1 : value += 0.4);
+    for (std::size_t i = 0; i < find_effect(effect)->linear.size(); ++i)
+      e.linear.push_back(effect == "rotor_inertia" ? 0.1 : value += 0.4);
     fit.effects.push_back(e);
   }
   BroadLearningFit bls;
@@ -101,7 +103,9 @@ IdentifiedModel one_joint() {
 }
 
 TickStates states_of(const JointSeries& series) {
-  TickStates s{"series", Eigen::VectorXd::LinSpaced(series.q.size(), 0, step_s * static_cast<double>(series.q.size() - 1)), series.q, series.dq, series.ddq};
+  TickStates s{"series",
+               Eigen::VectorXd::LinSpaced(series.q.size(), 0, step_s * static_cast<double>(series.q.size() - 1)),
+               series.q, series.dq, series.ddq};
   return s;
 }
 
@@ -112,7 +116,8 @@ TEST(Effects, TorqueIsThetaTimesPhi) {
   const Eigen::MatrixXd torque = predict(model, series.q, series.dq, series.ddq, step_s);
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(series.q.size());
   for (const EffectFit& fit : model.joints[0].effects) {
-    sum += effect_columns(fit.effect, fit.shape, sign_width, series) * Eigen::Map<const Eigen::VectorXd>(fit.linear.data(), static_cast<Eigen::Index>(fit.linear.size()));
+    sum += effect_columns(fit.effect, fit.shape, sign_width, series) *
+           Eigen::Map<const Eigen::VectorXd>(fit.linear.data(), static_cast<Eigen::Index>(fit.linear.size()));
   }
   EXPECT_LT((torque.col(0) - sum).cwiseAbs().maxCoeff(), 1e-12);
 }
@@ -143,8 +148,10 @@ TEST(Effects, EveryExportedWordOfTheEffectsChangesTheTorque) {
   };
   for (std::size_t e = 0; e < model.joints[0].effects.size(); ++e) {
     const EffectFit& fit = model.joints[0].effects[e];
-    for (std::size_t i = 0; i < fit.shape.size(); ++i) EXPECT_TRUE(changed([&](JointFit& j) { j.effects[e].shape[i] *= 1.1; })) << fit.effect;
-    for (std::size_t i = 0; i < fit.linear.size(); ++i) EXPECT_TRUE(changed([&](JointFit& j) { j.effects[e].linear[i] *= 1.01; })) << fit.effect;
+    for (std::size_t i = 0; i < fit.shape.size(); ++i)
+      EXPECT_TRUE(changed([&](JointFit& j) { j.effects[e].shape[i] *= 1.1; })) << fit.effect;
+    for (std::size_t i = 0; i < fit.linear.size(); ++i)
+      EXPECT_TRUE(changed([&](JointFit& j) { j.effects[e].linear[i] *= 1.01; })) << fit.effect;
   }
   EXPECT_TRUE(changed([](JointFit& j) { j.sign_width *= 1.1; }));
   for (Eigen::Index k = 0; k < model.joints[0].bls->weights.size(); ++k) {

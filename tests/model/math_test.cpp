@@ -94,7 +94,8 @@ TEST(Fixed, NarrowingMatchesArithmeticOnRandomValues) {
     const std::int32_t result = raw::narrow(x, shift, outside);
     const auto exact = static_cast<long double>(x) / static_cast<long double>(std::int64_t{1} << shift);
     const long double rounded = std::floor(exact + 0.5L);
-    const long double clamped = std::fmin(std::fmax(rounded, static_cast<long double>(INT32_MIN)), static_cast<long double>(INT32_MAX));
+    const long double clamped =
+        std::fmin(std::fmax(rounded, static_cast<long double>(INT32_MIN)), static_cast<long double>(INT32_MAX));
     ASSERT_EQ(static_cast<long double>(result), clamped) << x << " >> " << shift;
     ASSERT_EQ(outside != 0, rounded != clamped);
   }

@@ -32,7 +32,8 @@ IdentifiedModel arm(bool prismatic) {
 TickStates random_states(const IdentifiedModel& model, int count, std::uint64_t seed) {
   Random random(seed);
   const auto n = static_cast<Eigen::Index>(model.robot.size());
-  TickStates s{"random", Eigen::VectorXd::LinSpaced(count, 0, 1), Eigen::MatrixXd(count, n), Eigen::MatrixXd(count, n), Eigen::MatrixXd(count, n)};
+  TickStates s{"random", Eigen::VectorXd::LinSpaced(count, 0, 1), Eigen::MatrixXd(count, n), Eigen::MatrixXd(count, n),
+               Eigen::MatrixXd(count, n)};
   for (Eigen::Index k = 0; k < count; ++k) {
     for (Eigen::Index j = 0; j < n; ++j) {
       const JointFit& fit = model.joints[static_cast<std::size_t>(j)];
@@ -57,20 +58,22 @@ TEST(RneaFixed, StaysWithinAHundredThousandthOfRatedTorque) {
   }
 }
 
-/// The arm with other sizes: inertia times `mass`, limits times `speed`, rated torque as it comes; base parameters instead of
-/// the links' own if `base` (they put m = 0 and make forces tiny against moments).
+/// The arm with other sizes: inertia times `mass`, limits times `speed`, rated torque as it comes; base parameters
+/// instead of the links' own if `base` (they put m = 0 and make forces tiny against moments).
 IdentifiedModel sized_arm(bool prismatic, double mass, double speed, bool base) {
   IdentifiedModel model = arm(prismatic);
   const BaseSet set = find_base(to_dh(model.robot));
   Eigen::VectorXd parameters(60);
   for (std::size_t i = 0; i < 6; ++i) {
     const auto values = to_array(model.inertia[i]);
-    for (std::size_t p = 0; p < parameters_per_link; ++p) parameters[static_cast<Eigen::Index>(10 * i + p)] = mass * values[p];
+    for (std::size_t p = 0; p < parameters_per_link; ++p)
+      parameters[static_cast<Eigen::Index>(10 * i + p)] = mass * values[p];
   }
   if (base) {
     const Eigen::VectorXd beta = set.grouping * parameters;
     parameters.setZero();
-    for (std::size_t i = 0; i < set.columns.size(); ++i) parameters[set.columns[i]] = beta[static_cast<Eigen::Index>(i)];
+    for (std::size_t i = 0; i < set.columns.size(); ++i)
+      parameters[set.columns[i]] = beta[static_cast<Eigen::Index>(i)];
   }
   for (std::size_t i = 0; i < 6; ++i) {
     std::array<double, parameters_per_link> values{};
@@ -104,7 +107,8 @@ TEST(RneaFixed, FormatsFitRobotsOfAnySizeAndSpeed) {
           double largest = 0;
           for (const JointFit& joint : model.joints) largest = std::max(largest, joint.rated_torque);
           EXPECT_EQ(error.saturations, 0U) << mass << " " << speed;
-          EXPECT_LT(error.largest.maxCoeff(), 2e-6 * largest) << prismatic << base << " mass " << mass << " speed " << speed;
+          EXPECT_LT(error.largest.maxCoeff(), 2e-6 * largest)
+              << prismatic << base << " mass " << mass << " speed " << speed;
         }
       }
     }
@@ -128,7 +132,8 @@ TEST(Regressor, TimesParametersIsRnea) {
     Eigen::VectorXd parameters(60);
     for (std::size_t i = 0; i < 6; ++i) {
       const auto values = to_array(model.inertia[i]);
-      for (std::size_t p = 0; p < parameters_per_link; ++p) parameters[static_cast<Eigen::Index>(10 * i + p)] = values[p];
+      for (std::size_t p = 0; p < parameters_per_link; ++p)
+        parameters[static_cast<Eigen::Index>(10 * i + p)] = values[p];
     }
     for (Eigen::Index k = 0; k < states.q.rows(); ++k) {
       const Eigen::VectorXd product = regressor(states.q.row(k), states.dq.row(k), states.ddq.row(k)) * parameters;

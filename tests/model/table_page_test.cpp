@@ -8,8 +8,9 @@ namespace fxdyn {
 namespace {
 
 struct Formats9 {
-  static constexpr int position = 28, velocity = 27, acceleration = 23, linear_acceleration = 24, length = 29, force = 18,
-                       torque = 19, inverse_velocity = 20, inverse_path = 24, weight = 28, force_sum = 45, torque_sum = 50;
+  static constexpr int position = 28, velocity = 27, acceleration = 23, linear_acceleration = 24, length = 29,
+                       force = 18, torque = 19, inverse_velocity = 20, inverse_path = 24, weight = 28, force_sum = 45,
+                       torque_sum = 50;
 };
 struct OtherFormats : Formats9 {
   static constexpr int torque = 18;

@@ -22,7 +22,8 @@ void shell(const std::string& command) { ASSERT_EQ(std::system(command.c_str()),
 json replay_on_target(const fs::path& project, const fs::path& out) {
   Pipeline pipeline(project, out);
   pipeline.export_tables();
-  shell(FXDYN_SOURCE_DIR "/toolchains/build_image.sh " + (out / "tables.hpp").string() + " " + (out / "firmware").string());
+  shell(FXDYN_SOURCE_DIR "/toolchains/build_image.sh " + (out / "tables.hpp").string() + " " +
+        (out / "firmware").string());
   const fs::path image = out / "firmware" / "fxdyn-mps2-an386.elf";
   EXPECT_TRUE(replay(pipeline, image, 1500));
 
@@ -46,7 +47,8 @@ void expect_exact(const json& replayed, Eigen::Index at_least) {
       EXPECT_GT(log.at("saturations").get<int>(), 0);  // it leaves the limits on purpose
       continue;
     }
-    for (const json& joint : log.at("joints")) EXPECT_LT(joint.at("largest_error_of_rated").get<double>(), 1e-3) << joint.at("joint");
+    for (const json& joint : log.at("joints"))
+      EXPECT_LT(joint.at("largest_error_of_rated").get<double>(), 1e-3) << joint.at("joint");
   }
   EXPECT_TRUE(perturbed);
   EXPECT_GE(ticks, at_least);
@@ -56,20 +58,26 @@ TEST(Target, FirmwareGivesTheHostsBitsOnASimulatedRobot) {
   // All effects, a BLS with few nodes, and a sliding joint.
   std::string urdf = read_file(FXDYN_SOURCE_DIR "/host_tools/demo/puma560.urdf");
   const fs::path robot = test::write("arm.urdf", urdf);
-  std::string text = "seed = 4\n[sensors]\nencoder_bits = 17\ntorque_noise = 0.01\n[robot]\nurdf = \"arm.urdf\"\n"
-                     "rated_torque = [97.6, 186.4, 89.4, 24.2, 20.1, 21.3]\nacceleration = [10, 10, 10, 20, 20, 20]\n";
+  std::string text =
+      "seed = 4\n[sensors]\nencoder_bits = 17\ntorque_noise = 0.01\n[robot]\nurdf = \"arm.urdf\"\n"
+      "rated_torque = [97.6, 186.4, 89.4, 24.2, 20.1, 21.3]\nacceleration = [10, 10, 10, 20, 20, 20]\n";
   for (int j = 1; j <= 6; ++j) {
     const std::string head = "joint = " + std::to_string(j) + "\nparameters = ";
-    text += "[[effect]]\nname = \"coulomb\"\n" + head + "{ amplitude = 1.5 }\n[[effect]]\nname = \"viscous\"\n" + head + "{ coefficient = 0.8 }\n";
+    text += "[[effect]]\nname = \"coulomb\"\n" + head + "{ amplitude = 1.5 }\n[[effect]]\nname = \"viscous\"\n" + head +
+            "{ coefficient = 0.8 }\n";
     text += "[[effect]]\nname = \"presliding\"\n" + head + "{ amplitude = 1.5, distance = 0.003 }\n";
     text += "[[effect]]\nname = \"stribeck\"\n" + head + "{ amplitude = 0.6, velocity = 0.1 }\n";
   }
-  for (const char* log : {"a", "b", "c"}) text += std::string("[[log]]\nname = \"") + log + "\"\nduration_s = 10\nseed = " + std::to_string(log[0]) + "\n";
+  for (const char* log : {"a", "b", "c"})
+    text += std::string("[[log]]\nname = \"") + log + "\"\nduration_s = 10\nseed = " + std::to_string(log[0]) + "\n";
   test::write("scenario.toml", text);
-  text = "[robot]\nurdf = \"arm.urdf\"\nrated_torque = [97.6, 186.4, 89.4, 24.2, 20.1, 21.3]\n[train]\nnodes = 10\n"
-         "[identify]\neffects = [\"viscous\", \"coulomb\", \"offset\", \"rotor_inertia\"]\n";
+  text =
+      "[robot]\nurdf = \"arm.urdf\"\nrated_torque = [97.6, 186.4, 89.4, 24.2, 20.1, 21.3]\n[train]\nnodes = 10\n"
+      "[identify]\neffects = [\"viscous\", \"coulomb\", \"offset\", \"rotor_inertia\"]\n";
   const char* roles[] = {"train", "validate", "test"};
-  for (int i = 0; i < 3; ++i) text += std::string("[[log]]\nscenario = \"scenario.toml\"\nlog = \"") + "abc"[i] + "\"\nrole = \"" + roles[i] + "\"\n";
+  for (int i = 0; i < 3; ++i)
+    text +=
+        std::string("[[log]]\nscenario = \"scenario.toml\"\nlog = \"") + "abc"[i] + "\"\nrole = \"" + roles[i] + "\"\n";
   const fs::path project = test::write("project.toml", text);
   expect_exact(replay_on_target(project, test::folder() / "simulated"), 3000);
 }
