@@ -251,7 +251,7 @@ std::string bls_section(const json& model, const json& metrics) {
   return out + table.html() +
          paragraph(
              "Held-out RMSE on the gate data (see Data), not on the test logs. It is kept where that falls by at least "
-             "5 %. Its "
+             "5 % (20 % where blocks of one log judge). Its "
              "inputs are velocity and three presliding states; the distances are how far the joint moves until they "
              "follow.");
 }
