@@ -3,6 +3,8 @@
 #include <array>
 #include <concepts>
 #include <cstddef>
+#include <cstdint>
+#include <span>
 #include <string_view>
 #include <type_traits>
 
@@ -37,6 +39,15 @@ struct JointInput {
   Acceleration<N> ddq{};
   Unit<N> sign{};          ///< tanh(dq / width): the Coulomb sign with the joint's fitted width, shared by all effects
   Torque<N> structural{};  ///< rigid-body torque of this tick (RNEA)
+  Torque<N> total{};       ///< structural + the effects before this one; only for effects with `needs_total`
+  /// All joints of the robot in chain order, for effects that couple joints (`needs_peers`); q, dq, ddq, sign are set.
+  std::span<const JointInput> peers{};
+};
+
+/// What sum(theta phi) of an effect is.
+enum class ActsOn : std::uint8_t {
+  torque,    ///< added to the joint's torque
+  position,  ///< deflection delta between motor and link: the rigid body moves at q - delta
 };
 
 /// Stored parameters of one effect: its shape words, then its coefficients. Memory belongs to the caller.

@@ -43,6 +43,12 @@ constexpr std::int32_t narrow(std::int64_t x, int shift, std::uint32_t& outside)
   return saturate(shift_right(x, shift), outside);
 }
 
+/// x * 2^-shift rounded half up, for x known to fit.
+template <int shift>
+constexpr std::int32_t proven_narrow(std::int64_t x) {
+  return static_cast<std::int32_t>(shift_right(x, shift));
+}
+
 }  // namespace raw
 
 /// An exact product or sum, value = raw * 2^-bits. Overflow of the 64 bits is excluded by the choice of formats.

@@ -82,12 +82,10 @@ inline constexpr auto sine_table = [] {
   return table;
 }();
 
-/// Sine and cosine (30 bits) of q [rad] with `bits` fractional bits, |error| < 4e-9 + 2^-(bits + 1). From the nearest
-/// node a: sin(a + h) = sin a cos h + cos a sin h with |h| <= pi / 256, cos h = 1 - h^2/2, sin h = h - h^3/6.
-constexpr SineCosine<std::int32_t> sin_cos(std::int32_t q, int bits) {
-  constexpr std::int64_t inverse_two_pi = 1367130551;                                        // 2^33 / (2 pi)
-  constexpr std::int64_t two_pi = 1686629713;                                                // 2 pi * 2^28
-  const auto phase = static_cast<std::uint32_t>(shift_right(q * inverse_two_pi, bits + 1));  // 2^-32 turns, wraps
+/// Sine and cosine (30 bits) of phase * 2^-32 turns, |error| < 2e-9. From the nearest node a: sin(a + h) = sin a cos h
+/// + cos a sin h with |h| <= pi / 256, cos h = 1 - h^2/2, sin h = h - h^3/6.
+constexpr SineCosine<std::int32_t> sin_cos_of_phase(std::uint32_t phase) {
+  constexpr std::int64_t two_pi = 1686629713;  // 2 pi * 2^28
   const std::uint32_t nearest = phase + (1U << 23);
   const std::uint32_t node = nearest >> 24;
   const auto offset = static_cast<std::int32_t>(nearest & 0x00ffffffU) - (1 << 23);
@@ -98,6 +96,12 @@ constexpr SineCosine<std::int32_t> sin_cos(std::int32_t q, int bits) {
   const std::int64_t c = sine_table[node + 64];
   return {static_cast<std::int32_t>(s + shift_right(c * sine_h - s * half_square, 34)),
           static_cast<std::int32_t>(c - shift_right(s * sine_h + c * half_square, 34))};
+}
+
+/// Sine and cosine (30 bits) of q [rad] with `bits` fractional bits, |error| < 4e-9 + 2^-(bits + 1).
+constexpr SineCosine<std::int32_t> sin_cos(std::int32_t q, int bits) {
+  constexpr std::int64_t inverse_two_pi = 1367130551;                                              // 2^33 / (2 pi)
+  return sin_cos_of_phase(static_cast<std::uint32_t>(shift_right(q * inverse_two_pi, bits + 1)));  // wraps
 }
 
 /// tanh(i / 32), 0 <= x <= 8, 30 bits.

@@ -10,8 +10,10 @@
 //   align(x, w)               x in the format of the accumulator w
 //   N::narrow<T>(w, s)        w as a stored number of type T: rounds half up, saturates, counts in s
 //   N::clamp<T>(w)            the same where saturation is meant, not counted
-//   N::convert<T>(x, s)       a stored number as another quantity of the same unit (a prismatic joint's q is a length)
-//   N::Word, N::load<T>(word)  how parameters are stored in tables, and one of them as a number
+//   N::proven_narrow<T>(w)    rounds half up without a check: export has proven that w fits
+//   (host_tools/export/proof.hpp) N::convert<T>(x, s)       a stored number as another quantity of the same unit (a
+//   prismatic joint's q is a length) N::Word, N::load<T>(word)  how parameters are stored in tables, and one of them as
+//   a number
 // Coefficients (N::Coefficient<Q>) multiply a number of quantity Q to give a torque; their format follows from that of
 // Q, so that products of a sum need no shifts.
 
@@ -37,6 +39,10 @@ struct Real {
   static constexpr double one() { return 1; }
   template <class T>
   static constexpr T narrow(double x, Saturations&) {
+    return x;
+  }
+  template <class T>
+  static constexpr T proven_narrow(double x) {
     return x;
   }
   template <class T>
@@ -84,6 +90,16 @@ struct FixedNumbers {
         return Formats::inverse_path;
       case Quantity::weight:
         return Formats::weight;
+      case Quantity::velocity_squared:
+        return Formats::velocity_squared;
+      case Quantity::velocity_cubed:
+        return Formats::velocity_cubed;
+      case Quantity::inverse_position:
+        return Formats::inverse_position;
+      case Quantity::inverse_torque:
+        return Formats::inverse_torque;
+      case Quantity::count:
+        return count_bits;
     }
     return 0;
   }
@@ -119,6 +135,11 @@ struct FixedNumbers {
     const T result{raw::narrow(x.raw, bits - T::bits, outside)};
     saturations.count += outside;
     return result;
+  }
+  template <class T, int bits>
+  static constexpr T proven_narrow(Wide<bits> x) {
+    static_assert(bits >= T::bits, "narrowing to a finer format");
+    return {raw::proven_narrow<bits - T::bits>(x.raw)};
   }
   template <class T, int bits>
   static constexpr T clamp(Wide<bits> x) {
@@ -162,6 +183,16 @@ template <class N>
 using InversePath = typename N::template Of<Quantity::inverse_path>;
 template <class N>
 using Weight = typename N::template Of<Quantity::weight>;
+template <class N>
+using VelocitySquared = typename N::template Of<Quantity::velocity_squared>;
+template <class N>
+using VelocityCubed = typename N::template Of<Quantity::velocity_cubed>;
+template <class N>
+using InversePosition = typename N::template Of<Quantity::inverse_position>;
+template <class N>
+using InverseTorque = typename N::template Of<Quantity::inverse_torque>;
+template <class N>
+using Count = typename N::template Of<Quantity::count>;
 
 template <class N>
 concept NumberSystem = requires(Velocity<N> v, Unit<N> u, Saturations& saturations) {

@@ -24,16 +24,28 @@ enum class Quantity : std::uint8_t {
   inverse_velocity,     ///< 1 / width of a velocity-dependent effect [s/rad | s/m]
   inverse_path,         ///< time step / presliding distance [s/rad | s/m]
   weight,               ///< BLS weights and biases in front of the activation [-]
+  velocity_squared,     ///< dq |dq| [rad^2/s^2 | m^2/s^2]
+  velocity_cubed,       ///< dq^3 [rad^3/s^3 | m^3/s^3]
+  inverse_position,     ///< turns per unit of position [1/rad | 1/m]
+  inverse_torque,       ///< 1 / width of a load-dependent effect [1/(N*m) | 1/N]
+  count,                ///< ticks, and indices of joints [-]
 };
-inline constexpr std::size_t quantity_count = 13;
+inline constexpr std::size_t quantity_count = 18;
 
-inline constexpr std::array<std::string_view, quantity_count> quantity_names{
-    "position", "velocity", "acceleration", "linear_acceleration", "length",       "force", "torque",
-    "unit",     "argument", "ratio",        "inverse_velocity",    "inverse_path", "weight"};
+inline constexpr std::array<std::string_view, quantity_count> quantity_names{"position",         "velocity",
+                                                                             "acceleration",     "linear_acceleration",
+                                                                             "length",           "force",
+                                                                             "torque",           "unit",
+                                                                             "argument",         "ratio",
+                                                                             "inverse_velocity", "inverse_path",
+                                                                             "weight",           "velocity_squared",
+                                                                             "velocity_cubed",   "inverse_position",
+                                                                             "inverse_torque",   "count"};
 
 /// Fractional bits that are the same for every robot: quantities without a unit have a known range.
 inline constexpr int unit_bits = 30;      ///< [-2, 2)
 inline constexpr int argument_bits = 27;  ///< [-16, 16); tanh is flat beyond 8
 inline constexpr int ratio_bits = 24;     ///< [-128, 128)
+inline constexpr int count_bits = 16;     ///< [-32768, 32768)
 
 }  // namespace fxdyn

@@ -60,6 +60,7 @@ Formats choose_formats(const IdentifiedModel& model, const std::vector<TickState
   formats[Quantity::unit] = unit_bits;
   formats[Quantity::argument] = argument_bits;
   formats[Quantity::ratio] = ratio_bits;
+  formats[Quantity::count] = count_bits;
   // A product must be at least as fine as what it is added to, and the sum of its terms must fit 62 bits and a sign
   // (model/rigid_body.hpp: align() and narrow()). Bounds are sums of magnitudes, so no partial sum exceeds them.
   using Q = Quantity;

@@ -208,7 +208,10 @@ std::uint32_t write_tables(const IdentifiedModel& model, const Formats& formats,
   std::string format_lines, model_lines, error_lines, log_lines;
   for (std::size_t i = 0; i < quantity_count; ++i) {
     const auto quantity = static_cast<Quantity>(i);
-    if (quantity == Quantity::unit || quantity == Quantity::argument || quantity == Quantity::ratio) continue;
+    if (quantity == Quantity::unit || quantity == Quantity::argument || quantity == Quantity::ratio ||
+        quantity == Quantity::count) {
+      continue;
+    }
     format_lines += fmt::format("  static constexpr int {} = {};\n", quantity_names[i], formats.quantity[i]);
   }
   format_lines += fmt::format("  static constexpr int force_sum = {};\n  static constexpr int torque_sum = {};\n",

@@ -90,6 +90,10 @@ struct ObservedNumbers {
     return see(T{x.value});
   }
   template <class T>
+  static T proven_narrow(ObservedWide x) {
+    return see(T{x.value});
+  }
+  template <class T>
   static T clamp(ObservedWide x) {
     return {x.value};
   }

@@ -105,6 +105,14 @@ struct RunTimeNumbers {
     return result;
   }
   template <class T>
+  static T proven_narrow(RunTimeWide x) {
+    assert(x.bits >= T::bits());
+    std::uint32_t outside = 0;
+    const T result{raw::narrow(x.raw, x.bits - T::bits(), outside)};
+    if (outside != 0) sum_overflow();
+    return result;
+  }
+  template <class T>
   static T clamp(RunTimeWide x) {
     Saturations ignored;
     return narrow<T>(x, ignored);

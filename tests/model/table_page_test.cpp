@@ -9,8 +9,9 @@ namespace {
 
 struct Formats9 {
   static constexpr int position = 28, velocity = 27, acceleration = 23, linear_acceleration = 24, length = 29,
-                       force = 18, torque = 19, inverse_velocity = 20, inverse_path = 24, weight = 28, force_sum = 45,
-                       torque_sum = 50;
+                       force = 18, torque = 19, inverse_velocity = 20, inverse_path = 24, weight = 28,
+                       velocity_squared = 20, velocity_cubed = 16, inverse_position = 24, inverse_torque = 24,
+                       force_sum = 45, torque_sum = 50;
 };
 struct OtherFormats : Formats9 {
   static constexpr int torque = 18;
