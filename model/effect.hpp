@@ -48,6 +48,26 @@ struct JointInput {
 enum class ActsOn : std::uint8_t {
   torque,    ///< added to the joint's torque
   position,  ///< deflection delta between motor and link: the rigid body moves at q - delta
+  body,      ///< no sum: changes the parameters of the rigid body (BodyEffects in catalogue.hpp)
+};
+
+/// What an effect says of itself where it differs from the usual: a torque out of the joint's own motion.
+template <class E>
+inline constexpr ActsOn acts_on = [] {
+  if constexpr (requires { E::acts_on; }) return E::acts_on;
+  return ActsOn::torque;
+}();
+template <class E>
+inline constexpr bool needs_structural = requires {
+  requires E::needs_structural;
+};
+template <class E>
+inline constexpr bool needs_total = requires {
+  requires E::needs_total;
+};
+template <class E>
+inline constexpr bool needs_peers = requires {
+  requires E::needs_peers;
 };
 
 /// Stored parameters of one effect: its shape words, then its coefficients. Memory belongs to the caller.
@@ -62,6 +82,10 @@ struct Words {
   template <Quantity quantity>
   constexpr auto coefficient(std::size_t i) const {
     return N::template load<typename N::template Coefficient<quantity>>(data[i]);
+  }
+  template <Quantity quantity>
+  constexpr auto deflection_coefficient(std::size_t i) const {
+    return N::template load<typename N::template DeflectionCoefficient<quantity>>(data[i]);
   }
 };
 
@@ -92,16 +116,37 @@ concept Effect = requires(const JointInput<N>& u, Words<N> words, typename E::te
   E::template basis<N>(u, words, state, saturations, detail::EmitNothing{});
 };
 
-/// theta^T phi of one effect for this tick; steps its state.
+/// Words of one effect in the tables.
+template <class E>
+inline constexpr std::size_t words_of = [] {
+  if constexpr (requires { E::words; })
+    return E::words;
+  else
+    return E::shape.size() + E::linear.size();
+}();
+
+/// theta^T phi of one effect for this tick, as N::TorqueSum or N::DeflectionSum; steps its state.
 template <class E, class N>
-constexpr typename N::TorqueSum contribution(const JointInput<N>& u, Words<N> words,
-                                             typename E::template State<N>& state, Saturations& saturations) {
-  const Words<N> coefficients{words.data + E::shape.size()};
-  auto sum = N::no_torque();
-  E::template basis<N>(u, words, state, saturations, [&](auto tag, std::size_t i, auto phi) {
-    sum = sum + coefficients.template coefficient<decltype(tag)::value>(i) * phi;
-  });
-  return sum;
+constexpr auto contribution(const JointInput<N>& u, Words<N> words, typename E::template State<N>& state,
+                            Saturations& saturations) {
+  if constexpr (requires { E::template sum<N>(u, words, state, saturations); }) {
+    return E::template sum<N>(u, words, state, saturations);
+  } else {
+    const Words<N> coefficients{words.data + E::shape.size()};
+    if constexpr (acts_on<E> == ActsOn::position) {
+      auto sum = N::no_deflection();
+      E::template basis<N>(u, words, state, saturations, [&](auto tag, std::size_t i, auto phi) {
+        sum = sum + coefficients.template deflection_coefficient<decltype(tag)::value>(i) * phi;
+      });
+      return sum;
+    } else {
+      auto sum = N::no_torque();
+      E::template basis<N>(u, words, state, saturations, [&](auto tag, std::size_t i, auto phi) {
+        sum = sum + coefficients.template coefficient<decltype(tag)::value>(i) * phi;
+      });
+      return sum;
+    }
+  }
 }
 
 }  // namespace fxdyn

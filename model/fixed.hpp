@@ -3,8 +3,13 @@
 #include <compare>
 #include <cstdint>
 #include <limits>
+#include <type_traits>
 
 #include "model/quantity.hpp"
+
+#ifdef __ARM_FEATURE_SAT
+#include <arm_acle.h>
+#endif
 
 // Two's complement binary fixed point: value = raw * 2^-bits, raw in int32 (a number) or int64 (a product or a sum).
 // Products and sums widen and are exact; the only inexact operation is the narrowing back to 32 bits, which rounds
@@ -43,10 +48,46 @@ constexpr std::int32_t narrow(std::int64_t x, int shift, std::uint32_t& outside)
   return saturate(shift_right(x, shift), outside);
 }
 
-/// x * 2^-shift rounded half up, for x known to fit.
+/// x * 2^-shift rounded half up, for x known to fit. On Thumb-2 the carry of the shift is the rounding: three
+/// instructions instead of five.
 template <int shift>
 constexpr std::int32_t proven_narrow(std::int64_t x) {
+  static_assert(0 <= shift && shift < 64);
+  if constexpr (shift == 0) return static_cast<std::int32_t>(x);
+  const auto high = static_cast<std::int32_t>(x >> 32);
+  if constexpr (shift == 32) return high + static_cast<std::int32_t>(static_cast<std::uint32_t>(x) >> 31);
+#if defined(__thumb2__)
+  if (!std::is_constant_evaluated() && !__builtin_constant_p(x)) {
+    if constexpr (shift < 32) {
+      auto low = static_cast<std::uint32_t>(x);
+      asm("lsrs %0, %0, %2\n\torr %0, %0, %1, lsl %3\n\tadc %0, %0, #0"
+          : "+r"(low)
+          : "r"(high), "i"(shift), "i"((32 - shift) & 31)
+          : "cc");
+      return static_cast<std::int32_t>(low);
+    } else {
+      std::int32_t result = high;
+      asm("asrs %0, %0, %1\n\tadc %0, %0, #0" : "+r"(result) : "i"((shift - 32) & 31) : "cc");
+      return result;
+    }
+  }
+#endif
   return static_cast<std::int32_t>(shift_right(x, shift));
+}
+
+/// The upper half of the 64-bit product: a b 2^-32, rounded down.
+constexpr std::int32_t multiply_high(std::int32_t a, std::int32_t b) {
+  return static_cast<std::int32_t>((std::int64_t{a} * b) >> 32);
+}
+
+/// Saturates to `bits` bits with sign.
+template <int bits>
+constexpr std::int32_t saturate_to(std::int32_t x) {
+#ifdef __ARM_FEATURE_SAT
+  if (!std::is_constant_evaluated()) return __ssat(x, bits);
+#endif
+  constexpr std::int32_t most = (1 << (bits - 1)) - 1;
+  return x > most ? most : (x < -most - 1 ? -most - 1 : x);
 }
 
 }  // namespace raw
@@ -75,6 +116,12 @@ struct Fixed {
   friend constexpr Wide<bits> operator-(Fixed a) { return {-std::int64_t{a.raw}}; }
   friend constexpr auto operator<=>(Fixed, Fixed) = default;
 };
+
+/// x * x; a name of its own since an interval's square is narrower than the product of two intervals.
+template <class T>
+constexpr auto square(const T& x) {
+  return x * x;
+}
 
 /// x, exactly, in the finer format of `like`: what it takes to add numbers of different formats. A coarser target
 /// does not compile.

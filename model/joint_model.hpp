@@ -1,6 +1,8 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -36,9 +38,11 @@ namespace detail {
 /// x within [lower, upper]; counts when it was not.
 template <class T>
 constexpr T limit(T x, T lower, T upper, Saturations& saturations) {
-  const bool below = x<lower, above = x> upper;
+  const bool below = x < lower;
+  const T raised = below ? lower : x;
+  const bool above = upper < raised;
   saturations.count += static_cast<std::uint32_t>(below) + static_cast<std::uint32_t>(above);
-  return below ? lower : (above ? upper : x);
+  return above ? upper : raised;
 }
 }  // namespace detail
 
@@ -50,59 +54,120 @@ constexpr JointState<N> limit_setpoint(const JointState<N>& state, const JointLi
           detail::limit(state.ddq, limits.ddq_lower, limits.ddq_upper, saturations)};
 }
 
-/// Torque of one joint: structural (RNEA) + sum of its effects, within the joint's torque limits [N*m | N].
-/// `contributions(u)` returns that sum as N::TorqueSum.
-template <class N, class Contributions>
-constexpr Torque<N> joint_feedforward(const JointState<N>& joint, Torque<N> structural,
-                                      const JointConstants<N>& constants, Contributions&& contributions,
-                                      Saturations& saturations) {
-  JointInput<N> u{joint.q, joint.dq, joint.ddq, {}, structural};
-  u.sign = tanh_of(N::template clamp<Argument<N>>(joint.dq * constants.inverse_width));
-  const auto sum = align(structural, N::no_torque()) + contributions(u);
-  return detail::limit(N::template narrow<Torque<N>>(sum, saturations), constants.limits.tau_lower,
-                       constants.limits.tau_upper, saturations);
+/// The input of a joint's effects, without torques and peers.
+template <class N>
+constexpr JointInput<N> joint_input(const JointState<N>& joint, const JointConstants<N>& constants) {
+  return {joint.q, joint.dq, joint.ddq, tanh_of(N::template clamp<Argument<N>>(joint.dq * constants.inverse_width))};
 }
 
-/// The effects of one joint, in the order of their words in the tables.
-template <class... Effects>
-struct JointEffects {
-  static constexpr std::size_t words = (0 + ... + (Effects::shape.size() + Effects::linear.size()));
-  template <class N>
-  using State = std::tuple<typename Effects::template State<N>...>;
+/// The link's side of a joint whose motor and link differ by a deflection delta: q - delta and, with the differences of
+/// delta from tick to tick, its derivatives, within the joint's limits. Zero derivatives in the first tick.
+template <class N>
+struct Deflection {
+  Position<N> delta{};
+  Velocity<N> rate{};
+  std::uint32_t ticks = 0;  ///< since the start, up to 2
 
-  template <class N>
-  static constexpr typename N::TorqueSum sum(const JointInput<N>& u, const typename N::Word* data, State<N>& state,
-                                             Saturations& saturations) {
-    return sum_each<N>(u, data, state, saturations, std::index_sequence_for<Effects...>{});
-  }
-  static constexpr void hash(LayoutHash& hash) {
-    hash.add(static_cast<std::int32_t>(sizeof...(Effects)));
-    ((hash.add(Effects::name), hash.add(static_cast<std::int32_t>(Effects::shape.size() + Effects::linear.size()))),
-     ...);
-  }
-
- private:
-  template <class N, std::size_t... i>
-  static constexpr typename N::TorqueSum sum_each(const JointInput<N>& u, const typename N::Word* data, State<N>& state,
-                                                  Saturations& saturations, std::index_sequence<i...>) {
-    auto total = N::no_torque();
-    ((total = total + contribution<Effects, N>(u, Words<N>{data}, std::get<i>(state), saturations),
-      data += Effects::shape.size() + Effects::linear.size()),
-     ...);
-    return total;
+  /// @param per_second 1 / tick [1/s]
+  constexpr JointState<N> step(const JointState<N>& motor, typename N::DeflectionSum sum, Count<N> per_second,
+                               const JointLimits<N>& limits, Saturations& saturations) {
+    const auto now = N::template narrow<Position<N>>(sum, saturations);
+    const auto change = N::template narrow<Position<N>>(now - delta, saturations);
+    const auto speed = N::template narrow<Velocity<N>>(change * per_second, saturations);
+    const auto new_rate = ticks > 0 ? speed : Velocity<N>{};
+    const auto speed_change = N::template narrow<Velocity<N>>(new_rate - rate, saturations);
+    const auto push = N::template narrow<Acceleration<N>>(speed_change * per_second, saturations);
+    const auto acceleration = ticks > 1 ? push : Acceleration<N>{};
+    delta = now;
+    rate = new_rate;
+    ticks += static_cast<std::uint32_t>(ticks < 2);
+    return limit_setpoint<N>({N::template narrow<Position<N>>(motor.q - now, saturations),
+                              N::template narrow<Velocity<N>>(motor.dq - new_rate, saturations),
+                              N::template narrow<Acceleration<N>>(motor.ddq - acceleration, saturations)},
+                             limits, saturations);
   }
 };
 
-/// A robot's feedforward model with everything static: number system, joints, effects. `Joints` are JointEffects.
-template <class N, class... Joints>
+/// Torque of one joint: structural (RNEA) + sum of its effects, within the joint's torque limits [N*m | N].
+template <class N>
+constexpr Torque<N> joint_feedforward(Torque<N> structural, typename N::TorqueSum effects, const JointLimits<N>& limits,
+                                      Saturations& saturations) {
+  const auto sum = align(structural, N::no_torque()) + effects;
+  return detail::limit(N::template narrow<Torque<N>>(sum, saturations), limits.tau_lower, limits.tau_upper,
+                       saturations);
+}
+
+/// One joint of a robot: its link's shape and its effects in the order of their words in the tables; effects that need
+/// the running total come last.
+template <class Link_, class... Effects>
+struct JointModel {
+  using LinkShape = Link_;
+  static constexpr std::size_t words = (0 + ... + words_of<Effects>);
+  static constexpr bool deflects = (false || ... || (acts_on<Effects> == ActsOn::position));
+  static constexpr bool couples = (false || ... || needs_peers<Effects>);
+  template <class N>
+  using State = std::tuple<typename Effects::template State<N>...>;
+
+  /// Sum of the effects that act on `what`; steps their states.
+  template <class N, ActsOn what>
+  static constexpr auto sum(JointInput<N> u, const typename N::Word* data, State<N>& state, Saturations& saturations) {
+    auto total = [] {
+      if constexpr (what == ActsOn::position)
+        return N::no_deflection();
+      else
+        return N::no_torque();
+    }();
+    [&]<std::size_t... i>(std::index_sequence<i...>) {
+      (add<Effects, N, what>(u, data, std::get<i>(state), total, saturations), ...);
+    }(std::index_sequence_for<Effects...>{});
+    return total;
+  }
+  static constexpr void hash(LayoutHash& hash) {
+    hash.add(LinkShape::code);
+    hash.add(static_cast<std::int32_t>(sizeof...(Effects)));
+    (hash_effect<Effects>(hash), ...);
+  }
+
+ private:
+  template <class E>
+  static constexpr void hash_effect(LayoutHash& hash) {
+    if constexpr (requires { E::hash(hash); }) {
+      E::hash(hash);
+    } else {
+      hash.add(E::name);
+      hash.add(static_cast<std::int32_t>(words_of<E>));
+    }
+  }
+  template <class E, class N, ActsOn what, class State, class Sum>
+  static constexpr void add(JointInput<N>& u, const typename N::Word*& data, State& state, Sum& total,
+                            Saturations& saturations) {
+    if constexpr (acts_on<E> == what) {
+      if constexpr (needs_total<E>)
+        u.total = N::template proven_narrow<Torque<N>>(align(u.structural, N::no_torque()) + total);
+      total = total + contribution<E, N>(u, Words<N>{data}, state, saturations);
+    }
+    data += words_of<E>;
+  }
+};
+
+/// A robot's feedforward model with everything static: number system, which joints' torques this drive puts out
+/// (`outputs`: bit i for joint i+1), and the joints in chain order. RNEA needs the motion of every joint, but wrenches and
+/// effects only those of the joints asked for: the rest is not computed.
+template <class N, std::uint32_t outputs_, class... Joints>
 struct RobotModel {
   using Numbers = N;
   static constexpr std::size_t joints = sizeof...(Joints);
+  static_assert(joints <= 32 && outputs_ != 0 && (joints == 32 || outputs_ >> joints == 0));
+  static constexpr std::uint32_t outputs_mask = outputs_;
+  static constexpr std::size_t outputs = static_cast<std::size_t>(std::popcount(outputs_));
   static constexpr std::size_t effect_words = (0 + ... + Joints::words);
+  static constexpr bool deflects = (false || ... || Joints::deflects);
+  static constexpr bool couples = (false || ... || Joints::couples);
 
   /// In flash. Only 32-bit words on a target.
   struct Parameters {
     Vector3<LinearAcceleration<N>> up;
+    Count<N> ticks_per_second;
     std::array<LinkGeometry<N>, joints> geometry;
     std::array<LinkInertia<N>, joints> inertia;
     std::array<JointConstants<N>, joints> constants;
@@ -111,24 +176,55 @@ struct RobotModel {
   /// What effects remember; value-initialised: the robot at rest.
   struct State {
     std::tuple<typename Joints::template State<N>...> effects;
+    std::array<Deflection<N>, deflects ? joints : 0> deflections{};
   };
-  using Inputs = std::array<JointState<N>, joints>;
-  using Torques = std::array<Torque<N>, joints>;
+  template <class T>
+  using Column = Eigen::Matrix<T, static_cast<int>(joints), 1>;
+  /// q [rad | m], dq, ddq of every joint, in chain order.
+  struct Setpoints {
+    Column<Position<N>> q;
+    Column<Velocity<N>> dq;
+    Column<Acceleration<N>> ddq;
+  };
+  /// Of the joints in `outputs`, in chain order [N*m | N].
+  using Torques = Eigen::Matrix<Torque<N>, static_cast<int>(outputs), 1>;
 
-  /// One tick: setpoints in, feedforward torques out. Total: whatever comes in is limited, saturated and counted.
-  static constexpr Torques tick(const Parameters& parameters, State& state, const Inputs& setpoints,
-                                Saturations& saturations) noexcept {
-    Inputs limited{};
+  /// One tick: setpoints in, feedforward torques out. Total: whatever comes in is limited, saturated and counted. The
+  /// number of instructions does not depend on the values.
+  static Torques tick(const Parameters& parameters, State& state, const Setpoints& setpoints,
+                      Saturations& saturations) noexcept {
+    std::array<JointState<N>, joints> limited;
     for (std::size_t i = 0; i < joints; ++i) {
-      limited[i] = limit_setpoint<N>(setpoints[i], parameters.constants[i].limits, saturations);
+      const auto k = static_cast<int>(i);
+      limited[i] = limit_setpoint<N>({setpoints.q[k], setpoints.dq[k], setpoints.ddq[k]}, parameters.constants[i].limits,
+                                     saturations);
     }
-    std::array<LinkMotion<N>, joints> motions{};
-    std::array<Wrench<N>, joints> wrenches{};
-    Torques structural{};
-    rnea<N, joints>(parameters.geometry, parameters.inertia, parameters.up, limited, motions, wrenches, structural,
-                    saturations);
-    Torques tau{};
-    add_effects(parameters, state, limited, structural, tau, saturations, std::index_sequence_for<Joints...>{});
+    std::array<JointInput<N>, joints> inputs;
+    for (std::size_t i = 0; i < joints; ++i) {
+      if (couples || deflects || is_output(i)) inputs[i] = joint_input<N>(limited[i], parameters.constants[i]);
+      if constexpr (couples) inputs[i].peers = inputs;
+    }
+    std::array<Torque<N>, joints> structural;
+    rigid_body<deflects ? 0 : first>(parameters, limited, structural);
+    if constexpr (deflects) {
+      for (std::size_t i = 0; i < joints; ++i) inputs[i].structural = structural[i];
+      each([&]<std::size_t i, class J>(const typename N::Word* data) {
+        const auto sum =
+            J::template sum<N, ActsOn::position>(inputs[i], data, std::get<i>(state.effects), saturations);
+        limited[i] = state.deflections[i].step(limited[i], sum, parameters.ticks_per_second,
+                                               parameters.constants[i].limits, saturations);
+      }, parameters);
+      rigid_body<first>(parameters, limited, structural);
+    }
+    Torques tau;
+    int at = 0;
+    each([&]<std::size_t i, class J>(const typename N::Word* data) {
+      if constexpr (is_output(i)) {
+        inputs[i].structural = structural[i];
+        const auto sum = J::template sum<N, ActsOn::torque>(inputs[i], data, std::get<i>(state.effects), saturations);
+        tau[at++] = joint_feedforward<N>(structural[i], sum, parameters.constants[i].limits, saturations);
+      }
+    }, parameters);
     return tau;
   }
 
@@ -136,24 +232,31 @@ struct RobotModel {
     LayoutHash hash;
     N::hash_formats(hash);
     hash.add(static_cast<std::int32_t>(joints));
+    hash.add(static_cast<std::int32_t>(outputs_));
     (Joints::hash(hash), ...);
     return hash.value();
   }
 
  private:
-  template <std::size_t... i>
-  static constexpr void add_effects(const Parameters& parameters, State& state, const Inputs& limited,
-                                    const Torques& structural, Torques& tau, Saturations& saturations,
-                                    std::index_sequence<i...>) {
+  static constexpr std::size_t first = static_cast<std::size_t>(std::countr_zero(outputs_));
+  static constexpr bool is_output(std::size_t i) { return (outputs_ >> i & 1U) != 0; }
+
+  /// One function of its own, everything inlined: the links' intermediate results stay in registers.
+  template <std::size_t from>
+  [[gnu::noinline, gnu::flatten]] static void rigid_body(const Parameters& parameters,
+                                                         const std::array<JointState<N>, joints>& states,
+                                                         std::array<Torque<N>, joints>& structural) {
+    rnea_of<N, from, typename Joints::LinkShape...>(parameters.geometry, parameters.inertia, parameters.up, states,
+                                                    structural);
+  }
+
+  /// Calls visit<i, Joint>(its words) for every joint.
+  template <class Visit>
+  static constexpr void each(Visit&& visit, const Parameters& parameters) {
     const typename N::Word* data = parameters.words.data();
-    ((tau[i] = joint_feedforward<N>(
-          limited[i], structural[i], parameters.constants[i],
-          [&](const JointInput<N>& u) {
-            return Joints::template sum<N>(u, data, std::get<i>(state.effects), saturations);
-          },
-          saturations),
-      data += Joints::words),
-     ...);
+    [&]<std::size_t... i>(std::index_sequence<i...>) {
+      ((visit.template operator()<i, Joints>(data), data += Joints::words), ...);
+    }(std::index_sequence_for<Joints...>{});
   }
 };
 

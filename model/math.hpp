@@ -18,9 +18,18 @@ struct SineCosine {
   U sine, cosine;
 };
 
+/// A number of quantity `count` in parts.
+template <class U>
+struct WholeAndRest {
+  std::uint32_t whole;
+  U rest;  ///< [0, 1)
+};
+
 // ---- double
 // ----------------------------------------------------------------------------------------------------------
 inline SineCosine<double> sin_cos(double q) { return {std::sin(q), std::cos(q)}; }
+/// Sine and cosine of an angle in turns.
+inline SineCosine<double> sin_cos_turns(double turns) { return sin_cos(6.28318530717958647693 * turns); }
 inline double tanh_of(double x) { return std::tanh(x); }
 /// exp(-x) for x >= 0
 inline double exp_negative(double x) { return std::exp(-x); }
@@ -28,6 +37,14 @@ inline double asinh_of(double x) { return std::asinh(x); }
 constexpr double magnitude(double x) { return x < 0 ? -x : x; }
 /// sign(x): -1, 0 or 1
 constexpr double sign_of(double x) { return static_cast<double>((x > 0) - (x < 0)); }
+/// What a limiter to [-limit, limit] adds to x.
+constexpr double clipping(double x, double limit) { return x > limit ? limit - x : (x < -limit ? -limit - x : 0.0); }
+/// Negative and absurd counts are limited as the fixed-point format limits them.
+constexpr WholeAndRest<double> split_count(double x) {
+  const double limited = x > 0 ? (x < 32767 ? x : 32767) : 0;
+  const auto whole = static_cast<std::uint32_t>(limited);
+  return {whole, limited - whole};
+}
 
 // ---- raw integers: shared by all fixed formats
 // -------------------------------------------------------------------------
@@ -82,26 +99,36 @@ inline constexpr auto sine_table = [] {
   return table;
 }();
 
-/// Sine and cosine (30 bits) of phase * 2^-32 turns, |error| < 2e-9. From the nearest node a: sin(a + h) = sin a cos h
-/// + cos a sin h with |h| <= pi / 256, cos h = 1 - h^2/2, sin h = h - h^3/6.
+/// Sine and cosine (30 bits) of phase * 2^-32 turns, |error| < 2e-9. From the nearest node a: sin(a + h) = sin a cos h +
+/// cos a sin h with |h| <= pi / 256, cos h = 1 - h^2/2, sin h = h - h^3/6.
 constexpr SineCosine<std::int32_t> sin_cos_of_phase(std::uint32_t phase) {
-  constexpr std::int64_t two_pi = 1686629713;  // 2 pi * 2^28
+  constexpr std::int32_t two_pi = 1686629713;  // 2^28
+  constexpr std::int32_t third = 1431655765;   // 2^32
   const std::uint32_t nearest = phase + (1U << 23);
   const std::uint32_t node = nearest >> 24;
-  const auto offset = static_cast<std::int32_t>(nearest & 0x00ffffffU) - (1 << 23);
-  const std::int64_t h = (offset * two_pi) >> 26;                                   // 34 bits
-  const std::int64_t half_square = (h * h) >> 35;                                   // h^2 / 2, 34 bits
-  const std::int64_t sine_h = h - ((h * ((half_square * 715827883) >> 31)) >> 34);  // h - h (h^2/2) / 3
+  const std::int32_t h = multiply_high(static_cast<std::int32_t>((nearest << 8) ^ 0x80000000U), two_pi);  // 36 bits
+  const std::int32_t half_square = multiply_high(h, h);                                                    // 41 bits
+  const std::int32_t sine_h = h - (multiply_high(multiply_high(h, half_square), third) >> 9);              // 36 bits
+  const std::int32_t versine = half_square >> 5;                                                           // 36 bits
   const std::int64_t s = sine_table[node];
   const std::int64_t c = sine_table[node + 64];
-  return {static_cast<std::int32_t>(s + shift_right(c * sine_h - s * half_square, 34)),
-          static_cast<std::int32_t>(c - shift_right(s * sine_h + c * half_square, 34))};
+  return {static_cast<std::int32_t>(s) + proven_narrow<36>(c * sine_h - s * versine),
+          static_cast<std::int32_t>(c) - proven_narrow<36>(s * sine_h + c * versine)};
 }
 
 /// Sine and cosine (30 bits) of q [rad] with `bits` fractional bits, |error| < 4e-9 + 2^-(bits + 1).
-constexpr SineCosine<std::int32_t> sin_cos(std::int32_t q, int bits) {
-  constexpr std::int64_t inverse_two_pi = 1367130551;                                              // 2^33 / (2 pi)
-  return sin_cos_of_phase(static_cast<std::uint32_t>(shift_right(q * inverse_two_pi, bits + 1)));  // wraps
+template <int bits>
+constexpr SineCosine<std::int32_t> sin_cos(std::int32_t q) {
+  constexpr std::int64_t inverse_two_pi = 1367130551;  // 2^33 / (2 pi)
+  return sin_cos_of_phase(static_cast<std::uint32_t>(proven_narrow<bits + 1>(q * inverse_two_pi)));  // wraps
+}
+inline SineCosine<std::int32_t> sin_cos(std::int32_t q, int bits) {
+  return sin_cos_of_phase(static_cast<std::uint32_t>(shift_right(q * std::int64_t{1367130551}, bits + 1)));
+}
+
+/// Phase for sin_cos_of_phase() of an angle in turns with `bits` fractional bits: whole turns drop out by themselves.
+constexpr std::uint32_t phase_of_turns(std::int64_t turns, int bits) {
+  return static_cast<std::uint32_t>(shift_right(turns, bits - 32));
 }
 
 /// tanh(i / 32), 0 <= x <= 8, 30 bits.
@@ -119,11 +146,12 @@ constexpr std::int32_t tanh(std::int32_t x) {
   constexpr std::uint32_t end = 8U << argument_bits;
   size = size < end ? size : end;
   const std::uint32_t node = (size + (1U << (argument_bits - 6))) >> (argument_bits - 5);
-  const std::int64_t d = static_cast<std::int32_t>(size - (node << (argument_bits - 5)));  // 27 bits
-  const std::int64_t t = tanh_table[node];
-  const std::int64_t slope = (std::int64_t{1} << 30) - ((t * t) >> 30);
-  const std::int64_t bend = (std::int64_t{1} << 30) - ((d * t) >> argument_bits);
-  const auto value = static_cast<std::int32_t>(t + ((d * ((slope * bend) >> 30)) >> argument_bits));
+  const auto d = static_cast<std::int32_t>(size - (node << (argument_bits - 5))) << 5;  // 32 bits
+  const std::int32_t t = tanh_table[node];
+  const std::int32_t slope = (1 << 28) - multiply_high(t, t);             // 28 bits
+  const std::int32_t bend = (1 << 30) - multiply_high(d, t);              // 30 bits
+  const std::int32_t step = multiply_high(slope << 2, bend) << 2;         // 30 bits
+  const std::int32_t value = t + multiply_high(d, step);
   return (value ^ sign) - sign;
 }
 
@@ -138,16 +166,19 @@ inline constexpr auto power_table = [] {
 /// 2^-k by shifting, 2^(-i/64) from the table, 2^-r by its series to the third power.
 constexpr std::int32_t exp_negative(std::int32_t x) {
   x &= ~(x >> 31);
-  const std::int64_t y = (x * std::int64_t{1549082005}) >> 30;  // 1 / ln 2, 30 bits
-  const int k = static_cast<int>(y >> argument_bits);
-  const auto node = static_cast<std::uint32_t>(y >> (argument_bits - 6)) & 63U;
-  const std::int64_t r = y & ((std::int64_t{1} << (argument_bits - 6)) - 1);
-  const std::int64_t u = (r * 1488522236) >> 24;  // r ln 2 (31 bits), result with 34 bits
-  const std::int64_t square = (u * u) >> 35;      // u^2 / 2
-  const std::int64_t cube = (u * ((square * 715827883) >> 31)) >> 34;
-  const std::int64_t value = power_table[node];
-  const std::int64_t full = value - ((value * (u - square + cube)) >> 34);
-  return static_cast<std::int32_t>((((full << 1) >> k) + 1) >> 1);
+  const std::int64_t product = x * std::int64_t{1549082005};  // 1 / ln 2: 30 bits, product 57
+  const auto k = static_cast<std::uint32_t>(product >> 57);
+  const auto fraction = static_cast<std::uint32_t>(product >> 25);  // 32 bits
+  const std::uint32_t node = fraction >> 26;
+  const auto r = static_cast<std::int32_t>((fraction & 0x03ffffffU) << 5);  // 37 bits, r < 2^-6
+  const std::int32_t u = multiply_high(r, 1488522236) << 1;                // r ln 2, 37 bits
+  const std::int32_t square = multiply_high(u, u);                         // 42 bits
+  const std::int32_t cube = multiply_high(square, u);                      // 47 bits
+  // 1 - 2^-r = u - u^2 / 2 + u^3 / 6
+  const std::int32_t loss = u - (square >> 6) + (multiply_high(cube, 715827883) >> 10);  // 37 bits
+  const std::int32_t value = power_table[node];
+  const std::int32_t full = value - proven_narrow<37>(std::int64_t{value} * loss);
+  return static_cast<std::int32_t>(((static_cast<std::uint32_t>(full) << 1 >> k) + 1) >> 1);
 }
 
 struct Parabola {
@@ -194,13 +225,31 @@ constexpr std::int32_t magnitude(std::int32_t x) {
 /// sign(x) with 30 bits
 constexpr std::int32_t sign(std::int32_t x) { return ((x > 0) - (x < 0)) * (1 << 30); }
 
+/// What a limiter to [-limit, limit], limit >= 0, adds to x; masks stand for max(x - limit, 0) and min(x + limit, 0).
+constexpr std::int32_t clipping(std::int32_t x, std::int32_t limit) {
+  const std::int64_t over = std::int64_t{x} - limit, under = std::int64_t{x} + limit;
+  std::uint32_t ignored = 0;  // only x = -2^31 with limit 0 is outside
+  return saturate(-((over & ~(over >> 63)) + (under & (under >> 63))), ignored);
+}
+
+/// A count (count_bits) in parts, the rest with 30 bits; negative ones count as 0.
+constexpr WholeAndRest<std::int32_t> split_count(std::int32_t x) {
+  x &= ~(x >> 31);
+  return {static_cast<std::uint32_t>(x) >> count_bits, (x & ((1 << count_bits) - 1)) << (unit_bits - count_bits)};
+}
+
 }  // namespace raw
 
 // ---- fixed point
 // -----------------------------------------------------------------------------------------------------
 template <int bits>
 constexpr SineCosine<Fixed<unit_bits>> sin_cos(Fixed<bits> q) {
-  const auto result = raw::sin_cos(q.raw, bits);
+  const auto result = raw::sin_cos<bits>(q.raw);
+  return {{result.sine}, {result.cosine}};
+}
+template <int bits>
+constexpr SineCosine<Fixed<unit_bits>> sin_cos_turns(Wide<bits> turns) {
+  const auto result = raw::sin_cos_of_phase(raw::phase_of_turns(turns.raw, bits));
   return {{result.sine}, {result.cosine}};
 }
 constexpr Fixed<unit_bits> tanh_of(Fixed<argument_bits> x) { return {raw::tanh(x.raw)}; }
@@ -213,6 +262,25 @@ constexpr Fixed<bits> magnitude(Fixed<bits> x) {
 template <int bits>
 constexpr Fixed<unit_bits> sign_of(Fixed<bits> x) {
   return {raw::sign(x.raw)};
+}
+template <int bits>
+constexpr Fixed<bits> clipping(Fixed<bits> x, Fixed<bits> limit) {
+  return {raw::clipping(x.raw, limit.raw)};
+}
+constexpr WholeAndRest<Fixed<unit_bits>> split_count(Fixed<count_bits> x) {
+  const auto parts = raw::split_count(x.raw);
+  return {parts.whole, {parts.rest}};
+}
+
+// ---- all number systems
+// ----------------------------------------------------------------------------------------------
+
+/// a + share (b - a), 0 <= share <= 1: never outside [a, b], so a state that is blended with values of its range keeps
+/// that range for ever.
+template <class N, class T>
+constexpr T blend(T a, T b, Unit<N> share) {
+  const auto rest = N::template proven_narrow<Unit<N>>(N::one() - share);
+  return N::between(a, b, N::template proven_narrow<T>(a * rest + b * share));
 }
 
 }  // namespace fxdyn

@@ -1,19 +1,26 @@
 #pragma once
 
-#include <algorithm>
+#include <cmath>
 #include <concepts>
 
 #include "model/fixed.hpp"
+#include "model/vector.hpp"
 
 // A number system says which type stands for which quantity, so that every formula of the model is written once.
-//   a * b, a + b, a - b, -a   widen and are exact (for Real: double)
-//   align(x, w)               x in the format of the accumulator w
-//   N::narrow<T>(w, s)        w as a stored number of type T: rounds half up, saturates, counts in s
-//   N::clamp<T>(w)            the same where saturation is meant, not counted
-//   N::proven_narrow<T>(w)    rounds half up without a check: export has proven that w fits
-//   (host_tools/export/proof.hpp) N::convert<T>(x, s)       a stored number as another quantity of the same unit (a
-//   prismatic joint's q is a length) N::Word, N::load<T>(word)  how parameters are stored in tables, and one of them as
-//   a number
+//
+//   a * b, a + b, a - b, -a     widen and are exact (for Real: double)
+//   align(x, w)                 x in the format of the accumulator w
+//   N::proven_narrow<T>(w)      w as a stored number of type T, rounded half up, no check: the export has proven that it
+//                               fits (host_tools/export/proof.hpp)
+//   N::narrow<T>(w, s)          the same, saturated and counted in s: for what no proof covers
+//   N::clamp<T>(w)              the same where saturation is meant, not counted
+//   N::convert<T>(x)            a stored number as another quantity of the same unit (a prismatic joint's q is a length)
+//   N::turned(v, c, s)          v, that was just turned with cosine c and sine s; bounding systems cut its components down
+//                               to its length (vector.hpp)
+//   N::rounded_length<T>(l)     length of a vector whose components were narrowed to T
+//   N::between(a, b, x)         x; bounding systems cut it down to what lies between a and b
+//   N::Word, N::load<T>(word)   how parameters are stored in tables, and one of them as a number
+//
 // Coefficients (N::Coefficient<Q>) multiply a number of quantity Q to give a torque; their format follows from that of
 // Q, so that products of a sum need no shifts.
 
@@ -29,13 +36,22 @@ struct Real {
   using FirstMoment = double;
   using SecondMoment = double;
   using TorqueSum = double;
+  template <Quantity>
+  using DeflectionCoefficient = double;
+  using DeflectionSum = double;
   using Word = double;
+  static constexpr bool packed = false;
+  using NodeArgument = double;
 
   template <class T>
   static constexpr T load(Word word) {
     return word;
   }
   static constexpr TorqueSum no_torque() { return 0; }
+  static constexpr DeflectionSum no_deflection() { return 0; }
+  static constexpr double feature(double x) { return x; }
+  static double activation(double x) { return std::tanh(x); }
+  static constexpr double node_coefficient(double word, int) { return word; }
   static constexpr double one() { return 1; }
   template <class T>
   static constexpr T narrow(double x, Saturations&) {
@@ -50,7 +66,19 @@ struct Real {
     return x;
   }
   template <class T>
-  static constexpr T convert(double x, Saturations&) {
+  static constexpr T convert(double x) {
+    return x;
+  }
+  template <class T, class U>
+  static constexpr Vector3<T> turned(const Vector3<T>& v, U, U) {
+    return v;
+  }
+  template <class T>
+  static constexpr NoLength rounded_length(NoLength) {
+    return {};
+  }
+  template <class T>
+  static constexpr T between(T, T, T x) {
     return x;
   }
 };
@@ -58,8 +86,9 @@ struct Real {
 constexpr double align(double x, double) { return x; }
 
 /// Fixed point with formats known at compile time. `Formats` is a generated struct of static constexpr int: one
-/// member per name in `quantity_names` (but for `unit`, `argument` and `ratio`), `force_sum` (fractional bits of the
-/// sums that give forces) and `torque_sum` (of the sum of all contributions to a joint's torque).
+/// member per name in `quantity_names` without common_bits(), `force_sum` (fractional bits of the sums that give
+/// forces), `torque_sum` (of the sum of all contributions to a joint's torque) and `deflection_sum` (the same of its
+/// deflection).
 template <class Formats>
 struct FixedNumbers {
   static constexpr int bits(Quantity quantity) {
@@ -78,12 +107,6 @@ struct FixedNumbers {
         return Formats::force;
       case Quantity::torque:
         return Formats::torque;
-      case Quantity::unit:
-        return unit_bits;
-      case Quantity::argument:
-        return argument_bits;
-      case Quantity::ratio:
-        return ratio_bits;
       case Quantity::inverse_velocity:
         return Formats::inverse_velocity;
       case Quantity::inverse_path:
@@ -98,10 +121,9 @@ struct FixedNumbers {
         return Formats::inverse_position;
       case Quantity::inverse_torque:
         return Formats::inverse_torque;
-      case Quantity::count:
-        return count_bits;
+      default:
+        return common_bits(quantity);
     }
-    return 0;
   }
 
   template <Quantity quantity>
@@ -113,19 +135,38 @@ struct FixedNumbers {
   using FirstMoment = Fixed<Formats::force_sum - Formats::acceleration>;
   using SecondMoment = Fixed<Formats::force_sum - 2 * Formats::acceleration + Formats::linear_acceleration>;
   using TorqueSum = Wide<Formats::torque_sum>;
+  template <Quantity quantity>
+  using DeflectionCoefficient = Fixed<Formats::deflection_sum - bits(quantity)>;
+  using DeflectionSum = Wide<Formats::deflection_sum>;
   using Word = std::int32_t;
+  /// BLS: two int16 a word, the kernels of dense.hpp.
+  static constexpr bool packed = true;
+  using NodeArgument = std::int32_t;
+  static constexpr int weight_bits() { return Formats::weight; }
 
   template <class T>
   static constexpr T load(Word word) {
     return {word};
   }
   static constexpr TorqueSum no_torque() { return {}; }
+  static constexpr DeflectionSum no_deflection() { return {}; }
+  /// A BLS input, saturated to 16 bits.
+  template <int bits>
+  static constexpr Of<Quantity::feature> feature(Wide<bits> x) {
+    return {raw::saturate_to<16>(raw::proven_narrow<bits - small_bits>(x.raw))};
+  }
+  /// An output of the BLS: 64-bit sum of coefficients (`bits` fractional bits) times activations.
+  template <int bits>
+  static constexpr TorqueSum node_sum(std::int64_t sum, std::integral_constant<int, bits>) {
+    return align(Wide<bits + small_bits>{sum}, TorqueSum{});
+  }
   static constexpr Fixed<unit_bits> one() { return {1 << unit_bits}; }
   template <class Hash>
   static constexpr void hash_formats(Hash& hash) {
     for (std::size_t i = 0; i < quantity_count; ++i) hash.add(bits(static_cast<Quantity>(i)));
     hash.add(Formats::force_sum);
     hash.add(Formats::torque_sum);
+    hash.add(Formats::deflection_sum);
   }
 
   template <class T, int bits>
@@ -148,11 +189,23 @@ struct FixedNumbers {
     return {raw::narrow(x.raw, bits - T::bits, outside)};
   }
   template <class T, int bits>
-  static constexpr T convert(Fixed<bits> x, Saturations& saturations) {
-    std::uint32_t outside = 0;
-    const T result{raw::narrow(x.raw, bits - T::bits, outside)};
-    saturations.count += outside;
-    return result;
+  static constexpr T convert(Fixed<bits> x) {
+    if constexpr (bits >= T::bits)
+      return {raw::proven_narrow<bits - T::bits>(x.raw)};
+    else
+      return {static_cast<std::int32_t>(static_cast<std::uint32_t>(x.raw) << (T::bits - bits))};
+  }
+  template <class T, class U>
+  static constexpr Vector3<T> turned(const Vector3<T>& v, U, U) {
+    return v;
+  }
+  template <class T>
+  static constexpr NoLength rounded_length(NoLength) {
+    return {};
+  }
+  template <class T>
+  static constexpr T between(T, T, T x) {
+    return x;
   }
 };
 
@@ -191,6 +244,10 @@ template <class N>
 using InversePosition = typename N::template Of<Quantity::inverse_position>;
 template <class N>
 using InverseTorque = typename N::template Of<Quantity::inverse_torque>;
+template <class N>
+using Feature = typename N::template Of<Quantity::feature>;
+template <class N>
+using Activation = typename N::template Of<Quantity::activation>;
 template <class N>
 using Count = typename N::template Of<Quantity::count>;
 

@@ -87,13 +87,38 @@ struct RunTimeNumbers {
   using FirstMoment = RunTimeFixed<Kind{Kind::first_moment}>;
   using SecondMoment = RunTimeFixed<Kind{Kind::second_moment}>;
   using TorqueSum = RunTimeWide;
+  template <Quantity quantity>
+  using DeflectionCoefficient = RunTimeFixed<Kind{Kind::deflection_coefficient, quantity}>;
+  using DeflectionSum = RunTimeWide;
   using Word = std::int32_t;
+  static constexpr bool packed = true;
+  using NodeArgument = std::int32_t;
+  static int weight_bits() { return (*current_formats)[Quantity::weight]; }
 
   template <class T>
   static T load(Word word) {
     return {word};
   }
   static TorqueSum no_torque() { return {0, current_formats->torque_sum}; }
+  static DeflectionSum no_deflection() { return {0, current_formats->deflection_sum}; }
+  static Of<Quantity::feature> feature(RunTimeWide x) {
+    return {raw::saturate_to<16>(proven_narrow<Of<Quantity::feature>>(x).raw)};
+  }
+  static TorqueSum node_sum(std::int64_t sum, int bits) {
+    return align(RunTimeWide{sum, bits + small_bits}, no_torque());
+  }
+  template <class T, class U>
+  static Vector3<T> turned(const Vector3<T>& v, U, U) {
+    return v;
+  }
+  template <class T>
+  static NoLength rounded_length(NoLength) {
+    return {};
+  }
+  template <class T>
+  static T between(T, T, T x) {
+    return x;
+  }
   static Of<Quantity::unit> one() { return {1 << unit_bits}; }
 
   template <class T>
@@ -118,10 +143,10 @@ struct RunTimeNumbers {
     return narrow<T>(x, ignored);
   }
   template <class T, Kind kind>
-  static T convert(RunTimeFixed<kind> x, Saturations& saturations) {
+  static T convert(RunTimeFixed<kind> x) {
     std::uint32_t outside = 0;
     const T result{raw::narrow(x.raw, x.bits() - T::bits(), outside)};
-    saturations.count += outside;
+    if (outside != 0) sum_overflow();
     return result;
   }
 };

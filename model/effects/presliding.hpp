@@ -22,7 +22,7 @@ struct Presliding {
   static constexpr void basis(const JointInput<N>& u, Words<N> words, Dahl<N>& state, Saturations& saturations,
                               Emit&& emit) {
     const auto z = state.step(u.dq, words.template number<Quantity::inverse_path>(0), saturations);
-    emit(as<Quantity::unit>, 0, N::template narrow<Unit<N>>(z - u.sign, saturations));
+    emit(as<Quantity::unit>, 0, N::template proven_narrow<Unit<N>>(z - u.sign));
   }
 };
 

@@ -1,0 +1,321 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "host_tools/numbers/formats.hpp"
+#include "host_tools/numbers/run_time_fixed.hpp"
+#include "model/math.hpp"
+#include "model/numbers.hpp"
+
+// Bounds instead of numbers: an interval that holds the exact value, and the largest |fixed - exact|. The model's own
+// templates run in them, so what is proven is the code that runs in the drive.
+//   BoundedNumbers without formats in force: interval arithmetic; the largest magnitudes seen choose the formats.
+//   BoundedNumbers with formats in force (BoundScope): every narrowing adds its rounding, the functions of math.hpp add
+//   their stated errors; what could leave its format is an error of the export.
+// Intervals are evaluated in double precision without directed rounding: 2^-52 against a reserve of 2^-1 in the formats.
+
+namespace fxdyn {
+
+/// Largest magnitude that each kind of number took, errors included, and of the 64-bit sums in front of a narrowing.
+struct Ranges {
+  std::array<std::array<double, quantity_count>, group_count> largest{};
+
+  double& at(Kind kind) { return largest[kind.group][static_cast<std::size_t>(kind.quantity)]; }
+  double operator[](Kind kind) const { return largest[kind.group][static_cast<std::size_t>(kind.quantity)]; }
+  double operator[](Quantity quantity) const { return (*this)[Kind{Kind::number, quantity}]; }
+  void see(Kind kind, double x) { at(kind) = std::fmax(at(kind), x); }
+};
+
+/// What bounding needs on this thread: where ranges go, and the formats whose roundings count (null: none).
+struct Bounding {
+  Ranges* ranges = nullptr;
+  const Formats* formats = nullptr;
+};
+inline thread_local Bounding current_bounding;
+
+class BoundScope {
+ public:
+  BoundScope(Ranges& ranges, const Formats* formats) : previous_(current_bounding) {
+    current_bounding = {&ranges, formats};
+  }
+  ~BoundScope() { current_bounding = previous_; }
+  BoundScope(const BoundScope&) = delete;
+  BoundScope& operator=(const BoundScope&) = delete;
+
+ private:
+  Bounding previous_;
+};
+
+/// The states of Dahl's model and of relaxations forget their rounding errors while they move and add them up while they
+/// creep. Their error is bounded for creeping (less than one presliding distance or time constant in so many ticks) that
+/// lasts no longer than this: one minute at 2 ms.
+inline constexpr double creeping_ticks = 30'000;
+
+struct Bound {
+  double low = 0, high = 0, error = 0;
+
+  double magnitude() const { return std::fmax(std::fabs(low), std::fabs(high)); }
+  bool operator==(const Bound&) const = default;
+
+  friend Bound operator+(Bound a, Bound b) { return {a.low + b.low, a.high + b.high, a.error + b.error}; }
+  friend Bound operator-(Bound a, Bound b) { return {a.low - b.high, a.high - b.low, a.error + b.error}; }
+  friend Bound operator-(Bound a) { return {-a.high, -a.low, a.error}; }
+  friend Bound operator*(Bound a, Bound b) {
+    const double p = a.low * b.low, q = a.low * b.high, r = a.high * b.low, s = a.high * b.high;
+    return {std::fmin(std::fmin(p, q), std::fmin(r, s)), std::fmax(std::fmax(p, q), std::fmax(r, s)),
+            a.magnitude() * b.error + b.magnitude() * a.error + a.error * b.error};
+  }
+  static Bound hull(Bound a, Bound b) {
+    return {std::fmin(a.low, b.low), std::fmax(a.high, b.high), std::fmax(a.error, b.error)};
+  }
+  Bound cut(double from, double to) const { return {std::fmin(std::fmax(low, from), to), std::fmax(std::fmin(high, to), from), error}; }
+};
+
+/// Length of a vector and of its error; unknown: infinite.
+struct BoundedLength {
+  double length = std::numeric_limits<double>::infinity(), error = std::numeric_limits<double>::infinity();
+
+  friend BoundedLength operator+(BoundedLength a, BoundedLength b) { return {a.length + b.length, a.error + b.error}; }
+  friend BoundedLength operator*(BoundedLength a, BoundedLength b) {
+    return {a.length * b.length, a.length * b.error + b.length * a.error + a.error * b.error};
+  }
+};
+
+struct BoundedWide {
+  Bound value;
+  friend BoundedWide operator+(BoundedWide a, BoundedWide b) { return {a.value + b.value}; }
+  friend BoundedWide operator-(BoundedWide a, BoundedWide b) { return {a.value - b.value}; }
+  friend BoundedWide operator-(BoundedWide a) { return {-a.value}; }
+};
+
+template <Kind kind>
+struct Bounded {
+  Bound value;
+  template <Kind other>
+  friend BoundedWide operator*(Bounded a, Bounded<other> b) {
+    return {a.value * b.value};
+  }
+  friend BoundedWide operator+(Bounded a, Bounded b) { return {a.value + b.value}; }
+  friend BoundedWide operator-(Bounded a, Bounded b) { return {a.value - b.value}; }
+  friend BoundedWide operator-(Bounded a) { return {-a.value}; }
+};
+
+template <Kind kind>
+struct LengthOf<Bounded<kind>> {
+  using type = BoundedLength;
+};
+template <>
+struct LengthOf<BoundedWide> {
+  using type = BoundedLength;
+};
+
+inline BoundedLength length_of(const Bound& x) { return {x.magnitude(), x.error}; }
+template <Kind kind>
+BoundedLength length_of(const Bounded<kind>& x) {
+  return length_of(x.value);
+}
+template <class T>
+  requires std::same_as<typename LengthOf<T>::type, BoundedLength>
+BoundedLength length_of(const Vector3<T>& v) {
+  const Bound x = v.x.value, y = v.y.value, z = v.z.value;
+  return {std::fmin(v.length.length, std::hypot(x.magnitude(), y.magnitude(), z.magnitude())),
+          std::fmin(v.length.error, std::hypot(x.error, y.error, z.error))};
+}
+
+template <Kind kind>
+BoundedWide square(const Bounded<kind>& x) {
+  const Bound v = x.value, product = v * v;
+  const double most = v.magnitude() * v.magnitude();
+  const bool zero = v.low <= 0 && v.high >= 0;
+  return {{zero ? 0 : std::fmin(v.low * v.low, v.high * v.high), most, product.error}};
+}
+
+inline BoundedWide align(BoundedWide x, BoundedWide) { return x; }
+template <Kind kind>
+BoundedWide align(Bounded<kind> x, BoundedWide) {
+  return {x.value};
+}
+
+struct BoundedNumbers {
+  template <Quantity quantity>
+  using Of = Bounded<Kind{Kind::number, quantity}>;
+  template <Quantity quantity>
+  using Coefficient = Bounded<Kind{Kind::coefficient, quantity}>;
+  template <Quantity quantity>
+  using DeflectionCoefficient = Bounded<Kind{Kind::deflection_coefficient, quantity}>;
+  using Mass = Bounded<Kind{Kind::mass}>;
+  using FirstMoment = Bounded<Kind{Kind::first_moment}>;
+  using SecondMoment = Bounded<Kind{Kind::second_moment}>;
+  using TorqueSum = BoundedWide;
+  using DeflectionSum = BoundedWide;
+  using Word = Bound;
+  static constexpr bool packed = false;
+  using NodeArgument = BoundedWide;
+
+  template <class T>
+  static T load(Word word) {
+    return {word};
+  }
+  static TorqueSum no_torque() { return {}; }
+  static DeflectionSum no_deflection() { return {}; }
+  static Of<Quantity::unit> one() { return {{1, 1, 0}}; }
+
+  template <class T>
+  static T proven_narrow(BoundedWide x) {
+    return see(T{rounded<T>(x.value)});
+  }
+  template <class T>
+  static T narrow(BoundedWide x, Saturations&) {
+    return proven_narrow<T>(x);
+  }
+  template <class T>
+  static T clamp(BoundedWide x) {
+    const double most = largest<T>();
+    return {rounded<T>(x.value).cut(-most, most)};
+  }
+  template <class T, Kind kind>
+  static T convert(Bounded<kind> x) {
+    return proven_narrow<T>({x.value});
+  }
+  static Of<Quantity::feature> feature(BoundedWide x) {
+    Bound value = x.value;
+    if (current_bounding.formats != nullptr) value.error += std::ldexp(1.0, -small_bits);  // rounding and +1 itself
+    return {value.cut(-1, 1)};
+  }
+  static Of<Quantity::activation> activation(BoundedWide x) {
+    Bound out{std::tanh(x.value.low), std::tanh(x.value.high), 0};
+    if (current_bounding.formats != nullptr) {
+      // half a unit of the table's argument, the stated error of tanh_line()
+      out.error = steepest_tanh(x.value) * (x.value.error + std::ldexp(0.5, -raw::tanh_argument_bits)) + 3.2e-5;
+    }
+    return {out};
+  }
+  static Coefficient<Quantity::activation> node_coefficient(Word word, int) { return {word}; }
+
+  template <class T, class U>
+  static Vector3<T> turned(Vector3<T> v, U cosine, U sine) {
+    if (current_bounding.formats != nullptr) {
+      v.length.error += v.length.length * std::hypot(cosine.value.error, sine.value.error) +
+                        v.length.error * std::hypot(cosine.value.error, sine.value.error) + unit<T>() / std::sqrt(2.0);
+    }
+    const BoundedLength most = v.length;
+    const auto cut = [&](Bound& x) {
+      x = x.cut(-most.length, most.length);
+      x.error = std::fmin(x.error, most.error);
+    };
+    cut(v.x.value);
+    cut(v.y.value);
+    cut(v.z.value);
+    v.length = length_of(v);
+    return v;
+  }
+  template <class T>
+  static BoundedLength rounded_length(BoundedLength x) {
+    if (current_bounding.formats != nullptr) x.error += unit<T>() * std::sqrt(0.75);
+    return x;
+  }
+  template <class T>
+  static T between(T a, T b, T x) {
+    Bound out = Bound::hull(a.value, b.value);
+    const double own = std::fmax(0.0, x.value.error - out.error);
+    out.error = current_bounding.formats != nullptr ? std::fmax(out.error, creeping_ticks * own) : 0;
+    return {out};
+  }
+  static double steepest_tanh(Bound x) {
+    const double nearest = x.low <= 0 && x.high >= 0 ? 0 : std::fmin(std::fabs(x.low), std::fabs(x.high));
+    const double t = std::tanh(std::fmax(0.0, nearest - x.error));
+    return 1 - t * t;
+  }
+
+ private:
+  template <Kind kind>
+  static Kind kind_of(Bounded<kind>) {
+    return kind;
+  }
+  template <class T>
+  static double unit() {
+    return std::ldexp(1.0, -bits_of(*current_bounding.formats, kind_of(T{})));
+  }
+  template <class T>
+  static Bound rounded(Bound x) {
+    if (current_bounding.formats != nullptr) x.error += unit<T>() / 2;
+    return x;
+  }
+  template <class T>
+  static double largest() {
+    const int bits = common_bits(kind_of(T{}).quantity);
+    return bits > 0 ? std::ldexp(1.0, 31 - bits) : std::numeric_limits<double>::infinity();
+  }
+  template <Kind kind>
+  static Bounded<kind> see(Bounded<kind> x) {
+    current_bounding.ranges->see(kind, x.value.magnitude() + x.value.error);
+    return x;
+  }
+};
+
+// ---- the functions of math.hpp with their stated errors --------------------------------------------------------
+
+namespace detail {
+inline bool rounding() { return current_bounding.formats != nullptr; }
+/// Range of the sine over [low, high].
+inline Bound sine_range(double low, double high) {
+  const double turn = 2 * raw::pi;
+  if (!(high - low < turn)) return {-1, 1, 0};
+  const auto holds = [&](double x) { return std::ceil((low - x) / turn) * turn + x <= high; };
+  return {holds(-raw::pi / 2) ? -1 : std::fmin(std::sin(low), std::sin(high)),
+          holds(raw::pi / 2) ? 1 : std::fmax(std::sin(low), std::sin(high)), 0};
+}
+inline SineCosine<BoundedNumbers::Of<Quantity::unit>> sine_cosine(Bound angle, double own_error) {
+  Bound sine = sine_range(angle.low, angle.high);
+  Bound cosine = sine_range(angle.low + raw::pi / 2, angle.high + raw::pi / 2);
+  if (rounding()) sine.error = cosine.error = std::fmin(2.0, angle.error + own_error);
+  return {{sine}, {cosine}};
+}
+}  // namespace detail
+
+template <Kind kind>
+SineCosine<BoundedNumbers::Of<Quantity::unit>> sin_cos(Bounded<kind> q) {
+  return detail::sine_cosine(q.value, 4e-9);
+}
+inline SineCosine<BoundedNumbers::Of<Quantity::unit>> sin_cos_turns(BoundedWide turns) {
+  const double scale = 2 * raw::pi;
+  return detail::sine_cosine({scale * turns.value.low, scale * turns.value.high, scale * turns.value.error}, 4e-9);
+}
+inline BoundedNumbers::Of<Quantity::unit> tanh_of(BoundedNumbers::Of<Quantity::argument> x) {
+  Bound out{std::tanh(x.value.low), std::tanh(x.value.high), 0};
+  if (detail::rounding()) out.error = BoundedNumbers::steepest_tanh(x.value) * x.value.error + 1.5e-6;
+  return {out};
+}
+inline BoundedNumbers::Of<Quantity::unit> exp_negative(BoundedNumbers::Of<Quantity::argument> x) {
+  Bound out{std::exp(-std::fmax(0.0, x.value.high)), std::exp(-std::fmax(0.0, x.value.low)), 0};
+  if (detail::rounding()) out.error = x.value.error + 2e-9;
+  return {out};
+}
+inline BoundedNumbers::Of<Quantity::argument> asinh_of(BoundedNumbers::Of<Quantity::ratio> x) {
+  Bound out{std::asinh(x.value.low), std::asinh(x.value.high), 0};
+  if (detail::rounding()) out.error = x.value.error + 7e-6;
+  return {out};
+}
+template <Kind kind>
+Bounded<kind> magnitude(Bounded<kind> x) {
+  const bool zero = x.value.low <= 0 && x.value.high >= 0;
+  return {{zero ? 0 : std::fmin(std::fabs(x.value.low), std::fabs(x.value.high)), x.value.magnitude(), x.value.error}};
+}
+template <Kind kind>
+BoundedNumbers::Of<Quantity::unit> sign_of(Bounded<kind> x) {
+  const bool touches = x.value.low - x.value.error <= 0 && x.value.high + x.value.error >= 0;
+  return {{sign_of(x.value.low), sign_of(x.value.high), touches && x.value.error > 0 ? 2.0 : 0.0}};
+}
+template <Kind kind>
+Bounded<kind> clipping(Bounded<kind> x, Bounded<kind> limit) {
+  return {{clipping(x.value.high, limit.value.low), clipping(x.value.low, limit.value.low),
+           x.value.error + limit.value.error}};
+}
+inline WholeAndRest<BoundedNumbers::Of<Quantity::unit>> split_count(BoundedNumbers::Of<Quantity::count> x) {
+  const auto parts = split_count(x.value.low);  // a parameter: one value
+  return {parts.whole, {{parts.rest, parts.rest, x.value.error}}};
+}
+
+}  // namespace fxdyn
