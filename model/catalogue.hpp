@@ -1,11 +1,28 @@
 #pragma once
 
+#include "model/effects/asymmetric_friction.hpp"
+#include "model/effects/backlash.hpp"
 #include "model/effects/coulomb.hpp"
+#include "model/effects/delay.hpp"
+#include "model/effects/eccentricity.hpp"
+#include "model/effects/elasticity.hpp"
+#include "model/effects/friction_drift.hpp"
+#include "model/effects/gravity_compensator.hpp"
+#include "model/effects/gravity_tilt.hpp"
+#include "model/effects/joint_coupling.hpp"
+#include "model/effects/load_friction.hpp"
 #include "model/effects/offset.hpp"
+#include "model/effects/payload.hpp"
 #include "model/effects/presliding.hpp"
+#include "model/effects/ripple.hpp"
 #include "model/effects/rotor_inertia.hpp"
+#include "model/effects/saturation.hpp"
+#include "model/effects/spring.hpp"
 #include "model/effects/stribeck.hpp"
+#include "model/effects/torque_gain.hpp"
 #include "model/effects/viscous.hpp"
+#include "model/effects/viscous_cubic.hpp"
+#include "model/effects/viscous_quadratic.hpp"
 
 namespace fxdyn {
 
@@ -21,8 +38,14 @@ struct EffectList {
   using apply = To<Effects...>;
 };
 
-/// The one list of effects: simulator, identifier, exporter and diagnoser walk it.
-using Catalogue = EffectList<Viscous, Coulomb, Offset, RotorInertia, Stribeck, Presliding>;
+/// The one list of joint effects: simulator, identifier, exporter and diagnoser walk it.
+using Catalogue =
+    EffectList<Viscous, Coulomb, Offset, RotorInertia, Stribeck, Presliding, AsymmetricFriction, ViscousQuadratic,
+               ViscousCubic, LoadFriction, TorqueGain, Ripple, Spring, GravityCompensator, FrictionDrift, Saturation,
+               JointCoupling, Delay, Elasticity, Backlash, Eccentricity>;
+
+/// Effects on the rigid body itself: they change its parameters and have no basis.
+using BodyEffects = EffectList<Payload, GravityTilt>;
 
 namespace detail {
 template <class... Effects>

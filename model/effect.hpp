@@ -48,6 +48,26 @@ struct JointInput {
 enum class ActsOn : std::uint8_t {
   torque,    ///< added to the joint's torque
   position,  ///< deflection delta between motor and link: the rigid body moves at q - delta
+  body,      ///< no sum: changes the parameters of the rigid body (BodyEffects in catalogue.hpp)
+};
+
+/// What an effect says of itself where it differs from the usual: a torque out of the joint's own motion.
+template <class E>
+inline constexpr ActsOn acts_on = [] {
+  if constexpr (requires { E::acts_on; }) return E::acts_on;
+  return ActsOn::torque;
+}();
+template <class E>
+inline constexpr bool needs_structural = requires {
+  requires E::needs_structural;
+};
+template <class E>
+inline constexpr bool needs_total = requires {
+  requires E::needs_total;
+};
+template <class E>
+inline constexpr bool needs_peers = requires {
+  requires E::needs_peers;
 };
 
 /// Stored parameters of one effect: its shape words, then its coefficients. Memory belongs to the caller.

@@ -18,9 +18,18 @@ struct SineCosine {
   U sine, cosine;
 };
 
+/// A number of quantity `count` in parts.
+template <class U>
+struct WholeAndRest {
+  std::uint32_t whole;
+  U rest;  ///< [0, 1)
+};
+
 // ---- double
 // ----------------------------------------------------------------------------------------------------------
 inline SineCosine<double> sin_cos(double q) { return {std::sin(q), std::cos(q)}; }
+/// Sine and cosine of an angle in turns.
+inline SineCosine<double> sin_cos_turns(double turns) { return sin_cos(6.28318530717958647693 * turns); }
 inline double tanh_of(double x) { return std::tanh(x); }
 /// exp(-x) for x >= 0
 inline double exp_negative(double x) { return std::exp(-x); }
@@ -28,6 +37,14 @@ inline double asinh_of(double x) { return std::asinh(x); }
 constexpr double magnitude(double x) { return x < 0 ? -x : x; }
 /// sign(x): -1, 0 or 1
 constexpr double sign_of(double x) { return static_cast<double>((x > 0) - (x < 0)); }
+/// What a limiter to [-limit, limit] adds to x.
+constexpr double clipping(double x, double limit) { return x > limit ? limit - x : (x < -limit ? -limit - x : 0.0); }
+/// Negative and absurd counts are limited as the fixed-point format limits them.
+constexpr WholeAndRest<double> split_count(double x) {
+  const double limited = x > 0 ? (x < 32767 ? x : 32767) : 0;
+  const auto whole = static_cast<std::uint32_t>(limited);
+  return {whole, limited - whole};
+}
 
 // ---- raw integers: shared by all fixed formats
 // -------------------------------------------------------------------------
@@ -102,6 +119,11 @@ constexpr SineCosine<std::int32_t> sin_cos_of_phase(std::uint32_t phase) {
 constexpr SineCosine<std::int32_t> sin_cos(std::int32_t q, int bits) {
   constexpr std::int64_t inverse_two_pi = 1367130551;                                              // 2^33 / (2 pi)
   return sin_cos_of_phase(static_cast<std::uint32_t>(shift_right(q * inverse_two_pi, bits + 1)));  // wraps
+}
+
+/// Phase for sin_cos_of_phase() of an angle in turns with `bits` fractional bits: whole turns drop out by themselves.
+constexpr std::uint32_t phase_of_turns(std::int64_t turns, int bits) {
+  return static_cast<std::uint32_t>(shift_right(turns, bits - 32));
 }
 
 /// tanh(i / 32), 0 <= x <= 8, 30 bits.
@@ -194,6 +216,19 @@ constexpr std::int32_t magnitude(std::int32_t x) {
 /// sign(x) with 30 bits
 constexpr std::int32_t sign(std::int32_t x) { return ((x > 0) - (x < 0)) * (1 << 30); }
 
+/// What a limiter to [-limit, limit], limit >= 0, adds to x; masks stand for max(x - limit, 0) and min(x + limit, 0).
+constexpr std::int32_t clipping(std::int32_t x, std::int32_t limit) {
+  const std::int64_t over = std::int64_t{x} - limit, under = std::int64_t{x} + limit;
+  std::uint32_t ignored = 0;  // only x = -2^31 with limit 0 is outside
+  return saturate(-((over & ~(over >> 63)) + (under & (under >> 63))), ignored);
+}
+
+/// A count (count_bits) in parts, the rest with 30 bits; negative ones count as 0.
+constexpr WholeAndRest<std::int32_t> split_count(std::int32_t x) {
+  x &= ~(x >> 31);
+  return {static_cast<std::uint32_t>(x) >> count_bits, (x & ((1 << count_bits) - 1)) << (unit_bits - count_bits)};
+}
+
 }  // namespace raw
 
 // ---- fixed point
@@ -201,6 +236,11 @@ constexpr std::int32_t sign(std::int32_t x) { return ((x > 0) - (x < 0)) * (1 <<
 template <int bits>
 constexpr SineCosine<Fixed<unit_bits>> sin_cos(Fixed<bits> q) {
   const auto result = raw::sin_cos(q.raw, bits);
+  return {{result.sine}, {result.cosine}};
+}
+template <int bits>
+constexpr SineCosine<Fixed<unit_bits>> sin_cos_turns(Wide<bits> turns) {
+  const auto result = raw::sin_cos_of_phase(raw::phase_of_turns(turns.raw, bits));
   return {{result.sine}, {result.cosine}};
 }
 constexpr Fixed<unit_bits> tanh_of(Fixed<argument_bits> x) { return {raw::tanh(x.raw)}; }
@@ -213,6 +253,25 @@ constexpr Fixed<bits> magnitude(Fixed<bits> x) {
 template <int bits>
 constexpr Fixed<unit_bits> sign_of(Fixed<bits> x) {
   return {raw::sign(x.raw)};
+}
+template <int bits>
+constexpr Fixed<bits> clipping(Fixed<bits> x, Fixed<bits> limit) {
+  return {raw::clipping(x.raw, limit.raw)};
+}
+constexpr WholeAndRest<Fixed<unit_bits>> split_count(Fixed<count_bits> x) {
+  const auto parts = raw::split_count(x.raw);
+  return {parts.whole, {parts.rest}};
+}
+
+// ---- all number systems
+// ----------------------------------------------------------------------------------------------
+
+/// a + share (b - a), 0 <= share <= 1: never outside [a, b], so a state that is blended with values of its range keeps
+/// that range for ever.
+template <class N, class T>
+constexpr T blend(T a, T b, Unit<N> share) {
+  const auto rest = N::template proven_narrow<Unit<N>>(N::one() - share);
+  return N::template proven_narrow<T>(a * rest + b * share);
 }
 
 }  // namespace fxdyn

@@ -114,6 +114,10 @@ template <Kind kind>
 SineCosine<ObservedNumbers::Of<Quantity::unit>> sin_cos(Observed<kind> q) {
   return {{std::sin(q.value)}, {std::cos(q.value)}};
 }
+inline SineCosine<ObservedNumbers::Of<Quantity::unit>> sin_cos_turns(ObservedWide turns) {
+  const auto result = sin_cos_turns(turns.value);
+  return {{result.sine}, {result.cosine}};
+}
 inline ObservedNumbers::Of<Quantity::unit> tanh_of(ObservedNumbers::Of<Quantity::argument> x) {
   return {std::tanh(x.value)};
 }
@@ -130,6 +134,14 @@ Observed<kind> magnitude(Observed<kind> x) {
 template <Kind kind>
 ObservedNumbers::Of<Quantity::unit> sign_of(Observed<kind> x) {
   return {sign_of(x.value)};
+}
+template <Kind kind>
+Observed<kind> clipping(Observed<kind> x, Observed<kind> limit) {
+  return {clipping(x.value, limit.value)};
+}
+inline WholeAndRest<ObservedNumbers::Of<Quantity::unit>> split_count(ObservedNumbers::Of<Quantity::count> x) {
+  const auto parts = split_count(x.value);
+  return {parts.whole, {parts.rest}};
 }
 
 }  // namespace fxdyn

@@ -13,10 +13,9 @@ struct Dahl {
   Unit<N> z{};
 
   /// @param inverse_path tick / distance [s/rad | s/m]
-  constexpr Unit<N> step(Velocity<N> dq, InversePath<N> inverse_path, Saturations& saturations) {
+  constexpr Unit<N> step(Velocity<N> dq, InversePath<N> inverse_path, Saturations&) {
     const auto decay = exp_negative(N::template clamp<Argument<N>>(magnitude(dq) * inverse_path));
-    const auto rest = N::template narrow<Unit<N>>(N::one() - decay, saturations);
-    z = N::template narrow<Unit<N>>(z * decay + sign_of(dq) * rest, saturations);
+    z = blend<N>(sign_of(dq), z, decay);
     return z;
   }
 };

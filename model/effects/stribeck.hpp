@@ -18,10 +18,10 @@ struct Stribeck {
   static constexpr double stored_shape(std::size_t, double velocity, double) { return 1 / velocity; }
 
   template <class N, class Emit>
-  static constexpr void basis(const JointInput<N>& u, Words<N> words, NoState&, Saturations& saturations, Emit&& emit) {
+  static constexpr void basis(const JointInput<N>& u, Words<N> words, NoState&, Saturations&, Emit&& emit) {
     const auto ratio = N::template clamp<Argument<N>>(u.dq * words.template number<Quantity::inverse_velocity>(0));
     const auto bump = exp_negative(N::template clamp<Argument<N>>(ratio * ratio));
-    emit(as<Quantity::unit>, 0, N::template narrow<Unit<N>>(u.sign * bump, saturations));
+    emit(as<Quantity::unit>, 0, N::template proven_narrow<Unit<N>>(u.sign * bump));
   }
 };
 

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cmath>
+
+#include "model/effect.hpp"
+
+namespace fxdyn {
+
+/// Elastic gear, delta = compliance * load, load the structural torque behind a damper in parallel with the spring:
+/// K delta + B d(delta)/dt = structural, compliance = 1 / K, relaxation = B / K. Stepped exactly for a torque that is
+/// constant over the tick; starts in equilibrium. Paper Eq. 12 (its J_eff is the rotor_inertia effect). Acts on the
+/// position: the link is at q - delta. Link side of the gearbox, in its angle.
+struct Elasticity {
+  static constexpr std::string_view name = "elasticity";
+  static constexpr std::string_view equation = "delta = compliance load, load + relaxation d(load)/dt = structural";
+  static constexpr ActsOn acts_on = ActsOn::position;
+  static constexpr bool needs_structural = true;
+  static constexpr std::array shape{
+      ParameterInfo{"relaxation", "s", "s", 0, 1, Quantity::unit, "Han, Wu, Hui 2025, Eq. 12: B / K"}};
+  static constexpr std::array linear{ParameterInfo{"compliance", "rad/(N*m)", "m/N", 0, unbounded, Quantity::torque,
+                                                   "Han, Wu, Hui 2025, Eq. 12: 1 / K"}};
+  template <class N>
+  struct State {
+    Torque<N> load{};
+    bool started = false;
+  };
+  static double stored_shape(std::size_t, double relaxation, double tick_s) {
+    return relaxation > 0 ? -std::expm1(-tick_s / relaxation) : 1;
+  }
+
+  template <class N, class Emit>
+  static constexpr void basis(const JointInput<N>& u, Words<N> words, State<N>& state, Saturations&, Emit&& emit) {
+    const auto share = state.started ? words.template number<Quantity::unit>(0) : N::one();
+    state.started = true;
+    state.load = blend<N>(state.load, u.structural, share);
+    emit(as<Quantity::torque>, 0, state.load);
+  }
+};
+
+}  // namespace fxdyn
