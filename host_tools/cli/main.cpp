@@ -14,9 +14,21 @@ namespace {
 
 using namespace fxdyn;
 
+std::string_view name_of(ActsOn acts_on) {
+  switch (acts_on) {
+    case ActsOn::torque:
+      return "torque";
+    case ActsOn::position:
+      return "position";
+    case ActsOn::body:
+      return "body";
+  }
+  return "";
+}
+
 void print_effects(bool as_json) {
   nlohmann::json list = nlohmann::json::array();
-  Catalogue::for_each([&]<class E>() {
+  for (const EffectInfo& effect : effect_infos()) {
     nlohmann::json parameters = nlohmann::json::array();
     const auto add = [&](const auto& infos, const char* kind) {
       for (const ParameterInfo& p : infos) {
@@ -29,18 +41,23 @@ void print_effects(bool as_json) {
                               {"source", p.source}});
       }
     };
-    add(E::shape, "shape");
-    add(E::linear, "linear");
-    list.push_back({{"effect", E::name}, {"equation", E::equation}, {"side", "joint"}, {"parameters", parameters}});
-  });
+    add(effect.shape, "shape");
+    add(effect.linear, "linear");
+    list.push_back({{"effect", effect.name},
+                    {"equation", effect.equation},
+                    {"acts_on", name_of(effect.acts_on)},
+                    {"side", "joint"},
+                    {"parameters", parameters}});
+  }
   if (as_json) {
     fmt::print("{}\n", list.dump(1));
     return;
   }
   for (const auto& effect : list) {
-    fmt::print("{:<16} tau = {}\n", effect["effect"].get<std::string>(), effect["equation"].get<std::string>());
+    fmt::print("{:<20} {}{}\n", effect["effect"].get<std::string>(), effect["acts_on"] == "torque" ? "tau = " : "",
+               effect["equation"].get<std::string>());
     for (const auto& p : effect["parameters"]) {
-      fmt::print("{:<16}   {} [{}] ({})\n", "", p["name"].get<std::string>(), p["unit"].get<std::string>(),
+      fmt::print("{:<20}   {} [{}] ({})\n", "", p["name"].get<std::string>(), p["unit"].get<std::string>(),
                  p["source"].get<std::string>());
     }
   }

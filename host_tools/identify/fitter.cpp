@@ -175,14 +175,18 @@ std::vector<Fitter::Dependent> Fitter::dependent_effects() const {
     const Eigen::VectorXd scale = gram.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
     gram = scale.asDiagonal() * gram * scale.asDiagonal();
     const Eigen::Index p = gram.rows();
-    std::size_t effect = 0;
+    std::vector<std::size_t> effect_of;  // of each own column
+    for (const EffectFit& fit : design_[j].effects)
+      effect_of.insert(effect_of.end(), find_effect(fit.effect)->linear.size(),
+                       static_cast<std::size_t>(&fit - design_[j].effects.data()));
     for (Eigen::Index k = 0; k < p; ++k) {
       const double pivot = gram(k, k);
       const bool dependent = pivot < 1e-10;
-      if (k >= nb) {
-        // One linear parameter an effect so far; effects with more would be named by their first dependent one.
-        if (dependent) found.push_back({j, effect});
-        ++effect;
+      const auto own = static_cast<std::size_t>(k - nb);
+      if (k >= nb && dependent && own < effect_of.size()) {
+        const Dependent it{j, effect_of[own]};
+        const bool named = !found.empty() && found.back().joint == j && found.back().effect == it.effect;
+        if (!named) found.push_back(it);
       }
       if (dependent) continue;
       const Eigen::Index rest = p - k - 1;

@@ -68,8 +68,8 @@ Candidate search_effect(const Fitter& fitter, std::size_t joint, std::string_vie
   fit.shape.resize(info.shape.size());
   design.effects.push_back(fit);
   if (info.shape.empty()) return {design, fitter.held_out_with(joint, design, {0.0})[0]};
-  // Every shape of the catalogue so far is one velocity or one distance. Stribeck's is low by nature: a wide one is
-  // only a second viscous term.
+  // One velocity or one distance: why_not_identified() lets no other shapes through. Stribeck's is low by nature: a
+  // wide one is only a second viscous term.
   const bool velocity = info.shape[0].quantity == Quantity::inverse_velocity;
   const double from = velocity ? 3e-3 * scales.velocity : 1e-6 * scales.range;
   const double to = std::min(info.shape[0].upper, velocity ? 0.15 * scales.velocity : 0.1 * scales.range);
@@ -167,6 +167,11 @@ std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progres
   const std::vector<std::string_view> optional = project.identify.effects
                                                      ? std::vector<std::string_view>{}
                                                      : std::vector<std::string_view>{"presliding", "stribeck"};
+
+  for (const std::string& effect : nominal) {
+    if (const std::string reason = why_not_identified(*find_effect(effect)); !reason.empty())
+      throw InputError(fmt::format("{}: identify.effects: {}", project.file.string(), reason));
+  }
 
   const std::size_t n = project.robot.size();
   const DhChain chain = to_dh(project.robot);

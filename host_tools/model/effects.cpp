@@ -7,25 +7,42 @@
 namespace fxdyn {
 namespace {
 
-const std::vector<EffectInfo>& infos() {
-  static const std::vector<EffectInfo> list = [] {
-    std::vector<EffectInfo> all;
-    Catalogue::for_each([&]<class E>() { all.push_back({E::name, E::equation, E::shape, E::linear}); });
-    return all;
-  }();
-  return list;
+void check(const EffectInfo& effect, const JointSeries& series) {
+  const auto need = [&](bool needed, const auto& columns, std::string_view what) {
+    if (needed && columns.size() == 0)
+      throw InputError(fmt::format("effect '{}' needs {}, which is not known here", effect.name, what));
+  };
+  need(effect.needs_structural, series.structural, "the rigid-body torque");
+  need(effect.needs_total, series.total, "the torque of the effects before it");
+  need(effect.needs_peers, series.peers_dq, "the motion of the other joints");
 }
 
 template <class E>
 Eigen::MatrixXd columns_of(std::span<const double> shape, double sign_width, const JointSeries& series) {
+  check(*find_effect(E::name), series);
   std::vector<double> words;
   for (std::size_t i = 0; i < E::shape.size(); ++i) words.push_back(E::stored_shape(i, shape[i], series.step_s));
+  if constexpr (std::is_same_v<E, Delay>) {
+    if (words[0] > Delay::largest) {
+      throw InputError(fmt::format("delay of {} s: at most {} steps of {} s", shape[0], Delay::largest, series.step_s));
+    }
+  }
   typename E::template State<Real> state{};
   Saturations saturations;
   Eigen::MatrixXd columns(series.q.size(), static_cast<Eigen::Index>(E::linear.size()));
+  std::vector<JointInput<Real>> peers(static_cast<std::size_t>(series.peers_dq.cols()));
   for (Eigen::Index k = 0; k < series.q.size(); ++k) {
-    const JointInput<Real> u{series.q[k], series.dq[k], series.ddq[k], tanh_of(series.dq[k] / sign_width),
-                             series.structural.size() > 0 ? series.structural[k] : 0.0};
+    for (std::size_t i = 0; i < peers.size(); ++i) {
+      peers[i].dq = series.peers_dq(k, static_cast<Eigen::Index>(i));
+      peers[i].sign = series.peers_sign(k, static_cast<Eigen::Index>(i));
+    }
+    const JointInput<Real> u{series.q[k],
+                             series.dq[k],
+                             series.ddq[k],
+                             tanh_of(series.dq[k] / sign_width),
+                             series.structural.size() > 0 ? series.structural[k] : 0.0,
+                             series.total.size() > 0 ? series.total[k] : 0.0,
+                             peers};
     E::template basis<Real>(u, Words<Real>{words.data()}, state, saturations,
                             [&](auto, std::size_t i, double phi) { columns(k, static_cast<Eigen::Index>(i)) = phi; });
   }
@@ -34,8 +51,22 @@ Eigen::MatrixXd columns_of(std::span<const double> shape, double sign_width, con
 
 }  // namespace
 
+const std::vector<EffectInfo>& effect_infos() {
+  static const std::vector<EffectInfo> list = [] {
+    std::vector<EffectInfo> all;
+    const auto add = [&]<class E>() {
+      all.push_back(
+          {E::name, E::equation, E::shape, E::linear, acts_on<E>, needs_structural<E>, needs_total<E>, needs_peers<E>});
+    };
+    Catalogue::for_each(add);
+    BodyEffects::for_each(add);
+    return all;
+  }();
+  return list;
+}
+
 const EffectInfo* find_effect(std::string_view name) {
-  for (const EffectInfo& info : infos()) {
+  for (const EffectInfo& info : effect_infos()) {
     if (info.name == name) return &info;
   }
   return nullptr;
@@ -43,8 +74,37 @@ const EffectInfo* find_effect(std::string_view name) {
 
 std::vector<std::string_view> effect_names() {
   std::vector<std::string_view> names;
-  for (const EffectInfo& info : infos()) names.push_back(info.name);
+  for (const EffectInfo& info : effect_infos()) names.push_back(info.name);
   return names;
+}
+
+std::vector<std::string_view> joint_effect_names() {
+  std::vector<std::string_view> names = effect_names();
+  names.resize(Catalogue::size);
+  return names;
+}
+
+std::string why_not_in_model(const EffectInfo& info) {
+  const auto reason = [&](std::string_view what) {
+    return fmt::format("effect '{}' {}: models with such effects are not built yet", info.name, what);
+  };
+  if (info.acts_on == ActsOn::body) return reason("acts on the rigid body");
+  if (info.acts_on == ActsOn::position) return reason("acts on the joint's position");
+  if (info.needs_total) return reason("needs the torque of the effects before it");
+  if (info.needs_peers) return reason("needs the motion of the other joints");
+  return {};
+}
+
+std::string why_not_identified(const EffectInfo& info) {
+  if (std::string reason = why_not_in_model(info); !reason.empty()) return reason;
+  if (info.needs_structural)
+    return fmt::format("effect '{}' needs the rigid-body torque before it is fitted: not built yet", info.name);
+  // The search of shapes knows the scales of velocities and distances.
+  for (const ParameterInfo& shape : info.shape) {
+    if (shape.quantity == Quantity::inverse_velocity || shape.quantity == Quantity::inverse_path) continue;
+    return fmt::format("effect '{}': the search of its {} is not built yet", info.name, shape.name);
+  }
+  return {};
 }
 
 Eigen::MatrixXd effect_columns(std::string_view effect, std::span<const double> shape, double sign_width,

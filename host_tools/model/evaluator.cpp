@@ -1,6 +1,7 @@
 #include "host_tools/model/evaluator.hpp"
 
 #include "host_tools/error.hpp"
+#include "host_tools/model/effects.hpp"
 
 #include <fmt/format.h>
 
@@ -60,6 +61,9 @@ Evaluator<N>::Evaluator(const IdentifiedModel& model, double tick_s) {
 
 template <class N>
 void Evaluator<N>::add_effect(std::size_t joint, const EffectFit& fit, double tick_s) {
+  if (const EffectInfo* info = find_effect(fit.effect)) {
+    if (const std::string reason = why_not_in_model(*info); !reason.empty()) throw InputError(reason);
+  }
   bool found = false;
   Catalogue::for_each([&]<class E>() {
     if (E::name != fit.effect) return;

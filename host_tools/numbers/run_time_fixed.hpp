@@ -156,6 +156,10 @@ SineCosine<RunTimeNumbers::Of<Quantity::unit>> sin_cos(RunTimeFixed<kind> q) {
   const auto result = raw::sin_cos(q.raw, q.bits());
   return {{result.sine}, {result.cosine}};
 }
+inline SineCosine<RunTimeNumbers::Of<Quantity::unit>> sin_cos_turns(RunTimeWide turns) {
+  const auto result = raw::sin_cos_of_phase(raw::phase_of_turns(turns.raw, turns.bits));
+  return {{result.sine}, {result.cosine}};
+}
 inline RunTimeNumbers::Of<Quantity::unit> tanh_of(RunTimeNumbers::Of<Quantity::argument> x) {
   return {raw::tanh(x.raw)};
 }
@@ -172,6 +176,14 @@ RunTimeFixed<kind> magnitude(RunTimeFixed<kind> x) {
 template <Kind kind>
 RunTimeNumbers::Of<Quantity::unit> sign_of(RunTimeFixed<kind> x) {
   return {raw::sign(x.raw)};
+}
+template <Kind kind>
+RunTimeFixed<kind> clipping(RunTimeFixed<kind> x, RunTimeFixed<kind> limit) {
+  return {raw::clipping(x.raw, limit.raw)};
+}
+inline WholeAndRest<RunTimeNumbers::Of<Quantity::unit>> split_count(RunTimeNumbers::Of<Quantity::count> x) {
+  const auto parts = raw::split_count(x.raw);
+  return {parts.whole, {parts.rest}};
 }
 
 /// The nearest fixed-point number with `bits` fractional bits; saturates.

@@ -43,11 +43,13 @@ struct Scenario {
 
 void read_effect(Table table, Scenario& scenario) {
   toml_input::Names known;
-  for (const std::string_view name : effect_names()) known.emplace_back(name);
+  for (const std::string_view effect : effect_names()) known.emplace_back(effect);
   EffectFit fit;
-  fit.effect = table.need("name", "one of the catalogue, see `fxdyn effects`").name(known, "effect");
+  const Value name = table.need("name", "one of the catalogue, see `fxdyn effects`");
+  fit.effect = name.name(known, "effect");
   fit.named = true;
   const EffectInfo& info = *find_effect(fit.effect);
+  if (const std::string reason = why_not_in_model(info); !reason.empty()) name.place().fail(reason);
   const Value joint_value = table.need("joint", "1 for the first moving joint");
   const auto joint = static_cast<std::size_t>(joint_value.integer(1));
   if (joint > scenario.plant.robot.size()) {

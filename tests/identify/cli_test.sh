@@ -88,6 +88,18 @@ expect 2 "not built yet" train "$work/state.toml" --out "$work/out"
 project rls.toml '[identify]' 'method = "rls"' '[[log]]' 'file = "good.csv"' 'role = "train"'
 run 2 "rls" rls.toml
 
+# Effects that a stage can't handle are refused by name; the list shows them all.
+for effect in ripple load_friction torque_gain joint_coupling elasticity payload; do
+  project effect.toml '[identify]' "effects = [\"viscous\", \"$effect\"]" '[[log]]' 'file = "good.csv"' 'role = "train"'
+  run 2 "$effect" effect.toml
+done
+for acts_on in torque position body; do
+  if ! "$fxdyn" effects --json | grep -q "\"acts_on\": \"$acts_on\""; then
+    echo "FAILED: fxdyn effects --json shows no effect on $acts_on"
+    failures=$((failures + 1))
+  fi
+done
+
 echo '{"schema": "fxdyn.model/1"}' >"$work/model.json"
 expect 2 "model.json" predict --model "$work/model.json" --log "$work/good.csv" --out "$work/out"
 mkdir "$work/apart" && cp "$work/good.csv" "$work/apart"

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -37,6 +38,37 @@ TEST(Math, SineAndCosineKeepTheStatedError) {
       ASSERT_NEAR(value(result.sine, 30), std::sin(value(q, bits)), bound) << q;
       ASSERT_NEAR(value(result.cosine, 30), std::cos(value(q, bits)), bound) << q;
     }
+  }
+}
+
+TEST(Math, TurnsWrapExactly) {
+  // 2^-40 turns a step, over +-2^23 turns: whole turns must drop out without loss.
+  Random random(8);
+  for (int i = 0; i < 100'000; ++i) {
+    const auto turns = static_cast<std::int64_t>(random.next());
+    const auto result = sin_cos_turns(Wide<40>{turns});
+    const double part = std::ldexp(static_cast<double>(turns & ((std::int64_t{1} << 40) - 1)), -40);
+    ASSERT_NEAR(value(result.sine.raw, 30), std::sin(2 * raw::pi * part), 3e-9) << turns;
+    ASSERT_NEAR(value(result.cosine.raw, 30), std::cos(2 * raw::pi * part), 3e-9) << turns;
+  }
+}
+
+TEST(Math, ClippingIsWhatALimiterAdds) {
+  for (const std::int32_t x : samples()) {
+    for (const std::int32_t limit : {0, 1, 1 << 20, INT32_MAX}) {
+      const std::int64_t expected = std::clamp<std::int64_t>(x, -std::int64_t{limit}, limit) - x;
+      ASSERT_EQ(raw::clipping(x, limit), std::min<std::int64_t>(expected, INT32_MAX)) << x;
+    }
+  }
+}
+
+TEST(Math, CountsSplitIntoWholeAndRest) {
+  for (const std::int32_t x : samples()) {
+    const auto fixed = raw::split_count(x);
+    const auto real = split_count(value(x, count_bits));
+    ASSERT_EQ(fixed.whole, real.whole) << x;
+    ASSERT_LT(fixed.rest, 1 << 30) << x;
+    ASSERT_EQ(value(fixed.rest, 30), x < 32767 << 16 ? real.rest : value(fixed.rest, 30)) << x;
   }
 }
 

@@ -1,0 +1,238 @@
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <string_view>
+#include <vector>
+
+#include "host_tools/model/effects.hpp"
+#include "host_tools/numbers/run_time_fixed.hpp"
+
+// Every effect in the firmware's fixed point against double, both fed with the same quantised inputs and parameters, so
+// that the difference is the arithmetic's alone: over random inputs and at the corners of the limits. The same code
+// with formats of run time gives the same bits.
+
+namespace fxdyn {
+namespace {
+
+constexpr double step_s = 0.002;
+
+// Limits of the inputs, and formats that hold them and what follows from them.
+constexpr double q_limit = 3.2, dq_limit = 15, ddq_limit = 130, tau_limit = 250;
+constexpr double sign_limit = 0.99999977;  // tanh(8), where the fixed-point tanh ends
+struct TestFormats {
+  static constexpr int position = 28;      // +-8
+  static constexpr int velocity = 26;      // +-32
+  static constexpr int acceleration = 22;  // +-512
+  static constexpr int linear_acceleration = 24;
+  static constexpr int length = 28;
+  static constexpr int force = 20;
+  static constexpr int torque = 22;            // +-512: differences of two torques
+  static constexpr int inverse_velocity = 18;  // +-8192
+  static constexpr int inverse_path = 22;      // +-512
+  static constexpr int weight = 24;
+  static constexpr int velocity_squared = 22;  // +-512
+  static constexpr int velocity_cubed = 19;    // +-4096
+  static constexpr int inverse_position = 22;  // +-512
+  static constexpr int inverse_torque = 20;    // +-2048
+  static constexpr int force_sum = 44;
+  static constexpr int torque_sum = 44;
+};
+using Fixed32 = FixedNumbers<TestFormats>;
+
+Formats run_time_formats() {
+  Formats formats;
+  for (std::size_t i = 0; i < quantity_count; ++i) formats.quantity[i] = Fixed32::bits(static_cast<Quantity>(i));
+  formats.force_sum = TestFormats::force_sum;
+  formats.torque_sum = TestFormats::torque_sum;
+  return formats;
+}
+
+constexpr double lsb(Quantity quantity) {
+  return 1.0 / static_cast<double>(std::int64_t{1} << Fixed32::bits(quantity));
+}
+
+/// Range of each shape parameter for the test, and the largest error of each phi.
+struct Case {
+  std::string_view effect;
+  std::array<double, 2> shape;
+  std::array<double, 2> tolerance;
+};
+constexpr double exact = 0, torque = lsb(Quantity::torque);
+constexpr std::array cases{
+    Case{"viscous", {}, {exact}},
+    Case{"coulomb", {}, {exact}},
+    Case{"offset", {}, {exact}},
+    Case{"rotor_inertia", {}, {exact}},
+    Case{"stribeck", {0.02, 10}, {3e-7}},      // exp ends at exp(-16)
+    Case{"presliding", {1e-5, 0.03}, {3e-7}},  // the same, and rounding of the state
+    Case{"asymmetric_friction", {}, {exact, exact}},
+    Case{"viscous_quadratic", {}, {0.51 * lsb(Quantity::velocity_squared)}},
+    Case{"viscous_cubic", {}, {0.51 * (dq_limit * lsb(Quantity::velocity_squared) + lsb(Quantity::velocity_cubed))}},
+    Case{"load_friction", {}, {0.51 * torque}},
+    Case{"torque_gain", {}, {exact}},
+    Case{"ripple", {0.5, 3000}, {4e-9, 4e-9}},
+    Case{"spring", {}, {exact, exact}},
+    Case{"gravity_compensator", {}, {8e-9, 8e-9}},
+    Case{"friction_drift", {0.1, 1000}, {2e-7, 15 * 2e-7}},
+    Case{"saturation", {0, 250}, {exact}},
+    Case{"joint_coupling", {1, 4}, {exact, exact}},  // one more than there are
+    Case{"delay", {0, 0.03}, {0.51 * torque}},
+    Case{"elasticity", {0, 0.1}, {26 * torque}},  // half a unit for each tick that the low-pass remembers
+    Case{"backlash", {1e-3, 100}, {1.6e-6}},
+    Case{"eccentricity", {}, {8e-9, 8e-9}},
+};
+
+const Case& case_of(std::string_view effect) {
+  for (const Case& c : cases) {
+    if (c.effect == effect) return c;
+  }
+  ADD_FAILURE() << "no tolerance for " << effect;
+  return cases[0];
+}
+
+/// Shares of the limits, [-1, 1].
+struct Tick {
+  double q, dq, ddq, sign, structural, total;
+};
+
+template <class N, Quantity quantity>
+auto number(double value) {
+  const std::int32_t raw = to_raw(value, Fixed32::bits(quantity));
+  if constexpr (std::is_same_v<N, Real>) {
+    return from_raw(raw, Fixed32::bits(quantity));
+  } else {
+    return N::template load<typename N::template Of<quantity>>(raw);
+  }
+}
+
+template <class N>
+JointInput<N> input(const Tick& t) {
+  using Q = Quantity;
+  return {number<N, Q::position>(t.q * q_limit),          number<N, Q::velocity>(t.dq * dq_limit),
+          number<N, Q::acceleration>(t.ddq * ddq_limit),  number<N, Q::unit>(t.sign * sign_limit),
+          number<N, Q::torque>(t.structural * tau_limit), number<N, Q::torque>(t.total * tau_limit)};
+}
+
+/// phi of all ticks as doubles, one after the other.
+template <class E, class N>
+std::vector<double> run(const std::vector<Tick>& ticks, double shape) {
+  std::vector<typename N::Word> words;
+  for (std::size_t i = 0; i < E::shape.size(); ++i) {
+    const std::int32_t raw = to_raw(E::stored_shape(i, shape, step_s), Fixed32::bits(E::shape[i].quantity));
+    if constexpr (std::is_same_v<N, Real>) {
+      words.push_back(from_raw(raw, Fixed32::bits(E::shape[i].quantity)));
+    } else {
+      words.push_back(raw);
+    }
+  }
+  typename E::template State<N> state{};
+  Saturations saturations;
+  std::vector<double> out;
+  for (const Tick& t : ticks) {
+    const std::array peers{input<N>({t.q, t.total, t.q, t.structural, 0, 0}), input<N>({t.q, t.ddq, t.q, t.q, 0, 0}),
+                           input<N>(t)};
+    JointInput<N> u = input<N>(t);
+    u.peers = peers;
+    E::template basis<N>(u, Words<N>{words.data()}, state, saturations, [&](auto tag, std::size_t, auto phi) {
+      if constexpr (std::is_same_v<N, Real>) {
+        out.push_back(phi);
+      } else {
+        static_assert(std::is_same_v<decltype(phi), typename N::template Of<decltype(tag)::value>>);
+        out.push_back(from_raw(phi.raw, Fixed32::bits(decltype(tag)::value)));
+      }
+    });
+  }
+  EXPECT_EQ(saturations.count, 0U) << E::name;
+  return out;
+}
+
+struct Powers {
+  double signal = 0, error = 0;
+};
+
+/// Compares the three; returns what is wrong, or nothing.
+template <class E>
+std::string compare(const std::vector<Tick>& ticks, double shape, Powers* powers = nullptr) {
+  const Formats formats = run_time_formats();
+  const FormatScope scope(formats);
+  const std::vector<double> real = run<E, Real>(ticks, shape), fixed = run<E, Fixed32>(ticks, shape);
+  if (run<E, RunTimeNumbers>(ticks, shape) != fixed) return fmt::format("{}: formats of run time differ", E::name);
+  const Case& c = case_of(E::name);
+  for (std::size_t i = 0; i < real.size(); ++i) {
+    const double error = fixed[i] - real[i];
+    if (powers != nullptr) {
+      powers->signal += real[i] * real[i];
+      powers->error += error * error;
+    }
+    if (!(std::fabs(error) <= c.tolerance[i % E::linear.size()])) {
+      return fmt::format("{} with shape {}: phi {} is {} off from {} at tick {}", E::name, shape,
+                         i % E::linear.size() + 1, error, real[i], i / E::linear.size());
+    }
+  }
+  return {};
+}
+
+/// A shape parameter at a share of its range, geometric where that spans decades.
+double shape_at(const Case& c, double share) {
+  if (c.shape[0] > 0 && c.effect != "joint_coupling") return c.shape[0] * std::pow(c.shape[1] / c.shape[0], share);
+  const double value = c.shape[0] + share * (c.shape[1] - c.shape[0]);
+  return c.effect == "joint_coupling" ? std::round(value) : value;
+}
+
+RC_GTEST_PROP(EffectsFixed, EveryEffectFollowsDoubleOverItsLimits, ()) {
+  constexpr std::size_t ticks = 60, fields = 6;
+  constexpr int one = 10000;
+  const auto values = *rc::gen::container<std::vector<int>>(
+      ticks * fields, rc::gen::resize(rc::kNominalSize, rc::gen::inRange(-one, one + 1)));
+  const double share = *rc::gen::inRange(0, one + 1) / static_cast<double>(one);
+  std::vector<Tick> list;
+  for (std::size_t k = 0; k < ticks; ++k) {
+    const auto at = [&](std::size_t i) { return values[k * fields + i] / static_cast<double>(one); };
+    list.push_back({at(0), at(1), at(2), at(3), at(4), at(5)});
+  }
+  Catalogue::for_each([&]<class E>() {
+    const std::string wrong = compare<E>(list, shape_at(case_of(E::name), share));
+    if (!wrong.empty()) RC_FAIL(wrong);
+  });
+}
+
+TEST(EffectsFixed, EveryEffectFollowsDoubleAtTheCorners) {
+  // All combinations of -1, 0, 1, in two orders: neighbours alike, and far jumps.
+  std::vector<Tick> list;
+  for (const int stride : {1, 376}) {
+    for (int k = 0; k < 729; ++k) {
+      int code = k * stride % 729;
+      std::array<double, 6> x{};
+      for (double& value : x) {
+        value = code % 3 - 1;
+        code /= 3;
+      }
+      list.push_back({x[0], x[1], x[2], x[3], x[4], x[5]});
+    }
+  }
+  Catalogue::for_each([&]<class E>() {
+    for (const double share : {0.0, 0.5, 1.0}) {
+      EXPECT_EQ(compare<E>(list, shape_at(case_of(E::name), share)), "");
+    }
+  });
+}
+
+TEST(EffectsFixed, SignalToNoise) {
+  std::vector<Tick> list;
+  for (int k = 0; k < 3000; ++k) {  // smooth motion, the torque lags behind
+    const double t = step_s * k;
+    list.push_back({std::sin(3 * t), std::cos(3 * t), -std::sin(3 * t), std::tanh(50 * std::cos(3 * t)),
+                    std::sin(2 * t + 1), std::sin(2 * t + 1.2)});
+  }
+  Catalogue::for_each([&]<class E>() {
+    Powers powers;
+    EXPECT_EQ(compare<E>(list, shape_at(case_of(E::name), 0.4), &powers), "");
+    EXPECT_GT(powers.signal, 3e10 * powers.error) << E::name;  // 105 dB; stribeck's exp(-16) is the least
+  });
+}
+
+}  // namespace
+}  // namespace fxdyn
