@@ -49,7 +49,8 @@ class DriveNode {
 
  private:
   static constexpr std::size_t joints = Model::joints;
-  static constexpr std::size_t largest_reply = std::max(serial::torque_words(joints), serial::identity_words);
+  static constexpr std::size_t outputs = Model::outputs;
+  static constexpr std::size_t largest_reply = std::max(serial::torque_words(outputs), serial::identity_words);
 
   void handle() {
     switch (frame_.type) {
@@ -59,7 +60,7 @@ class DriveNode {
             std::array{serial::protocol_version, static_cast<std::uint32_t>(joints), tables_.layout_hash, tables_.crc32,
                        static_cast<std::uint32_t>(tables_.valid ? serial::NodeState::ready
                                                                 : serial::NodeState::tables_invalid),
-                       reader_.corrupt_frames()});
+                       reader_.corrupt_frames(), Model::outputs_mask});
       case serial::Type::reset:
         state_ = {};
         return reply(serial::Type::reset_done, std::array<std::uint32_t, 0>{});
@@ -75,25 +76,27 @@ class DriveNode {
   void tick() {
     const auto value = [&](std::size_t i) { return static_cast<std::int32_t>(frame_.words[1 + i]); };
     for (std::size_t j = 0; j < joints; ++j) {
-      inputs_[j].q.raw = value(3 * j);
-      inputs_[j].dq.raw = value(3 * j + 1);
-      inputs_[j].ddq.raw = value(3 * j + 2);
+      const auto i = static_cast<int>(j);
+      setpoints_.q[i].raw = value(3 * j);
+      setpoints_.dq[i].raw = value(3 * j + 1);
+      setpoints_.ddq[i].raw = value(3 * j + 2);
     }
     saturations_ = {};
     counter_.start();
     compute();
     const std::uint32_t cycles = counter_.stop() - empty_measurement_;
 
-    std::array<std::uint32_t, serial::torque_words(joints)> words;
+    std::array<std::uint32_t, serial::torque_words(outputs)> words;
     words[0] = frame_.words[0];
-    for (std::size_t j = 0; j < joints; ++j) words[1 + j] = static_cast<std::uint32_t>(torques_[j].raw);
-    words[1 + joints] = saturations_.count;
-    words[2 + joints] = cycles;
+    for (std::size_t j = 0; j < outputs; ++j)
+      words[1 + j] = static_cast<std::uint32_t>(torques_[static_cast<int>(j)].raw);
+    words[1 + outputs] = saturations_.count;
+    words[2 + outputs] = cycles;
     reply(serial::Type::torque, words);
   }
 
   /// A function of its own, from members to members, so that no part of the tick can leave the measured stretch.
-  [[gnu::noinline]] void compute() { torques_ = Model::tick(parameters_, state_, inputs_, saturations_); }
+  [[gnu::noinline]] void compute() { torques_ = Model::tick(parameters_, state_, setpoints_, saturations_); }
 
   void refuse(serial::Refusal reason) {
     reply(serial::Type::refused,
@@ -118,7 +121,7 @@ class DriveNode {
   std::uint32_t empty_measurement_ = 0;
 
   typename Model::State state_{};
-  typename Model::Inputs inputs_{};
+  typename Model::Setpoints setpoints_{};
   typename Model::Torques torques_{};
   Saturations saturations_{};
 

@@ -13,7 +13,7 @@
 //
 //   host -> node                             node -> host
 //   hello   -                                identity  Identity's members in their order
-//   tick    sequence, (q, dq, ddq) x joints  torque    sequence, tau x joints, saturations, cycles
+//   tick    sequence, (q, dq, ddq) x joints  torque    sequence, tau x outputs, saturations, cycles
 //   reset   -                                reset     -
 //                                            refused   sequence (0 if none), Refusal
 // Numbers are the model's raw fixed-point integers. A frame that fails its CRC is dropped and counted, never answered.
@@ -45,12 +45,13 @@ struct Identity {
   std::uint32_t tables_crc = 0;
   NodeState state = NodeState::ready;
   std::uint32_t corrupt_frames = 0;  ///< since start-up
+  std::uint32_t outputs = 0;         ///< bit i: the node puts out the torque of joint i+1
 };
-inline constexpr std::size_t identity_words = 6;
+inline constexpr std::size_t identity_words = 7;
 
 /// Payload words of a tick and of its reply.
 constexpr std::size_t tick_words(std::size_t joints) { return 1 + 3 * joints; }
-constexpr std::size_t torque_words(std::size_t joints) { return 3 + joints; }
+constexpr std::size_t torque_words(std::size_t outputs) { return 3 + outputs; }
 constexpr std::size_t frame_bytes(std::size_t payload_words) { return 4 * (payload_words + 2); }
 
 namespace detail {

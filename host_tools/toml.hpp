@@ -77,6 +77,7 @@ class Value {
     if (!node_.is_boolean()) place_.fail("expected true or false");
     return *node_.value<bool>();
   }
+  bool is_string() const { return node_.is_string(); }
   std::string string() const {
     if (!node_.is_string()) place_.fail("expected a string in quotes");
     return *node_.value<std::string>();

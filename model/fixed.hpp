@@ -123,6 +123,8 @@ constexpr auto square(const T& x) {
   return x * x;
 }
 
+constexpr double align(double x, double) { return x; }
+
 /// x, exactly, in the finer format of `like`: what it takes to add numbers of different formats. A coarser target
 /// does not compile.
 template <int bits, int like>

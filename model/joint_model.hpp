@@ -34,7 +34,6 @@ struct JointConstants {
   InverseVelocity<N> inverse_width{};  ///< 1 / width of the Coulomb sign [s/rad | s/m]
 };
 
-namespace detail {
 /// x within [lower, upper]; counts when it was not.
 template <class T>
 constexpr T limit(T x, T lower, T upper, Saturations& saturations) {
@@ -44,14 +43,13 @@ constexpr T limit(T x, T lower, T upper, Saturations& saturations) {
   saturations.count += static_cast<std::uint32_t>(below) + static_cast<std::uint32_t>(above);
   return above ? upper : raised;
 }
-}  // namespace detail
 
 template <class N>
 constexpr JointState<N> limit_setpoint(const JointState<N>& state, const JointLimits<N>& limits,
                                        Saturations& saturations) {
-  return {detail::limit(state.q, limits.q_lower, limits.q_upper, saturations),
-          detail::limit(state.dq, limits.dq_lower, limits.dq_upper, saturations),
-          detail::limit(state.ddq, limits.ddq_lower, limits.ddq_upper, saturations)};
+  return {limit(state.q, limits.q_lower, limits.q_upper, saturations),
+          limit(state.dq, limits.dq_lower, limits.dq_upper, saturations),
+          limit(state.ddq, limits.ddq_lower, limits.ddq_upper, saturations)};
 }
 
 /// The input of a joint's effects, without torques and peers.
@@ -93,8 +91,14 @@ template <class N>
 constexpr Torque<N> joint_feedforward(Torque<N> structural, typename N::TorqueSum effects, const JointLimits<N>& limits,
                                       Saturations& saturations) {
   const auto sum = align(structural, N::no_torque()) + effects;
-  return detail::limit(N::template narrow<Torque<N>>(sum, saturations), limits.tau_lower, limits.tau_upper,
+  return limit(N::template narrow<Torque<N>>(sum, saturations), limits.tau_lower, limits.tau_upper,
                        saturations);
+}
+
+/// Structural torque plus the effects so far, what `needs_total` asks for.
+template <class N>
+constexpr Torque<N> running_total(Torque<N> structural, typename N::TorqueSum effects) {
+  return N::template proven_narrow<Torque<N>>(align(structural, N::no_torque()) + effects);
 }
 
 /// One joint of a robot: its link's shape and its effects in the order of their words in the tables; effects that need
@@ -143,7 +147,7 @@ struct JointModel {
                             Saturations& saturations) {
     if constexpr (acts_on<E> == what) {
       if constexpr (needs_total<E>)
-        u.total = N::template proven_narrow<Torque<N>>(align(u.structural, N::no_torque()) + total);
+        u.total = running_total<N>(u.structural, total);
       total = total + contribution<E, N>(u, Words<N>{data}, state, saturations);
     }
     data += words_of<E>;

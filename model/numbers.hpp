@@ -49,7 +49,7 @@ struct Real {
   }
   static constexpr TorqueSum no_torque() { return 0; }
   static constexpr DeflectionSum no_deflection() { return 0; }
-  static constexpr double feature(double x) { return x; }
+  static constexpr double feature(double x) { return x < -1 ? -1 : (x > 1 ? 1 : x); }
   static double activation(double x) { return std::tanh(x); }
   static constexpr double node_coefficient(double word, int) { return word; }
   static constexpr double one() { return 1; }
@@ -82,8 +82,6 @@ struct Real {
     return x;
   }
 };
-
-constexpr double align(double x, double) { return x; }
 
 /// Fixed point with formats known at compile time. `Formats` is a generated struct of static constexpr int: one
 /// member per name in `quantity_names` without common_bits(), `force_sum` (fractional bits of the sums that give

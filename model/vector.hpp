@@ -1,5 +1,7 @@
 #pragma once
 
+#include "model/fixed.hpp"
+
 namespace fxdyn {
 
 /// What a number system may know of a vector beyond its components: nothing, for numbers that are just computed with.

@@ -21,32 +21,43 @@ TickStates at_ticks(const ProcessedLog& log, double tick_s, bool whole = false);
 /// Seeded disturbance of every state: noise of 1 % of the limits, and now and then a value far beyond them.
 TickStates perturbed(const TickStates& states, const IdentifiedModel& model, std::uint64_t seed);
 
+/// Seeded states within the joint limits: random positions, velocities and accelerations at their limits every other
+/// time, now and then one joint that creeps.
+TickStates within_limits(const IdentifiedModel& model, Eigen::Index count, std::uint64_t seed);
+
 /// The same states as raw words of the wire: q1 dq1 ddq1 q2 .. per tick.
 std::vector<std::int32_t> raw_states(const TickStates& states, Eigen::Index tick, const Formats& formats);
 
 /// The model in the fixed point of the firmware.
 class FixedModel {
  public:
-  FixedModel(const IdentifiedModel& model, const Formats& formats);
+  /// @param outputs bit i: the drive puts out the torque of joint i+1
+  FixedModel(const IdentifiedModel& model, const Formats& formats, std::uint32_t outputs);
+  FixedModel(const IdentifiedModel& model, const Formats& formats)
+      : FixedModel(model, formats, (1U << model.joints.size()) - 1) {}
   const Formats& formats() const { return formats_; }
+  /// Indices of the joints whose torques tick() gives.
+  const std::vector<std::size_t>& outputs() const { return output_joints_; }
   void reset() { evaluator_.reset(); }
   /// One tick: raw states in (see raw_states), raw torques out.
   std::vector<std::int32_t> tick(const std::vector<std::int32_t>& states, Saturations& saturations);
   /// The parameter words of the tables, and the layout that they have.
   std::vector<std::int32_t> words() const;
   std::uint32_t layout_hash() const;
+  std::uint32_t crc() const;
 
  private:
   Formats formats_;
   const IdentifiedModel model_;
+  std::uint32_t outputs_;
+  std::vector<std::size_t> output_joints_;
   Evaluator<RunTimeNumbers> evaluator_;
 };
 
-/// Chooses the formats: ranges observed when the model runs over the given states and over 4000 random states within
-/// the joint limits, with a factor of two in reserve; 64-bit sums bounded by the sum of the magnitudes of their terms.
-/// Not a proof: whatever exceeds a number's format saturates and is counted.
+/// Chooses the formats from ranges that interval arithmetic proves over the joint limits (proof.hpp), so that no
+/// narrowing overflows; 64-bit sums are bounded by the sum of the magnitudes of their terms.
 /// @throws DataError where the joints' parameters are too far apart in size for common sums.
-Formats choose_formats(const IdentifiedModel& model, const std::vector<TickStates>& states);
+Formats choose_formats(const IdentifiedModel& model);
 
 /// |fixed - double| of each joint over the states [N*m | N], both fed with the same quantised states.
 struct QuantisationError {
@@ -59,8 +70,10 @@ QuantisationError quantisation_error(const IdentifiedModel& model, const Formats
 /// Torques of the fixed-point model over a log at its own states, samples x joints [N*m | N].
 Eigen::MatrixXd predict_fixed(const IdentifiedModel& model, const Formats& formats, const TickStates& states);
 
-/// Writes tables.hpp and tables.bin; returns the CRC-32 of the parameters.
+/// Writes tables.hpp and tables.bin for a drive that puts out the torques of the joints in `outputs` (bit i: joint i+1);
+/// returns the CRC-32 of the parameters. `proven`: bound of |fixed - double| of each joint.
 std::uint32_t write_tables(const IdentifiedModel& model, const Formats& formats, const QuantisationError& error,
+                           const Eigen::VectorXd& proven, std::uint32_t outputs,
                            const std::filesystem::path& directory);
 
 }  // namespace fxdyn

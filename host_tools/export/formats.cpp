@@ -4,6 +4,7 @@
 
 #include "host_tools/error.hpp"
 #include "host_tools/export/export.hpp"
+#include "host_tools/export/proof.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/random.hpp"
 
@@ -17,54 +18,22 @@ int fitting_bits(double range, int width) {
   return width - static_cast<int>(std::ceil(std::log2(std::max(range, 1e-9))));
 }
 
-Ranges observe(const IdentifiedModel& model, const std::vector<TickStates>& states) {
-  Ranges ranges;
-  current_ranges = &ranges;
-  Evaluator<ObservedNumbers> evaluator(model, model.tick_s);
-  const std::size_t n = model.robot.size();
-  std::vector<JointState<ObservedNumbers>> state(n);
-  Saturations ignored;
-  for (const TickStates& log : states) {
-    evaluator.reset();
-    for (Eigen::Index k = 0; k < log.t.size(); ++k) {
-      for (std::size_t j = 0; j < n; ++j) {
-        const auto c = static_cast<Eigen::Index>(j);
-        state[j] = {{log.q(k, c)}, {log.dq(k, c)}, {log.ddq(k, c)}};
-      }
-      evaluator.tick(state, ignored);
-    }
-  }
-  Random random(1);
-  for (int k = 0; k < 4000; ++k) {
-    for (std::size_t j = 0; j < n; ++j) {
-      const JointFit& joint = model.joints[j];
-      // Velocity and acceleration at their limits with either sign: the extremes lie at corners.
-      const double dq = (random.uniform() < 0.5 ? -1 : 1) * joint.dq_limit,
-                   ddq = (random.uniform() < 0.5 ? -1 : 1) * joint.ddq_limit;
-      state[j] = {{random.uniform(joint.q_lower, joint.q_upper)}, {dq}, {ddq}};
-    }
-    evaluator.tick(state, ignored);
-  }
-  current_ranges = nullptr;
-  return ranges;
-}
-
 }  // namespace
 
-Formats choose_formats(const IdentifiedModel& model, const std::vector<TickStates>& states) {
-  const Ranges ranges = observe(model, states);
+Formats choose_formats(const IdentifiedModel& model) {
+  const Ranges ranges = prove(model, nullptr).ranges;
+  using Q = Quantity;
   Formats formats;
   for (std::size_t i = 0; i < quantity_count; ++i) {
-    formats.quantity[i] = std::min(30, fitting_bits(2 * ranges.number[i], 31));
+    const auto quantity = static_cast<Quantity>(i);
+    const int common = common_bits(quantity);
+    // A reserve of 1/64 holds what roundings add; the error bound is checked against the format later.
+    formats.quantity[i] = common > 0 ? common : std::min(30, fitting_bits(ranges[quantity] * 65 / 64, 31));
   }
-  formats[Quantity::unit] = unit_bits;
-  formats[Quantity::argument] = argument_bits;
-  formats[Quantity::ratio] = ratio_bits;
-  formats[Quantity::count] = count_bits;
-  // A product must be at least as fine as what it is added to, and the sum of its terms must fit 62 bits and a sign
-  // (model/rigid_body.hpp: align() and narrow()). Bounds are sums of magnitudes, so no partial sum exceeds them.
-  using Q = Quantity;
   const auto bits = [&](Q quantity) -> int& { return formats[quantity]; };
+  bits(Q::weight) = std::clamp(fitting_bits(ranges[Q::weight] * 32768 / 32767, 15), 3, 15);
+  // A product must be at least as fine as what it is added to, and the sum of its terms must fit 62 bits and a sign
+  // (model/rigid_body.hpp: align() and proven_narrow()). Bounds are sums of magnitudes, so no partial sum exceeds them.
   const auto at_most = [&](Q quantity, int most) { bits(quantity) = std::min(bits(quantity), most); };
   const auto product_at_most = [&](Q x, Q y, double sum) {
     while (bits(x) + bits(y) > fitting_bits(2 * sum, 62)) --(bits(x) > bits(y) ? bits(x) : bits(y));
@@ -74,40 +43,52 @@ Formats choose_formats(const IdentifiedModel& model, const std::vector<TickState
   at_most(Q::velocity, fitting_bits(2 * (2 * v * v + w + a), 62) / 2);
   at_most(Q::acceleration, 2 * bits(Q::velocity));
   at_most(Q::linear_acceleration, 2 * bits(Q::velocity));
+  at_most(Q::velocity_squared, 2 * bits(Q::velocity));
+  at_most(Q::velocity_cubed, bits(Q::velocity_squared) + bits(Q::velocity));
   product_at_most(Q::acceleration, Q::length, 3 * w * l + a);
   product_at_most(Q::length, Q::force, 2 * l * f + 2 * t);
   at_most(Q::linear_acceleration, bits(Q::acceleration) + bits(Q::length));
   at_most(Q::torque, bits(Q::length) + bits(Q::force));
 
   const int fa = bits(Q::linear_acceleration), fw = bits(Q::acceleration);
-  formats.force_sum =
-      std::min({fitting_bits(ranges.mass, 31) + fa, fitting_bits(ranges.first_moment, 31) + fw,
-                fitting_bits(ranges.second_moment, 31) + 2 * fw - fa,
-                fitting_bits(2 * (ranges.mass * a + 3 * w * ranges.first_moment), 62),
-                fitting_bits(2 * (2 * ranges.first_moment * a + 6 * w * ranges.second_moment), 62) + fw - fa});
+  const double mass = ranges[Kind{Kind::mass}], first = ranges[Kind{Kind::first_moment}],
+               second = ranges[Kind{Kind::second_moment}];
+  formats.force_sum = std::min({fitting_bits(mass, 31) + fa, fitting_bits(first, 31) + fw,
+                                fitting_bits(second, 31) + 2 * fw - fa, fitting_bits(2 * (mass * a + 3 * w * first), 62),
+                                fitting_bits(2 * (2 * first * a + 6 * w * second), 62) + fw - fa});
   at_most(Q::force, formats.force_sum);
   at_most(Q::torque, std::min(formats.force_sum - fw + fa, bits(Q::length) + bits(Q::force)));
 
   // Every partial sum of a joint's contributions, bounded by the sum of the magnitudes.
-  double torque_sum = 0;
+  double torque_sum = 0, deflection_sum = 0;
   for (const JointFit& joint : model.joints) {
-    double sum = ranges[Quantity::torque];
+    double torque = ranges[Q::torque], deflection = 0;
     for (const EffectFit& fit : joint.effects) {
       const EffectInfo& info = *find_effect(fit.effect);
-      for (std::size_t i = 0; i < fit.linear.size(); ++i) {
+      double& sum = info.acts_on == ActsOn::position ? deflection : torque;
+      for (std::size_t i = 0; i < fit.linear.size(); ++i)
         sum += std::fabs(fit.linear[i]) * std::ldexp(1.0, 31 - formats[info.linear[i].quantity]);
-      }
     }
-    if (joint.bls) sum += joint.bls->coefficients.cwiseAbs().sum() * 16;
-    torque_sum = std::max(torque_sum, sum);
+    if (joint.bls) torque += joint.bls->coefficients.cwiseAbs().sum();
+    torque_sum = std::max(torque_sum, torque);
+    deflection_sum = std::max(deflection_sum, deflection);
   }
   formats.torque_sum = fitting_bits(torque_sum, 62);
+  formats.deflection_sum = fitting_bits(deflection_sum, 62);
   for (std::size_t i = 0; i < quantity_count; ++i) {
-    if (ranges.coefficient[i] > 0) {
-      formats.torque_sum = std::min(formats.torque_sum, fitting_bits(ranges.coefficient[i], 31) + formats.quantity[i]);
-    }
+    const auto quantity = static_cast<Quantity>(i);
+    const auto hold = [&](Kind::Group group, int& sum) {
+      const double most = ranges[Kind{group, quantity}];
+      if (most > 0) sum = std::min(sum, fitting_bits(most, 31) + formats.quantity[i]);
+    };
+    hold(Kind::coefficient, formats.torque_sum);
+    hold(Kind::deflection_coefficient, formats.deflection_sum);
   }
-  if (formats.torque_sum < formats[Quantity::torque]) {
+  int least = formats[Q::torque];
+  for (const JointFit& joint : model.joints) {
+    if (joint.bls) least = std::max(least, node_coefficient_bits(*joint.bls) + small_bits);
+  }
+  if (formats.torque_sum < least || formats.deflection_sum < formats[Q::position]) {
     throw DataError(
         "the joints' coefficients differ too much in size for one sum: leave out the joint's BLS or raise train.ridge");
   }
@@ -148,6 +129,23 @@ TickStates perturbed(const TickStates& states, const IdentifiedModel& model, std
     }
   }
   return out;
+}
+
+TickStates within_limits(const IdentifiedModel& model, Eigen::Index count, std::uint64_t seed) {
+  Random random(seed);
+  const auto n = static_cast<Eigen::Index>(model.joints.size());
+  TickStates s{"random", Eigen::VectorXd::LinSpaced(count, 0, model.tick_s * static_cast<double>(count - 1)),
+               Eigen::MatrixXd(count, n), Eigen::MatrixXd(count, n), Eigen::MatrixXd(count, n)};
+  for (Eigen::Index k = 0; k < count; ++k) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const JointFit& joint = model.joints[static_cast<std::size_t>(j)];
+      const auto share = [&] { return k % 2 == 0 ? (random.uniform() < 0.5 ? -1.0 : 1.0) : random.uniform(-1, 1); };
+      s.q(k, j) = random.uniform(joint.q_lower, joint.q_upper);
+      s.dq(k, j) = joint.dq_limit * share() * (random.uniform() < 0.1 ? 1e-4 : 1);
+      s.ddq(k, j) = joint.ddq_limit * share();
+    }
+  }
+  return s;
 }
 
 std::vector<std::int32_t> raw_states(const TickStates& states, Eigen::Index tick, const Formats& formats) {

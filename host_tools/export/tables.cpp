@@ -7,14 +7,17 @@
 #include "host_tools/files.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/version.hpp"
+#include "model/catalogue.hpp"
 #include "model/table_page.hpp"
 
 namespace fxdyn {
 namespace {
 
-Evaluator<RunTimeNumbers> make_evaluator(const IdentifiedModel& model, const Formats& formats) {
+Evaluator<RunTimeNumbers> make_evaluator(const IdentifiedModel& model, const Formats& formats, std::uint32_t outputs) {
   const FormatScope scope(formats);
-  return Evaluator<RunTimeNumbers>(model, model.tick_s);
+  Evaluator<RunTimeNumbers> evaluator(model, model.tick_s);
+  evaluator.set_outputs(outputs);
+  return evaluator;
 }
 
 std::string type_name(std::string_view effect) {
@@ -32,11 +35,67 @@ std::string type_name(std::string_view effect) {
   return name;
 }
 
-std::string joint_type(const JointFit& joint) {
-  std::string list;
-  for (const EffectFit& fit : joint.effects) list += (list.empty() ? "" : ", ") + type_name(fit.effect);
-  if (joint.bls) list += fmt::format("{}BroadLearning<{}>", list.empty() ? "" : ", ", joint.bls->nodes());
-  return "JointEffects<" + list + ">";
+/// Link<...> with what its parameters say beforehand (model/rigid_body.hpp).
+struct LinkShape {
+  JointType type = JointType::revolute;
+  Twist twist = Twist::any;
+  unsigned offsets = 0, parameters = 0;
+
+  std::int32_t code() const {
+    return static_cast<std::int32_t>(type) | static_cast<std::int32_t>(twist) << 1 |
+           static_cast<std::int32_t>(offsets << 3 | parameters << 6);
+  }
+  std::string text() const {
+    static constexpr std::array names{"any", "none", "quarter", "minus_quarter"};
+    return fmt::format("Link<JointType::{}, Twist::{}, {:#x}, {:#x}>",
+                       type == JointType::prismatic ? "prismatic" : "revolute", names[static_cast<std::size_t>(twist)],
+                       offsets, parameters);
+  }
+};
+
+/// Read from the words themselves: what is zero or a right angle there is not computed. 17 words a link.
+std::vector<LinkShape> link_shapes(const std::vector<std::int32_t>& words, std::size_t joints) {
+  constexpr std::int32_t one = 1 << unit_bits;
+  std::vector<LinkShape> shapes;
+  for (std::size_t i = 0; i < joints; ++i) {
+    const std::int32_t* geometry = words.data() + 4 + 7 * i;
+    const std::int32_t* inertia = words.data() + 4 + 7 * joints + 10 * i;
+    LinkShape shape;
+    shape.type = static_cast<JointType>(geometry[0]);
+    const std::int32_t cosine = geometry[1], sine = geometry[2];
+    if (cosine == one && sine == 0) shape.twist = Twist::none;
+    if (cosine == 0 && sine == one) shape.twist = Twist::quarter;
+    if (cosine == 0 && sine == -one) shape.twist = Twist::minus_quarter;
+    for (unsigned k = 0; k < 3; ++k) shape.offsets |= static_cast<unsigned>(geometry[3 + k] != 0) << k;
+    for (unsigned k = 0; k < 10; ++k) shape.parameters |= static_cast<unsigned>(inertia[k] != 0) << k;
+    shapes.push_back(shape);
+  }
+  return shapes;
+}
+
+bool deflects(const IdentifiedModel& model) {
+  for (const JointFit& joint : model.joints) {
+    for (const EffectFit& fit : joint.effects) {
+      if (find_effect(fit.effect)->acts_on == ActsOn::position) return true;
+    }
+  }
+  return false;
+}
+
+/// The effects of a joint in the tables: none where the drive does not put out its torque and nobody needs them.
+bool has_effects(const IdentifiedModel& model, std::size_t joint, std::uint32_t outputs) {
+  return (outputs >> joint & 1U) != 0 || deflects(model);
+}
+
+std::string joint_type(const JointFit& joint, const LinkShape& shape, bool effects) {
+  std::string list = shape.text();
+  if (effects) {
+    for (const EffectFit* fit : in_order(joint)) list += ", " + type_name(fit->effect);
+    if (joint.bls)
+      list += fmt::format(", BroadLearning<{}, {}>", stored_nodes(*joint.bls), node_coefficient_bits(*joint.bls));
+    for (const EffectFit* fit : in_order(joint, true)) list += ", " + type_name(fit->effect);
+  }
+  return "JointModel<" + list + ">";
 }
 
 /// Emits the words in order, with a comment for each group.
@@ -71,13 +130,14 @@ class Printer {
   std::size_t at_ = 0;
 };
 
-std::string parameters_text(const IdentifiedModel& model, const std::vector<std::int32_t>& words) {
+std::string parameters_text(const IdentifiedModel& model, const std::vector<std::int32_t>& words,
+                            std::uint32_t outputs) {
   Printer printer(words);
   printer.group(3, "minus gravity in the first DH frame [m/s^2]");
+  printer.group(1, "ticks per second");
   for (std::size_t i = 0; i < model.robot.size(); ++i) {
     printer.joint_kind(model.robot.joints[i].type);
-    printer.group(6,
-                  fmt::format("{}: cos alpha, sin alpha, a, d [m], cos theta, sin theta", model.robot.joints[i].name));
+    printer.group(6, fmt::format("{}: cos alpha, sin alpha, p [m], theta [rad]", model.robot.joints[i].name));
   }
   for (std::size_t i = 0; i < model.robot.size(); ++i) {
     printer.group(10, fmt::format("link {}: m [kg], h [kg m], Jxx Jyy Jzz Jxy Jxz Jyz [kg m^2]", i + 1));
@@ -89,7 +149,8 @@ std::string parameters_text(const IdentifiedModel& model, const std::vector<std:
   for (std::size_t i = 0; i < model.robot.size(); ++i) {
     const Joint& joint = model.robot.joints[i];
     const bool prismatic = joint.type == JointType::prismatic;
-    for (const EffectFit& fit : model.joints[i].effects) {
+    if (!has_effects(model, i, outputs)) continue;
+    const auto print = [&](const EffectFit& fit) {
       const EffectInfo& info = *find_effect(fit.effect);
       std::string comment = fmt::format("{}: {} = {};", joint.name, fit.effect, info.equation);
       const auto describe = [&](std::span<const ParameterInfo> infos, const std::vector<double>& values) {
@@ -101,21 +162,28 @@ std::string parameters_text(const IdentifiedModel& model, const std::vector<std:
       describe(info.shape, fit.shape);
       describe(info.linear, fit.linear);
       printer.group(info.shape.size() + info.linear.size(), comment);
-    }
+    };
+    for (const EffectFit* fit : in_order(model.joints[i])) print(*fit);
     if (const auto& bls = model.joints[i].bls) {
-      const auto nodes = static_cast<std::size_t>(bls->nodes());
-      printer.block(broad_learning_shape_words(nodes) + broad_learning_coefficients(nodes),
-                    fmt::format("{}: BLS, {} nodes: 1 / reference velocity, tick / distances, weights, coefficients",
+      const std::size_t nodes = stored_nodes(*bls);
+      printer.block(BroadLearningLayout::words(nodes, true),
+                    fmt::format("{}: BLS, {} nodes: 1 / reference velocity, 1 / span, tick / distances; a row of bias and "
+                                "weights a node; coefficients of inputs and nodes",
                                 joint.name, nodes));
     }
+    for (const EffectFit* fit : in_order(model.joints[i], true)) print(*fit);
   }
   return printer.text;
 }
 
 }  // namespace
 
-FixedModel::FixedModel(const IdentifiedModel& model, const Formats& formats)
-    : formats_(formats), model_(model), evaluator_(make_evaluator(model, formats)) {}
+FixedModel::FixedModel(const IdentifiedModel& model, const Formats& formats, std::uint32_t outputs)
+    : formats_(formats), model_(model), outputs_(outputs), evaluator_(make_evaluator(model, formats, outputs)) {
+  for (std::size_t i = 0; i < model.joints.size(); ++i) {
+    if ((outputs >> i & 1U) != 0) output_joints_.push_back(i);
+  }
+}
 
 std::vector<std::int32_t> FixedModel::tick(const std::vector<std::int32_t>& states, Saturations& saturations) {
   const FormatScope scope(formats_);
@@ -123,11 +191,18 @@ std::vector<std::int32_t> FixedModel::tick(const std::vector<std::int32_t>& stat
   for (std::size_t j = 0; j < joints.size(); ++j)
     joints[j] = {{states[3 * j]}, {states[3 * j + 1]}, {states[3 * j + 2]}};
   std::vector<std::int32_t> torques;
-  for (const auto tau : evaluator_.tick(joints, saturations)) torques.push_back(tau.raw);
+  const auto tau = evaluator_.tick(joints, saturations);
+  for (const std::size_t i : output_joints_) torques.push_back(tau[i].raw);
   return torques;
 }
 
 std::vector<std::int32_t> FixedModel::words() const { return evaluator_.words(); }
+
+std::uint32_t FixedModel::crc() const {
+  Crc32 crc;
+  for (const std::int32_t word : words()) crc.add(static_cast<std::uint32_t>(word));
+  return crc.value();
+}
 
 std::uint32_t FixedModel::layout_hash() const {
   // RobotModel::layout_hash() of the types that write_tables() names
@@ -135,18 +210,29 @@ std::uint32_t FixedModel::layout_hash() const {
   for (const int bits : formats_.quantity) hash.add(bits);
   hash.add(formats_.force_sum);
   hash.add(formats_.torque_sum);
+  hash.add(formats_.deflection_sum);
   hash.add(static_cast<std::int32_t>(model_.joints.size()));
-  for (const JointFit& joint : model_.joints) {
+  hash.add(static_cast<std::int32_t>(outputs_));
+  const std::vector<LinkShape> shapes = link_shapes(words(), model_.joints.size());
+  for (std::size_t i = 0; i < model_.joints.size(); ++i) {
+    const JointFit& joint = model_.joints[i];
+    hash.add(shapes[i].code());
+    if (!has_effects(model_, i, outputs_)) {
+      hash.add(0);
+      continue;
+    }
     hash.add(static_cast<std::int32_t>(joint.effects.size() + (joint.bls ? 1 : 0)));
-    for (const EffectFit& fit : joint.effects) {
+    const auto add = [&](const EffectFit& fit) {
       hash.add(std::string_view(fit.effect));
       hash.add(static_cast<std::int32_t>(fit.shape.size() + fit.linear.size()));
-    }
+    };
+    for (const EffectFit* fit : in_order(joint)) add(*fit);
     if (joint.bls) {
-      const auto nodes = static_cast<std::size_t>(joint.bls->nodes());
-      hash.add(BroadLearning<1>::name);
-      hash.add(static_cast<std::int32_t>(broad_learning_shape_words(nodes) + broad_learning_coefficients(nodes)));
+      hash.add(BroadLearning<2, 0>::name);
+      hash.add(static_cast<std::int32_t>(stored_nodes(*joint.bls)));
+      hash.add(node_coefficient_bits(*joint.bls));
     }
+    for (const EffectFit* fit : in_order(joint, true)) add(*fit);
   }
   return hash.value();
 }
@@ -198,28 +284,28 @@ Eigen::MatrixXd predict_fixed(const IdentifiedModel& model, const Formats& forma
 }
 
 std::uint32_t write_tables(const IdentifiedModel& model, const Formats& formats, const QuantisationError& error,
+                           const Eigen::VectorXd& proven, std::uint32_t outputs,
                            const std::filesystem::path& directory) {
-  const FixedModel fixed(model, formats);
+  const FixedModel fixed(model, formats, outputs);
   const std::vector<std::int32_t> words = fixed.words();
-  Crc32 crc;
-  for (const std::int32_t word : words) crc.add(static_cast<std::uint32_t>(word));
-  const PageHeader header{table_magic, fixed.layout_hash(), static_cast<std::uint32_t>(words.size()), crc.value()};
+  const std::vector<LinkShape> shapes = link_shapes(words, model.joints.size());
+  const PageHeader header{table_magic, fixed.layout_hash(), static_cast<std::uint32_t>(words.size()), fixed.crc()};
 
   std::string format_lines, model_lines, error_lines, log_lines;
   for (std::size_t i = 0; i < quantity_count; ++i) {
     const auto quantity = static_cast<Quantity>(i);
-    if (quantity == Quantity::unit || quantity == Quantity::argument || quantity == Quantity::ratio ||
-        quantity == Quantity::count) {
-      continue;
-    }
+    if (common_bits(quantity) > 0) continue;
     format_lines += fmt::format("  static constexpr int {} = {};\n", quantity_names[i], formats.quantity[i]);
   }
-  format_lines += fmt::format("  static constexpr int force_sum = {};\n  static constexpr int torque_sum = {};\n",
-                              formats.force_sum, formats.torque_sum);
+  format_lines += fmt::format(
+      "  static constexpr int force_sum = {};\n  static constexpr int torque_sum = {};\n  static constexpr int "
+      "deflection_sum = {};\n",
+      formats.force_sum, formats.torque_sum, formats.deflection_sum);
   for (std::size_t j = 0; j < model.joints.size(); ++j) {
-    model_lines += fmt::format(",\n                         {}", joint_type(model.joints[j]));
+    model_lines += fmt::format(",\n                         {}", joint_type(model.joints[j], shapes[j], has_effects(model, j, outputs)));
     const auto k = static_cast<Eigen::Index>(j);
-    error_lines += fmt::format("//   {}: {:.3g} {}, {:.2g} of rated\n", model.robot.joints[j].name, error.largest[k],
+    error_lines += fmt::format("//   {}: proven <= {:.3g}, observed {:.3g} {}, {:.2g} of rated\n",
+                               model.robot.joints[j].name, proven[k], error.largest[k],
                                model.robot.joints[j].torque_unit(), error.largest[k] / model.joints[j].rated_torque);
   }
   for (const LogReference& log : model.logs)
@@ -231,7 +317,8 @@ std::uint32_t write_tables(const IdentifiedModel& model, const Formats& formats,
 // tick of {} s:
 //   tau = fxdyn::tables::Model::tick(parameters, state, setpoints, saturations)
 // Raw integers, value = raw * 2^-bits with the bits of Formats. Made from
-{}// Largest |fixed - double| observed over these logs and their perturbed copies (an observation, not a proof):
+{}// |fixed - double|: proven for every motion within the limits (effect states: unless a joint creeps, by less than a
+// presliding distance in a minute, for longer than a minute), and the largest over these logs and their perturbed copies:
 {}
 #pragma once
 
@@ -242,7 +329,7 @@ namespace fxdyn::tables {{
 struct Formats {{
 {}}};
 using Numbers = FixedNumbers<Formats>;
-using Model = RobotModel<Numbers{}>;
+using Model = RobotModel<Numbers, {:#x}{}>;
 
 [[gnu::section(".fxdyn_tables"), gnu::used]] inline constexpr TablePage<Model> page{{
   {{{}U, {}U, {}U, {}U}},  // magic, layout hash, words, CRC-32
@@ -252,8 +339,8 @@ inline constexpr const Model::Parameters& parameters = page.parameters;
 
 }}  // namespace fxdyn::tables
 )",
-      version, model.project, model.project_hash, model.tick_s, log_lines, error_lines, format_lines, model_lines,
-      header.magic, header.layout_hash, header.words, header.crc32, parameters_text(model, words));
+      version, model.project, model.project_hash, model.tick_s, log_lines, error_lines, format_lines, outputs, model_lines,
+      header.magic, header.layout_hash, header.words, header.crc32, parameters_text(model, words, outputs));
   write_file(directory / "tables.hpp", text);
 
   std::string bytes(sizeof header + 4 * words.size(), '\0');

@@ -115,7 +115,8 @@ serial::Identity QemuTarget::hello() {
   if (words[0] != serial::protocol_version) {
     fail(fmt::format("speaks protocol version {}, not {}", words[0], serial::protocol_version));
   }
-  return {words[0], words[1], words[2], words[3], static_cast<serial::NodeState>(words[4]), words[5]};
+  outputs_ = static_cast<std::size_t>(std::popcount(words[6]));
+  return {words[0], words[1], words[2], words[3], static_cast<serial::NodeState>(words[4]), words[5], words[6]};
 }
 
 void QemuTarget::reset() {
@@ -134,11 +135,12 @@ TickReply QemuTarget::tick(std::span<const std::int32_t> words) {
   send(serial::Type::tick, payload);
 
   const Reply& reply = receive(serial::Type::torque);
-  if (reply.size != serial::torque_words(joints) || reply.words[0] != sequence_) {
+  const std::size_t outputs = reply.size - serial::torque_words(0);
+  if (reply.size <= serial::torque_words(0) || (outputs_ != 0 && outputs != outputs_) || reply.words[0] != sequence_) {
     fail(fmt::format("answered tick {} where {} was expected", reply.words[0], sequence_));
   }
-  TickReply result{{}, reply.words[1 + joints], reply.words[2 + joints]};
-  for (std::size_t j = 0; j < joints; ++j) result.torques.push_back(std::bit_cast<std::int32_t>(reply.words[1 + j]));
+  TickReply result{{}, reply.words[1 + outputs], reply.words[2 + outputs]};
+  for (std::size_t j = 0; j < outputs; ++j) result.torques.push_back(std::bit_cast<std::int32_t>(reply.words[1 + j]));
   return result;
 }
 

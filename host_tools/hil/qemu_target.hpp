@@ -38,6 +38,7 @@ class QemuTarget {
   QemuTarget(const QemuTarget&) = delete;
   QemuTarget& operator=(const QemuTarget&) = delete;
 
+  /// Who is there; call it first.
   serial::Identity hello();
   /// Sets what the model's effects remember back to the robot at rest.
   void reset();
@@ -60,6 +61,7 @@ class QemuTarget {
   int line_ = -1;      ///< our end of the serial line
   int messages_ = -1;  ///< what the emulator prints
   std::uint32_t sequence_ = 0;
+  std::size_t outputs_ = 0;  ///< torques of a tick, once hello() has said it
   serial::FrameReader<serial::largest_payload> reader_;
   Reply reply_;
 };

@@ -13,20 +13,23 @@ namespace {
 constexpr int blocks_of_one_log = 5;
 
 Eigen::MatrixXd bls_columns(const BroadLearningFit& bls, double sign_width, const JointSeries& series) {
-  std::vector<double> words{1 / bls.reference_velocity};
+  std::vector<double> words{1 / bls.reference_velocity, 1 / bls.span};
   for (const double distance : bls.distances) words.push_back(series.step_s / distance);
   for (Eigen::Index k = 0; k < bls.weights.rows(); ++k) {
-    for (Eigen::Index i = 0; i < bls.weights.cols(); ++i) words.push_back(bls.weights(k, i));
+    words.push_back(bls.weights(k, bls.weights.cols() - 1));
+    for (Eigen::Index i = 0; i + 1 < bls.weights.cols(); ++i) words.push_back(bls.weights(k, i));
   }
   const auto nodes = static_cast<std::size_t>(bls.nodes());
-  Eigen::MatrixXd columns(series.q.size(), static_cast<Eigen::Index>(broad_learning_coefficients(nodes)));
+  Eigen::MatrixXd columns(series.q.size(),
+                          static_cast<Eigen::Index>(BroadLearningLayout::coefficient_words(nodes, false)));
+  std::vector<double> scratch(nodes);
   BroadLearningState<Real> state;
   Saturations none;
   for (Eigen::Index k = 0; k < series.q.size(); ++k) {
     const JointInput<Real> u{series.q[k], series.dq[k], series.ddq[k], tanh_of(series.dq[k] / sign_width), 0.0};
-    broad_learning_basis<Real>(nodes, u, Words<Real>{words.data()}, state, none, [&](auto, std::size_t i, double phi) {
-      columns(k, static_cast<Eigen::Index>(i)) = phi;
-    });
+    broad_learning_basis<Real>(
+        nodes, u, Words<Real>{words.data()}, state, none, scratch,
+        [&](auto, std::size_t i, double phi) { columns(k, static_cast<Eigen::Index>(i)) = phi; });
   }
   return columns;
 }
@@ -35,7 +38,7 @@ Eigen::Index own_count(const JointFit& design) {
   Eigen::Index count = 0;
   for (const EffectFit& fit : design.effects)
     count += static_cast<Eigen::Index>(find_effect(fit.effect)->linear.size());
-  if (design.bls) count += design.bls->nodes() + static_cast<Eigen::Index>(BroadLearningInputs::count);
+  if (design.bls) count += design.bls->nodes() + static_cast<Eigen::Index>(BroadLearningLayout::inputs);
   return count;
 }
 
@@ -204,7 +207,7 @@ void Fitter::set_design(std::size_t joint, JointFit design) {
 Eigen::VectorXd Fitter::ridge_of(const JointFit& design, double ridge, Eigen::Index count) {
   Eigen::VectorXd out = Eigen::VectorXd::Zero(count);
   if (design.bls)
-    out.tail(design.bls->nodes() + static_cast<Eigen::Index>(BroadLearningInputs::count)).setConstant(ridge);
+    out.tail(design.bls->nodes() + static_cast<Eigen::Index>(BroadLearningLayout::inputs)).setConstant(ridge);
   return out;
 }
 
@@ -341,7 +344,7 @@ std::vector<Judgement> Fitter::judged(std::size_t first, std::size_t last,
       }
       judgement.physical &= last_is_physical(*design[j], solution.theta[j]);
       if (design[j]->bls) {
-        const Eigen::Index own = design[j]->bls->nodes() + static_cast<Eigen::Index>(BroadLearningInputs::count);
+        const Eigen::Index own = design[j]->bls->nodes() + static_cast<Eigen::Index>(BroadLearningLayout::inputs);
         judgement.coefficient_sum = std::max(judgement.coefficient_sum, solution.theta[j].tail(own).cwiseAbs().sum());
       }
     }

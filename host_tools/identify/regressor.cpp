@@ -16,23 +16,22 @@ Regressor::Regressor(const DhChain& chain)
 
 const Eigen::MatrixXd& Regressor::operator()(const Eigen::VectorXd& q, const Eigen::VectorXd& dq,
                                              const Eigen::VectorXd& ddq) {
-  Saturations none;
   const std::size_t n = chain_.links.size();
   for (std::size_t i = 0; i < n; ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    motions_[i] = link_motion<Real>(chain_.links[i], i == 0 ? base_ : motions_[i - 1], {q[k], dq[k], ddq[k]}, none);
+    motions_[i] = link_motion<Real>(AnyLink{}, chain_.links[i], i == 0 ? base_ : motions_[i - 1], {q[k], dq[k], ddq[k]});
   }
   for (std::size_t link = 0; link < n; ++link) {
     for (std::size_t p = 0; p < parameters_per_link; ++p) {
       std::array<double, parameters_per_link> unit{};
       unit[p] = 1;
-      Wrench<Real> wrench = link_wrench<Real>(to_inertia(unit), motions_[link], none);
+      Wrench<Real> wrench = link_wrench<Real>(AnyLink{}, to_inertia(unit), motions_[link]);
       const auto column = static_cast<Eigen::Index>(link * parameters_per_link + p);
       for (std::size_t i = link + 1; i-- > 0;) {
-        y_(static_cast<Eigen::Index>(i), column) = joint_torque<Real>(chain_.links[i], wrench, none);
+        y_(static_cast<Eigen::Index>(i), column) = joint_torque<Real>(AnyLink{}, chain_.links[i], wrench);
         if (i > 0) {
           Wrench<Real> parent;
-          add_to_parent<Real>(parent, wrench, chain_.links[i], motions_[i], none);
+          add_to_parent<Real>(AnyLink{}, parent, wrench, chain_.links[i], motions_[i]);
           wrench = parent;
         }
       }

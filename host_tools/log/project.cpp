@@ -229,7 +229,15 @@ class ProjectReader {
       project_.target.tick_s = tick->positive();
       if (project_.target.tick_s < 1e-5 || project_.target.tick_s > 0.1) tick->place().fail("expected 1e-5 .. 0.1 s");
     }
-    table.find("joints");  // "all" or a list
+    if (const auto joints = table.find("joints"); joints && !joints->is_string()) {
+      for (const Value& value : joints->items()) {
+        const auto joint = static_cast<std::size_t>(value.integer(1));
+        if (joint > this->joints()) value.place().fail(fmt::format("the robot has {} joints", this->joints()));
+        project_.target.joints.push_back(joint - 1);
+      }
+    } else if (joints && joints->string() != "all") {
+      joints->place().fail("expected \"all\" or a list of joints, as in [1, 2]");
+    }
     table.finish();
   }
 

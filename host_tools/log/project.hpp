@@ -45,6 +45,7 @@ struct TrainSettings {
 struct TargetSettings {
   std::string board = "mps2-an386";
   double tick_s = 0.002;
+  std::vector<std::size_t> joints;  ///< one image for each of these (from 0); empty: one image for all
 };
 
 struct LimitSettings {

@@ -84,21 +84,15 @@ std::vector<std::string_view> joint_effect_names() {
   return names;
 }
 
-std::string why_not_in_model(const EffectInfo& info) {
+std::string why_not_identified(const EffectInfo& info) {
   const auto reason = [&](std::string_view what) {
-    return fmt::format("effect '{}' {}: models with such effects are not built yet", info.name, what);
+    return fmt::format("effect '{}' {}: identify can't fit such effects yet", info.name, what);
   };
   if (info.acts_on == ActsOn::body) return reason("acts on the rigid body");
   if (info.acts_on == ActsOn::position) return reason("acts on the joint's position");
   if (info.needs_total) return reason("needs the torque of the effects before it");
   if (info.needs_peers) return reason("needs the motion of the other joints");
-  return {};
-}
-
-std::string why_not_identified(const EffectInfo& info) {
-  if (std::string reason = why_not_in_model(info); !reason.empty()) return reason;
-  if (info.needs_structural)
-    return fmt::format("effect '{}' needs the rigid-body torque before it is fitted: not built yet", info.name);
+  if (info.needs_structural) return reason("needs the rigid-body torque");
   // The search of shapes knows the scales of velocities and distances.
   for (const ParameterInfo& shape : info.shape) {
     if (shape.quantity == Quantity::inverse_velocity || shape.quantity == Quantity::inverse_path) continue;

@@ -26,8 +26,6 @@ const EffectInfo* find_effect(std::string_view name);
 std::vector<std::string_view> effect_names();
 std::vector<std::string_view> joint_effect_names();
 
-/// Why the effect can't be part of a model yet; empty if it can.
-std::string why_not_in_model(const EffectInfo& info);
 /// Why identify can't fit the effect yet; empty if it can.
 std::string why_not_identified(const EffectInfo& info);
 

@@ -15,19 +15,50 @@ T number(Kind kind, double value) {
 
 }  // namespace
 
+std::vector<const EffectFit*> in_order(const JointFit& joint, bool of_total) {
+  std::vector<const EffectFit*> order;
+  for (const EffectFit& fit : joint.effects) {
+    const EffectInfo* info = find_effect(fit.effect);
+    if ((info != nullptr && info->needs_total) == of_total) order.push_back(&fit);
+  }
+  return order;
+}
+
+
+int node_coefficient_bits(const BroadLearningFit& fit) {
+  const double most = fit.coefficients.tail(fit.nodes()).cwiseAbs().maxCoeff() * 32768 / raw::activation_one;
+  int bits = 40;
+  while (std::ldexp(most, bits) > 32767) --bits;
+  return bits;
+}
+
+std::size_t stored_nodes(const BroadLearningFit& fit) { return static_cast<std::size_t>(fit.nodes() + 1) / 2 * 2; }
+
 template <class N>
 Evaluator<N>::Evaluator(const IdentifiedModel& model, double tick_s) {
   const std::size_t n = model.robot.size();
-  const DhChain chain = to_dh(model.robot);
+  DhChain chain = to_dh(model.robot);
+  std::vector<LinkInertia<Real>> bodies = model.inertia;
+  for (const EffectFit& fit : model.body) {
+    if (fit.effect == Payload::name) {
+      bodies.back() = Payload::add_to(bodies.back(), fit.linear[0], {fit.linear[1], fit.linear[2], fit.linear[3]});
+    } else {
+      const auto turned = GravityTilt::turn({chain.up.x(), chain.up.y(), chain.up.z()}, fit.linear[0], fit.linear[1]);
+      chain.up = {turned.x, turned.y, turned.z};
+    }
+  }
   const auto up = [](double x) { return from_si<N, Quantity::linear_acceleration>(x); };
   up_ = {up(chain.up.x()), up(chain.up.y()), up(chain.up.z())};
+  ticks_per_second_ = from_si<N, Quantity::count>(1 / tick_s);
   for (std::size_t i = 0; i < n; ++i) {
     const LinkGeometry<Real>& link = chain.links[i];
-    geometry_.push_back({link.type, from_si<N, Quantity::unit>(link.cos_alpha),
-                         from_si<N, Quantity::unit>(link.sin_alpha), from_si<N, Quantity::length>(link.a),
-                         from_si<N, Quantity::length>(link.d), from_si<N, Quantity::unit>(link.cos_theta),
-                         from_si<N, Quantity::unit>(link.sin_theta)});
-    const LinkInertia<Real>& body = model.inertia[i];
+    const auto length = [](double x) { return from_si<N, Quantity::length>(x); };
+    geometry_.push_back({link.type,
+                         from_si<N, Quantity::unit>(link.cos_alpha),
+                         from_si<N, Quantity::unit>(link.sin_alpha),
+                         {length(link.p.x), length(link.p.y), length(link.p.z)},
+                         from_si<N, Quantity::position>(link.theta)});
+    const LinkInertia<Real>& body = bodies[i];
     const auto first = [](double x) { return number<N, typename N::FirstMoment>({Kind::first_moment}, x); };
     const auto second = [](double x) { return number<N, typename N::SecondMoment>({Kind::second_moment}, x); };
     inertia_.push_back({number<N, typename N::Mass>({Kind::mass}, body.m),
@@ -49,10 +80,13 @@ Evaluator<N>::Evaluator(const IdentifiedModel& model, double tick_s) {
   }
   steps_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
-    for (const EffectFit& fit : model.joints[i].effects) add_effect(i, fit, tick_s);
+    for (const EffectFit* fit : in_order(model.joints[i])) add_effect(i, *fit, tick_s);
     if (model.joints[i].bls) add_bls(i, *model.joints[i].bls, tick_s);
+    for (const EffectFit* fit : in_order(model.joints[i], true)) add_effect(i, *fit, tick_s);
   }
   limited_.resize(n);
+  inputs_.resize(n);
+  deflections_.resize(n);
   motions_.resize(n);
   wrenches_.resize(n);
   structural_.resize(n);
@@ -61,19 +95,20 @@ Evaluator<N>::Evaluator(const IdentifiedModel& model, double tick_s) {
 
 template <class N>
 void Evaluator<N>::add_effect(std::size_t joint, const EffectFit& fit, double tick_s) {
-  if (const EffectInfo* info = find_effect(fit.effect)) {
-    if (const std::string reason = why_not_in_model(*info); !reason.empty()) throw InputError(reason);
-  }
   bool found = false;
   Catalogue::for_each([&]<class E>() {
     if (E::name != fit.effect) return;
     found = true;
+    constexpr bool position = acts_on<E> == ActsOn::position;
+    deflects_ |= position;
+    couples_ |= needs_peers<E>;
     auto step = std::make_unique<EffectStep<E>>();
     for (std::size_t i = 0; i < E::shape.size(); ++i) {
       step->words.push_back(word(Kind::number, E::shape[i].quantity, E::stored_shape(i, fit.shape[i], tick_s)));
     }
     for (std::size_t i = 0; i < E::linear.size(); ++i) {
-      step->words.push_back(word(Kind::coefficient, E::linear[i].quantity, fit.linear[i]));
+      step->words.push_back(
+          word(position ? Kind::deflection_coefficient : Kind::coefficient, E::linear[i].quantity, fit.linear[i]));
     }
     steps_[joint].push_back(std::move(step));
   });
@@ -82,19 +117,40 @@ void Evaluator<N>::add_effect(std::size_t joint, const EffectFit& fit, double ti
 
 template <class N>
 void Evaluator<N>::add_bls(std::size_t joint, const BroadLearningFit& fit, double tick_s) {
+  constexpr auto inputs = static_cast<Eigen::Index>(BroadLearningLayout::inputs);
   auto step = std::make_unique<BroadLearningStep>();
-  step->nodes = static_cast<std::size_t>(fit.nodes());
+  step->nodes = stored_nodes(fit);
+  step->bits = node_coefficient_bits(fit);
+  step->scratch.resize(step->nodes);
   auto& words = step->words;
   words.push_back(word(Kind::number, Quantity::inverse_velocity, 1 / fit.reference_velocity));
+  words.push_back(word(Kind::number, Quantity::unit, 1 / fit.span));
   for (const double distance : fit.distances)
     words.push_back(word(Kind::number, Quantity::inverse_path, tick_s / distance));
-  for (Eigen::Index k = 0; k < fit.weights.rows(); ++k) {
-    for (Eigen::Index i = 0; i < fit.weights.cols(); ++i)
-      words.push_back(word(Kind::number, Quantity::weight, fit.weights(k, i)));
+  const auto weight = [&](Eigen::Index k, Eigen::Index i) {
+    return word(Kind::number, Quantity::weight, k < fit.nodes() ? fit.weights(k, i) : 0);
+  };
+  const auto output = [&](Eigen::Index k) { return k < fit.nodes() ? fit.coefficients[inputs + k] : 0; };
+  const auto nodes = static_cast<Eigen::Index>(step->nodes);
+  for (Eigen::Index k = 0; k < nodes; ++k) {
+    auto bias = word(Kind::bias, Quantity::weight, k < fit.nodes() ? fit.weights(k, inputs) : 0);
+    if constexpr (N::packed) {
+      // dense() rounds down: half a unit of its result makes that the nearest
+      bias += 1 << (N::weight_bits() + small_bits - raw::tanh_argument_bits - 1);
+      words.push_back(bias);
+      for (Eigen::Index i = 0; i < inputs; i += 2) words.push_back(raw::pack(weight(k, i), weight(k, i + 1)));
+    } else {
+      words.push_back(bias);
+      for (Eigen::Index i = 0; i < inputs; ++i) words.push_back(weight(k, i));
+    }
   }
-  for (Eigen::Index i = 0; i < fit.coefficients.size(); ++i) {
-    const bool input = i < static_cast<Eigen::Index>(BroadLearningInputs::count);
-    words.push_back(word(Kind::coefficient, input ? Quantity::argument : Quantity::unit, fit.coefficients[i]));
+  for (Eigen::Index i = 0; i < inputs; ++i)
+    words.push_back(word(Kind::coefficient, Quantity::feature, fit.coefficients[i]));
+  if constexpr (N::packed) {
+    const auto raw_output = [&](Eigen::Index k) { return to_raw(output(k) * 32768 / raw::activation_one, step->bits); };
+    for (Eigen::Index k = 0; k < nodes; k += 2) words.push_back(raw::pack(raw_output(k), raw_output(k + 1)));
+  } else {
+    for (Eigen::Index k = 0; k < nodes; ++k) words.push_back(FromSi<N>::node_coefficient(output(k), step->bits));
   }
   steps_[joint].push_back(std::move(step));
 }
@@ -104,22 +160,39 @@ void Evaluator<N>::reset() {
   for (auto& joint : steps_) {
     for (auto& step : joint) step->reset();
   }
+  for (auto& deflection : deflections_) deflection = {};
 }
 
 template <class N>
 std::span<const Torque<N>> Evaluator<N>::tick(std::span<const JointState<N>> setpoints, Saturations& saturations) {
+  // RobotModel::tick() with what is a type there read from lists
   const std::size_t n = joints();
-  for (std::size_t i = 0; i < n; ++i) limited_[i] = limit_setpoint<N>(setpoints[i], constants_[i].limits, saturations);
-  rnea<N, std::dynamic_extent>(geometry_, inertia_, up_, limited_, motions_, wrenches_, structural_, saturations);
+  const auto rigid_body = [&] {
+    rnea<N, std::dynamic_extent>(geometry_, inertia_, up_, limited_, motions_, wrenches_, structural_);
+  };
   for (std::size_t i = 0; i < n; ++i) {
-    tau_[i] = joint_feedforward<N>(
-        limited_[i], structural_[i], constants_[i],
-        [&](const JointInput<N>& u) {
-          auto sum = N::no_torque();
-          for (auto& step : steps_[i]) sum = sum + (*step)(u, saturations);
-          return sum;
-        },
-        saturations);
+    limited_[i] = limit_setpoint<N>(setpoints[i], constants_[i].limits, saturations);
+    inputs_[i] = joint_input<N>(limited_[i], constants_[i]);
+    if (couples_) inputs_[i].peers = inputs_;
+  }
+  rigid_body();
+  if (deflects_) {
+    for (std::size_t i = 0; i < n; ++i) inputs_[i].structural = structural_[i];
+    for (std::size_t i = 0; i < n; ++i) {
+      auto sum = N::no_deflection();
+      for (auto& step : steps_[i]) sum = sum + step->deflection(inputs_[i], saturations);
+      limited_[i] =
+          deflections_[i].step(limited_[i], sum, ticks_per_second_, constants_[i].limits, saturations);
+    }
+    rigid_body();
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!is_output(i)) continue;
+    inputs_[i].structural = structural_[i];
+    auto sum = N::no_torque();
+    JointInput<N> u = inputs_[i];
+    for (auto& step : steps_[i]) sum = sum + step->torque(u, sum, saturations);
+    tau_[i] = joint_feedforward<N>(structural_[i], sum, constants_[i].limits, saturations);
   }
   return tau_;
 }
@@ -130,25 +203,26 @@ std::vector<typename N::Word> Evaluator<N>::words() const {
   std::vector<typename N::Word> all;
   if constexpr (std::is_same_v<N, RunTimeNumbers>) {
     const auto add = [&](auto... x) { (all.push_back(x.raw), ...); };
-    add(up_.x, up_.y, up_.z);
+    add(up_.x, up_.y, up_.z, ticks_per_second_);
     for (const auto& g : geometry_) {
       all.push_back(static_cast<std::int32_t>(g.type));
-      add(g.cos_alpha, g.sin_alpha, g.a, g.d, g.cos_theta, g.sin_theta);
+      add(g.cos_alpha, g.sin_alpha, g.p.x, g.p.y, g.p.z, g.theta);
     }
     for (const auto& b : inertia_) add(b.m, b.h.x, b.h.y, b.h.z, b.xx, b.yy, b.zz, b.xy, b.xz, b.yz);
     for (const auto& c : constants_) {
       add(c.limits.q_lower, c.limits.q_upper, c.limits.dq_lower, c.limits.dq_upper, c.limits.ddq_lower,
           c.limits.ddq_upper, c.limits.tau_lower, c.limits.tau_upper, c.inverse_width);
     }
-    for (const auto& joint : steps_) {
-      for (const auto& step : joint) all.insert(all.end(), step->words.begin(), step->words.end());
+    for (std::size_t i = 0; i < steps_.size(); ++i) {
+      if (!is_output(i) && !deflects_) continue;
+      for (const auto& step : steps_[i]) all.insert(all.end(), step->words.begin(), step->words.end());
     }
   }
   return all;
 }
 
 template class Evaluator<Real>;
-template class Evaluator<ObservedNumbers>;
+template class Evaluator<BoundedNumbers>;
 template class Evaluator<RunTimeNumbers>;
 
 Eigen::MatrixXd predict(const IdentifiedModel& model, const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "host_tools/model/identified_model.hpp"
-#include "host_tools/numbers/observed.hpp"
+#include "host_tools/numbers/bounded.hpp"
 #include "host_tools/numbers/run_time_fixed.hpp"
 #include "model/joint_model.hpp"
 
@@ -17,19 +17,37 @@ struct FromSi;
 template <>
 struct FromSi<Real> {
   static double word(Kind, double value) { return value; }
-  static double to_si(Kind, double word) { return word; }
+  static double node_coefficient(double value, int) { return value; }
 };
 template <>
-struct FromSi<ObservedNumbers> {
-  static double word(Kind kind, double value) {
-    current_ranges->see(kind, value);
-    return value;
+struct FromSi<BoundedNumbers> {
+  static Bound with_error(double value, int bits) {
+    return {value, value, std::fabs(from_raw(to_raw(value, bits), bits) - value)};
+  }
+  static Bound word(Kind kind, double value) {
+    current_bounding.ranges->see(kind, std::fabs(value));
+    if (current_bounding.formats == nullptr) return {value, value, 0};
+    return with_error(value, bits_of(*current_bounding.formats, kind));
+  }
+  static Bound node_coefficient(double value, int bits) {
+    if (current_bounding.formats == nullptr) return {value, value, 0};
+    return with_error(value, bits);
   }
 };
 template <>
 struct FromSi<RunTimeNumbers> {
   static std::int32_t word(Kind kind, double value) { return to_raw(value, bits_of(*current_formats, kind)); }
 };
+
+/// Fractional bits of a joint's int16 node coefficients (those of BroadLearning<nodes, bits>): the largest that hold
+/// them all.
+int node_coefficient_bits(const BroadLearningFit& fit);
+/// Nodes in the tables: an even number.
+std::size_t stored_nodes(const BroadLearningFit& fit);
+
+/// A joint's effects in the order of the tables: those of its own motion first (then the BLS), then those that need the
+/// running total (`of_total`).
+std::vector<const EffectFit*> in_order(const JointFit& joint, bool of_total = false);
 
 /// A double as a number of quantity Q in number system N.
 template <class N, Quantity quantity>
@@ -46,6 +64,8 @@ class Evaluator {
   Evaluator(Evaluator&&) noexcept = default;
 
   std::size_t joints() const { return geometry_.size(); }
+  /// Puts out the torques of these joints only (bit i: joint i+1); the others' are zero.
+  void set_outputs(std::uint32_t outputs) { outputs_ = outputs; }
   /// Effects back to rest.
   void reset();
   /// One tick; the span returned is valid until the next call.
@@ -53,35 +73,43 @@ class Evaluator {
   /// Rigid-body torque of the last tick.
   std::span<const Torque<N>> structural() const { return structural_; }
 
-  /// The parameters in the order of RobotModel::Parameters, as words.
+  /// The parameters in the order of RobotModel::Parameters, as words; with the effects of the joints
+  /// put out only.
   std::vector<typename N::Word> words() const;
 
  private:
   struct Step {
     virtual ~Step() = default;
-    virtual typename N::TorqueSum operator()(const JointInput<N>& u, Saturations& saturations) = 0;
+    /// theta^T phi where the effect acts on this, else zero; steps the effect's state.
+    virtual typename N::TorqueSum torque(JointInput<N>&, typename N::TorqueSum, Saturations&) { return N::no_torque(); }
+    virtual typename N::DeflectionSum deflection(const JointInput<N>&, Saturations&) { return N::no_deflection(); }
     virtual void reset() = 0;
     std::vector<typename N::Word> words;
   };
   template <class E>
   struct EffectStep final : Step {
     typename E::template State<N> state{};
-    typename N::TorqueSum operator()(const JointInput<N>& u, Saturations& saturations) override {
-      return contribution<E, N>(u, Words<N>{this->words.data()}, state, saturations);
+    typename N::TorqueSum torque(JointInput<N>& u, typename N::TorqueSum so_far, Saturations& saturations) override {
+      if constexpr (acts_on<E> == ActsOn::torque) {
+        if constexpr (needs_total<E>) u.total = running_total<N>(u.structural, so_far);
+        return contribution<E, N>(u, Words<N>{this->words.data()}, state, saturations);
+      }
+      return N::no_torque();
+    }
+    typename N::DeflectionSum deflection(const JointInput<N>& u, Saturations& saturations) override {
+      if constexpr (acts_on<E> == ActsOn::position)
+        return contribution<E, N>(u, Words<N>{this->words.data()}, state, saturations);
+      return N::no_deflection();
     }
     void reset() override { state = {}; }
   };
   struct BroadLearningStep final : Step {
     std::size_t nodes = 0;
+    int bits = 0;
     BroadLearningState<N> state{};
-    typename N::TorqueSum operator()(const JointInput<N>& u, Saturations& saturations) override {
-      const Words<N> coefficients{this->words.data() + broad_learning_shape_words(nodes)};
-      auto sum = N::no_torque();
-      broad_learning_basis<N>(nodes, u, Words<N>{this->words.data()}, state, saturations,
-                              [&](auto tag, std::size_t i, auto phi) {
-                                sum = sum + coefficients.template coefficient<decltype(tag)::value>(i) * phi;
-                              });
-      return sum;
+    std::vector<typename N::NodeArgument> scratch;
+    typename N::TorqueSum torque(JointInput<N>& u, typename N::TorqueSum, Saturations& saturations) override {
+      return broad_learning_sum<N>(nodes, bits, u, Words<N>{this->words.data()}, state, saturations, scratch);
     }
     void reset() override { state = {}; }
   };
@@ -89,22 +117,28 @@ class Evaluator {
   static typename N::Word word(Kind::Group group, Quantity quantity, double value) {
     return FromSi<N>::word({group, quantity}, value);
   }
+  bool is_output(std::size_t i) const { return (outputs_ >> i & 1U) != 0; }
   void add_effect(std::size_t joint, const EffectFit& fit, double tick_s);
   void add_bls(std::size_t joint, const BroadLearningFit& fit, double tick_s);
 
   Vector3<LinearAcceleration<N>> up_;
+  Count<N> ticks_per_second_{};
+  std::uint32_t outputs_ = ~0U;
+  bool deflects_ = false, couples_ = false;
   std::vector<LinkGeometry<N>> geometry_;
   std::vector<LinkInertia<N>> inertia_;
   std::vector<JointConstants<N>> constants_;
   std::vector<std::vector<std::unique_ptr<Step>>> steps_;
   std::vector<JointState<N>> limited_;
+  std::vector<JointInput<N>> inputs_;
+  std::vector<Deflection<N>> deflections_;
   std::vector<LinkMotion<N>> motions_;
   std::vector<Wrench<N>> wrenches_;
   std::vector<Torque<N>> structural_, tau_;
 };
 
 extern template class Evaluator<Real>;
-extern template class Evaluator<ObservedNumbers>;
+extern template class Evaluator<BoundedNumbers>;
 extern template class Evaluator<RunTimeNumbers>;
 
 /// Torques of the model in double precision over a log's states, samples x joints [N*m | N]. Limits do not apply: this

@@ -121,6 +121,7 @@ Formats to_formats(const json& j) {
   for (std::size_t i = 0; i < quantity_count; ++i) formats.quantity[i] = j.at(std::string(quantity_names[i]));
   formats.force_sum = j.at("force_sum");
   formats.torque_sum = j.at("torque_sum");
+  formats.deflection_sum = j.at("deflection_sum");
   return formats;
 }
 
@@ -144,6 +145,7 @@ json joint_json(const Robot& robot, std::size_t index, const JointFit& fit) {
     out["bls"] = {{"inputs", "physical"},
                   {"nodes", fit.bls->nodes()},
                   {"reference_velocity", fit.bls->reference_velocity},
+                  {"span", fit.bls->span},
                   {"distances", fit.bls->distances},
                   {"ridge", fit.bls->ridge},
                   {"weights", matrix_json(fit.bls->weights)},
@@ -167,9 +169,10 @@ JointFit to_joint(const json& j) {
     const json& b = j.at("bls");
     BroadLearningFit bls;
     bls.reference_velocity = b.at("reference_velocity");
+    bls.span = b.at("span");
     bls.distances = b.at("distances").get<std::array<double, 3>>();
     bls.ridge = b.at("ridge");
-    bls.weights.resize(static_cast<Eigen::Index>(b.at("weights").size()), BroadLearningInputs::count + 1);
+    bls.weights.resize(static_cast<Eigen::Index>(b.at("weights").size()), BroadLearningLayout::inputs + 1);
     for (Eigen::Index k = 0; k < bls.weights.rows(); ++k) {
       bls.weights.row(k) = to_vector(b.at("weights").at(static_cast<std::size_t>(k))).transpose();
     }
@@ -201,6 +204,7 @@ json formats_json(const Formats& formats) {
   for (std::size_t i = 0; i < quantity_count; ++i) out[std::string(quantity_names[i])] = formats.quantity[i];
   out["force_sum"] = formats.force_sum;
   out["torque_sum"] = formats.torque_sum;
+  out["deflection_sum"] = formats.deflection_sum;
   return out;
 }
 
@@ -218,6 +222,8 @@ json to_json(const IdentifiedModel& model) {
   for (const auto& link : model.inertia) inertia.push_back(to_array(link));
   json joints = json::array();
   for (std::size_t i = 0; i < model.joints.size(); ++i) joints.push_back(joint_json(model.robot, i, model.joints[i]));
+  json body = json::array();
+  for (const EffectFit& fit : model.body) body.push_back(effect_json(fit, 0, false));
   json logs = json::array();
   for (const LogReference& log : model.logs) {
     logs.push_back(
@@ -238,6 +244,7 @@ json to_json(const IdentifiedModel& model) {
               {"base_parameters", base},
               {"inertia", inertia},
               {"joints", joints},
+              {"robot_effects", body},
               {"filter",
                {{"position_cutoff_hz", model.filter.position_cutoff_hz},
                 {"torque_cutoff_hz", model.filter.torque_cutoff_hz},
@@ -265,6 +272,9 @@ IdentifiedModel read_model(const std::filesystem::path& file) {
     for (const json& link : j.at("inertia"))
       model.inertia.push_back(to_inertia(link.get<std::array<double, parameters_per_link>>()));
     for (const json& joint : j.at("joints")) model.joints.push_back(to_joint(joint));
+    if (j.contains("robot_effects")) {
+      for (const json& effect : j.at("robot_effects")) model.body.push_back(to_effect(effect));
+    }
     if (model.inertia.size() != model.robot.size() || model.joints.size() != model.robot.size()) {
       throw InputError("robot, inertia and joints differ in length");
     }

@@ -24,7 +24,8 @@ struct EffectFit {
 
 /// The BLS of one joint (model/broad_learning.hpp).
 struct BroadLearningFit {
-  double reference_velocity = 1;                      ///< asinh(dq / reference) [rad/s | m/s]
+  double reference_velocity = 1;                      ///< input 1: asinh(dq / reference) / span [rad/s | m/s]
+  double span = 6;                                    ///< asinh at the largest velocity, at least 1 [-]
   std::array<double, 3> distances{1e-3, 3e-3, 9e-3};  ///< Dahl widths [rad | m]
   Eigen::MatrixXd weights;                            ///< nodes x 5: input weights, bias [-]
   Eigen::VectorXd coefficients;                       ///< 4 inputs, then nodes [N*m | N]
@@ -64,6 +65,7 @@ struct IdentifiedModel {
   std::vector<LinkInertia<Real>> inertia;  ///< representative: Y [beta; 0] = Y_b beta, DH frames
   std::vector<BaseParameter> base;
   std::vector<JointFit> joints;
+  std::vector<EffectFit> body;  ///< payload, gravity_tilt
   FilterFit filter;
   /// How to read logs, by file name; "" stands for logs that the project does not name.
   std::map<std::string, LogFormat> log_formats;

@@ -255,6 +255,11 @@ struct BoundedNumbers {
   }
 };
 
+template <Kind kind>
+Bounded<kind> limit(Bounded<kind> x, Bounded<kind> lower, Bounded<kind> upper, Saturations&) {
+  return {x.value.cut(lower.value.low, upper.value.high)};
+}
+
 // ---- the functions of math.hpp with their stated errors --------------------------------------------------------
 
 namespace detail {

@@ -6,6 +6,7 @@
 
 #include "host_tools/error.hpp"
 #include "host_tools/export/export.hpp"
+#include "host_tools/export/proof.hpp"
 #include "host_tools/files.hpp"
 #include "host_tools/report/metrics.hpp"
 #include "host_tools/report/report.hpp"
@@ -20,6 +21,11 @@ namespace {
 
 /// |fixed - double| on the logs beyond which tables are refused, of rated torque.
 constexpr double largest_error = 1e-3;
+/// The proven range of the rigid body's torque is refined until it is no more than this times what is attained ...
+constexpr double tight_enough = 2;
+/// ... or this many boxes were looked at.
+constexpr int proof_boxes = 20'000;
+constexpr Eigen::Index random_states = 20'000;
 
 const LogFormat& format_of(const IdentifiedModel& model, const fs::path& log) {
   for (const std::string& name : {log.filename().string(), std::string()}) {
@@ -149,14 +155,21 @@ IdentifiedModel Pipeline::model() {
 
 void Pipeline::export_tables() {
   IdentifiedModel model = this->model();
-  progress_.stage("choosing formats, writing tables", 1);
+  progress_.stage("proving ranges and errors, writing tables", 4);
+  const Formats formats = choose_formats(model);
+  const Proof proof = prove(model, &formats);
+  progress_.step();
+  const Attained attained = attain(model);
+  const Eigen::VectorXd structural = prove_structural(model, attained.structural, tight_enough, proof_boxes);
+  progress_.step();
   std::vector<TickStates> states, judged;
   for (const ProcessedLog& log : data().logs) states.push_back(at_ticks(log, model.tick_s));
-  const Formats formats = choose_formats(model, states);
   judged = states;
   for (std::size_t i = 0; i < states.size(); ++i) judged.push_back(perturbed(states[i], model, 1000 + i));
+  judged.push_back(within_limits(model, random_states, 77));
   const QuantisationError clean = quantisation_error(model, formats, states);
   const QuantisationError error = quantisation_error(model, formats, judged);
+  progress_.step();
   for (std::size_t j = 0; j < model.joints.size(); ++j) {
     const double share = clean.largest[static_cast<Eigen::Index>(j)] / model.joints[j].rated_torque;
     if (!(share <= largest_error)) {
@@ -166,20 +179,32 @@ void Pipeline::export_tables() {
           j + 1, model.robot.joints[j].name, share, largest_error));
     }
   }
-  model.tables_crc = write_tables(model, formats, error, directory_);
+  const auto n = model.joints.size();
+  model.tables_crc = write_tables(model, formats, error, proof.error, (1U << n) - 1, directory_);
+  for (const std::size_t j : project_.target.joints) {
+    const fs::path own = directory_ / fmt::format("joint_{}", j + 1);
+    fs::create_directories(own);
+    write_tables(model, formats, error, proof.error, 1U << j, own);
+  }
   model.formats = formats;
   json joints = json::array();
-  for (std::size_t j = 0; j < model.joints.size(); ++j) {
+  for (std::size_t j = 0; j < n; ++j) {
     const auto k = static_cast<Eigen::Index>(j);
     joints.push_back({{"joint", model.robot.joints[j].name},
                       {"index", j + 1},
                       {"unit", model.robot.joints[j].torque_unit()},
                       {"rated_torque", model.joints[j].rated_torque},
                       {"formats", formats_json(formats)},
-                      {"proven_bound", nullptr},  // not proven yet: only observed
+                      {"proven_bound", proof.error[k]},
+                      {"proven_bound_of_rated", proof.error[k] / model.joints[j].rated_torque},
                       {"observed_max", error.largest[k]},
                       {"observed_max_of_rated", error.largest[k] / model.joints[j].rated_torque},
-                      {"quantisation_rms", error.rms[k]}});
+                      {"quantisation_rms", error.rms[k]},
+                      {"torque_range",
+                       {{"proven", proof.torque[k]},
+                        {"proven_structural", structural[k]},
+                        {"attained", attained.total[k]},
+                        {"attained_structural", attained.structural[k]}}}});
   }
   const json document = {{"schema", "fxdyn.export/1"},
                          {"tick_s", model.tick_s},

@@ -50,9 +50,10 @@ Replayed play(QemuTarget& target, const IdentifiedModel& model, FixedModel& fixe
                   from_raw(words[3 * j + 2], formats[Quantity::acceleration])};
     }
     const auto reference = exact.tick(state, ignored);
-    for (std::size_t j = 0; j < state.size(); ++j) {
+    for (std::size_t i = 0; i < replies[k].torques.size(); ++i) {
+      const std::size_t j = fixed.outputs()[i];
       double& largest = out.largest_error[static_cast<Eigen::Index>(j)];
-      largest = std::max(largest, std::fabs(from_raw(replies[k].torques[j], formats[Quantity::torque]) - reference[j]));
+      largest = std::max(largest, std::fabs(from_raw(replies[k].torques[i], formats[Quantity::torque]) - reference[j]));
     }
     out.fewest = std::min(out.fewest, replies[k].instructions);
     out.most = std::max(out.most, replies[k].instructions);
@@ -62,9 +63,10 @@ Replayed play(QemuTarget& target, const IdentifiedModel& model, FixedModel& fixe
   return out;
 }
 
-json to_json(const Replayed& replayed, const TickStates& states, const IdentifiedModel& model) {
+json to_json(const Replayed& replayed, const TickStates& states, const IdentifiedModel& model,
+             const std::vector<std::size_t>& outputs) {
   json joints = json::array();
-  for (std::size_t j = 0; j < model.joints.size(); ++j) {
+  for (const std::size_t j : outputs) {
     const double error = replayed.largest_error[static_cast<Eigen::Index>(j)];
     joints.push_back({{"joint", model.robot.joints[j].name},
                       {"index", j + 1},
@@ -93,7 +95,6 @@ bool replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index
         fmt::format("{}: no tables of this model there; run `fxdyn export` and build the image from its tables.hpp",
                     pipeline.directory().string()));
   }
-  FixedModel fixed(model, *model.formats);
   std::vector<TickStates> streams;
   for (const Role role : {Role::test, Role::validate}) {
     for (const ProcessedLog& log : pipeline.logs(role)) streams.push_back(at_ticks(log, model.tick_s));
@@ -107,10 +108,13 @@ bool replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index
   const serial::Identity identity = target.hello();
   if (identity.state != serial::NodeState::ready)
     throw InputError(fmt::format("{}: the image refuses its tables (CRC or layout)", image.string()));
-  if (identity.layout_hash != fixed.layout_hash() || identity.tables_crc != model.tables_crc) {
+  const std::uint32_t all = (1U << model.robot.size()) - 1;
+  FixedModel fixed(model, *model.formats, identity.outputs & all);
+  if (identity.joints != model.robot.size() || identity.outputs == 0 || (identity.outputs & ~all) != 0 ||
+      identity.layout_hash != fixed.layout_hash() || identity.tables_crc != fixed.crc()) {
     throw InputError(
         fmt::format("{}: holds other tables (layout {:08x}, CRC {:08x}; expected {:08x}, {:08x}); build it from {}",
-                    image.string(), identity.layout_hash, identity.tables_crc, fixed.layout_hash(), model.tables_crc,
+                    image.string(), identity.layout_hash, identity.tables_crc, fixed.layout_hash(), fixed.crc(),
                     (pipeline.directory() / "tables.hpp").string()));
   }
   Progress progress;
@@ -120,13 +124,14 @@ bool replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index
   for (const TickStates& states : streams) {
     const Replayed replayed = play(target, model, fixed, states, std::min(max_ticks, states.t.size()));
     same = same && replayed.different_ticks == 0;
-    logs.push_back(to_json(replayed, states, model));
+    logs.push_back(to_json(replayed, states, model, fixed.outputs()));
     progress.step();
   }
   progress.done();
   json document = {{"schema", "fxdyn.replay/1"},
                    {"image", image.filename().string()},
-                   {"tables_crc", model.tables_crc},
+                   {"tables_crc", fixed.crc()},
+                   {"outputs", identity.outputs},
                    {"bit_exact", same},
                    {"logs", logs}};
   const std::filesystem::path size_file = image.parent_path() / "size.json";

@@ -85,13 +85,13 @@ LinkGeometry<Real> geometry(JointType type, const Isometry3d& previous, const Is
   link.cos_alpha = z0.dot(z1);
   link.sin_alpha = z0.cross(z1).dot(x0);
   if (std::abs(link.sin_alpha) < parallel) link.sin_alpha = 0;
-  link.cos_theta = x0.dot(x1);
-  link.sin_theta = x0.cross(x1).dot(z1);
+  double cos_theta = x0.dot(x1), sin_theta = x0.cross(x1).dot(z1);
   snap_angle(link.cos_alpha, link.sin_alpha);
-  snap_angle(link.cos_theta, link.sin_theta);
+  snap_angle(cos_theta, sin_theta);
+  link.theta = std::atan2(sin_theta, cos_theta);
   const Vector3d between = frame.translation() - previous.translation();
-  link.a = snap_length(between.dot(x0));
-  link.d = snap_length(between.dot(z1));
+  const double a = snap_length(between.dot(x0)), d = snap_length(between.dot(z1));
+  link.p = {a, -d * link.sin_alpha, d * link.cos_alpha};
   return link;
 }
 

@@ -49,15 +49,17 @@ void read_effect(Table table, Scenario& scenario) {
   fit.effect = name.name(known, "effect");
   fit.named = true;
   const EffectInfo& info = *find_effect(fit.effect);
-  if (const std::string reason = why_not_in_model(info); !reason.empty()) name.place().fail(reason);
-  const Value joint_value = table.need("joint", "1 for the first moving joint");
-  const auto joint = static_cast<std::size_t>(joint_value.integer(1));
-  if (joint > scenario.plant.robot.size()) {
-    joint_value.place().fail(fmt::format("the robot has {} joints", scenario.plant.robot.size()));
+  JointFit* target = nullptr;  // an effect on the body has no joint
+  if (info.acts_on != ActsOn::body) {
+    const Value joint_value = table.need("joint", "1 for the first moving joint");
+    const auto joint = static_cast<std::size_t>(joint_value.integer(1));
+    if (joint > scenario.plant.robot.size()) {
+      joint_value.place().fail(fmt::format("the robot has {} joints", scenario.plant.robot.size()));
+    }
+    target = &scenario.plant.joints[joint - 1];
+    if (target->find(fit.effect) != nullptr)
+      joint_value.place().fail(fmt::format("joint {} has {} already", joint, fit.effect));
   }
-  JointFit& target = scenario.plant.joints[joint - 1];
-  if (target.find(fit.effect) != nullptr)
-    joint_value.place().fail(fmt::format("joint {} has {} already", joint, fit.effect));
   Table parameters(table.need("parameters", "as in { amplitude = 2.0 }"));
   const auto read = [&](const ParameterInfo& parameter) {
     const Value value = parameters.need(std::string(parameter.name), fmt::format("in {}", parameter.unit));
@@ -70,11 +72,11 @@ void read_effect(Table table, Scenario& scenario) {
   for (const ParameterInfo& parameter : info.shape) fit.shape.push_back(read(parameter));
   for (const ParameterInfo& parameter : info.linear) fit.linear.push_back(read(parameter));
   if (fit.effect == "coulomb") {
-    if (const auto width = parameters.find("width")) target.sign_width = width->positive();
+    if (const auto width = parameters.find("width")) target->sign_width = width->positive();
   }
   parameters.finish();
   table.finish();
-  target.effects.push_back(fit);
+  (target != nullptr ? target->effects : scenario.plant.body).push_back(fit);
 }
 
 ScenarioLog read_scenario_log(Table table) {

@@ -20,16 +20,19 @@ struct Choice {
   Judgement judgement;
 };
 
+/// Weights lie on a grid that every format of theirs holds, so that fixed point does not change them.
+constexpr double weight_grid = 512;
+
 /// Random feature weights (paper Eqs. 23 and 25), drawn once: fewer nodes are the first rows of more.
 Eigen::MatrixXd random_weights(std::uint64_t seed, Eigen::Index nodes, double scale) {
   Random random(seed);
-  const auto inputs = static_cast<Eigen::Index>(BroadLearningInputs::count);
+  const auto inputs = static_cast<Eigen::Index>(BroadLearningLayout::inputs);
   Eigen::MatrixXd weights(nodes, inputs + 1);
   for (Eigen::Index k = 0; k < nodes; ++k) {
     for (Eigen::Index i = 0; i <= inputs; ++i) weights(k, i) = scale * random.uniform(-1, 1);
-    weights(k, 0) /= 3;  // asinh of the velocity reaches about 4.5, the Dahl states 1
+    weights(k, 0) *= 1.5;  // half of what the velocity's curve spans
   }
-  return weights;
+  return (weights * weight_grid).array().round() / weight_grid;
 }
 
 double span(const Fitter& fitter, std::size_t joint) {
@@ -71,6 +74,7 @@ std::vector<TrainOutcome> train(Fitter& fitter, const TrainSettings& settings, P
     JointFit design = fitter.design(j);
     BroadLearningFit bls;
     bls.reference_velocity = 0.02 * top_speed(fitter, j);
+    bls.span = std::asinh(std::max(top_speed(fitter, j), design.dq_limit) / bls.reference_velocity);
     const auto attempt = [&](double distance, double scale, Eigen::Index nodes) {
       bls.distances = {distance / 3, distance, distance * 3};
       bls.weights = random_weights(settings.seed * 100 + j, nodes, scale);

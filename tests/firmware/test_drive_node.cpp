@@ -17,9 +17,10 @@ struct Number {
 
 /// tau = gain q + dq - ddq + number of ticks since reset; one saturation for each negative q.
 struct StubModel {
-  static constexpr std::size_t joints = 2;
-  struct Joint {
-    Number q, dq, ddq;
+  static constexpr std::size_t joints = 2, outputs = 2;
+  static constexpr std::uint32_t outputs_mask = 3;
+  struct Setpoints {
+    Number q[joints], dq[joints], ddq[joints];
   };
   struct Parameters {
     std::int32_t gain = 0;
@@ -27,15 +28,17 @@ struct StubModel {
   struct State {
     std::int32_t ticks = 0;
   };
-  using Inputs = std::array<Joint, joints>;
-  using Torques = std::array<Number, joints>;
-  static Torques tick(const Parameters& parameters, State& state, const Inputs& inputs,
+  struct Torques {
+    Number tau[outputs];
+    Number& operator[](int i) { return tau[i]; }
+  };
+  static Torques tick(const Parameters& parameters, State& state, const Setpoints& inputs,
                       Saturations& saturations) noexcept {
     Torques tau;
     ++state.ticks;
-    for (std::size_t j = 0; j < joints; ++j) {
-      tau[j].raw = parameters.gain * inputs[j].q.raw + inputs[j].dq.raw - inputs[j].ddq.raw + state.ticks;
-      saturations.count += inputs[j].q.raw < 0 ? 1 : 0;
+    for (int j = 0; j < 2; ++j) {
+      tau[j].raw = parameters.gain * inputs.q[j].raw + inputs.dq[j].raw - inputs.ddq[j].raw + state.ticks;
+      saturations.count += inputs.q[j].raw < 0 ? 1 : 0;
     }
     return tau;
   }

@@ -1,0 +1,182 @@
+#include "host_tools/export/proof.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <queue>
+
+#include "host_tools/error.hpp"
+#include "host_tools/model/evaluator.hpp"
+#include "host_tools/parallel.hpp"
+#include "host_tools/random.hpp"
+
+namespace fxdyn {
+namespace {
+
+using State = JointState<BoundedNumbers>;
+
+/// Every joint anywhere within its limits.
+std::vector<State> whole_box(const IdentifiedModel& model) {
+  std::vector<State> box;
+  for (const JointFit& joint : model.joints) {
+    box.push_back({{{joint.q_lower, joint.q_upper, 0}},
+                   {{-joint.dq_limit, joint.dq_limit, 0}},
+                   {{-joint.ddq_limit, joint.ddq_limit, 0}}});
+  }
+  return box;
+}
+
+/// The same model whose torques are not cut, so that they show.
+IdentifiedModel uncut(const IdentifiedModel& model, bool effects) {
+  IdentifiedModel out = model;
+  for (JointFit& joint : out.joints) {
+    joint.tau_limit = unbounded;
+    if (effects) continue;
+    joint.effects.clear();
+    joint.bls.reset();
+  }
+  return out;
+}
+
+}  // namespace
+
+Proof prove(const IdentifiedModel& model, const Formats* formats) {
+  Proof proof;
+  const BoundScope scope(proof.ranges, formats);
+  Evaluator<BoundedNumbers> evaluator(uncut(model, true), model.tick_s);
+  const std::vector<State> box = whole_box(model);
+  for (const State& joint : box) {
+    proof.ranges.see({Kind::number, Quantity::position}, joint.q.value.magnitude());
+    proof.ranges.see({Kind::number, Quantity::velocity}, joint.dq.value.magnitude());
+    proof.ranges.see({Kind::number, Quantity::acceleration}, joint.ddq.value.magnitude());
+  }
+  Saturations none;
+  const auto n = static_cast<Eigen::Index>(model.joints.size());
+  proof.torque = proof.error = Eigen::VectorXd::Zero(n);
+  // Three ticks: a state starts at rest, is anywhere in its range after one, and its memory of memory after two.
+  for (int tick = 0; tick < 3; ++tick) {
+    const auto torques = evaluator.tick(box, none);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const Bound tau = torques[static_cast<std::size_t>(j)].value;
+      proof.torque[j] = std::max(proof.torque[j], tau.magnitude());
+      proof.error[j] = std::max(proof.error[j], tau.error);
+    }
+  }
+  if (formats == nullptr) return proof;
+  for (std::size_t g = 0; g < group_count; ++g) {
+    for (std::size_t i = 0; i < quantity_count; ++i) {
+      const Kind kind{static_cast<Kind::Group>(g), static_cast<Quantity>(i)};
+      const double most = proof.ranges[kind];
+      const bool small = kind.quantity == Quantity::weight && kind.group == Kind::number;
+      if (most > std::ldexp(small ? 32767.0 : 2147483647.0, -bits_of(*formats, kind))) {
+        throw DataError(fmt::format("can't prove that {} stays in its format (up to {:.3g}, {} fractional bits)",
+                                    quantity_names[i], most, bits_of(*formats, kind)));
+      }
+    }
+  }
+  return proof;
+}
+
+Attained attain(const IdentifiedModel& model) {
+  const auto n = model.joints.size();
+  const IdentifiedModel free = uncut(model, true);
+  Attained out{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(n)), Eigen::VectorXd::Zero(static_cast<Eigen::Index>(n))};
+  constexpr int starts = 60;
+  constexpr int steps = 9;
+  parallel_for(n, [&](std::size_t target) {
+    Evaluator<Real> evaluator(free, model.tick_s);
+    Random random(100 + target);
+    Saturations none;
+    double structural = 0, total = 0;
+    std::vector<JointState<Real>> state(n);
+    const auto torque = [&] {
+      evaluator.reset();
+      const double whole = std::fabs(evaluator.tick(state, none)[target]);
+      const double rigid = std::fabs(evaluator.structural()[target]);
+      structural = std::max(structural, rigid);
+      total = std::max(total, whole);
+      return whole;
+    };
+    for (int start = 0; start < starts; ++start) {
+      const auto either = [&](double x) { return random.uniform() < 0.5 ? -x : x; };
+      for (std::size_t j = 0; j < n; ++j) {
+        const JointFit& joint = model.joints[j];
+        state[j] = {random.uniform(joint.q_lower, joint.q_upper), either(joint.dq_limit), either(joint.ddq_limit)};
+      }
+      double best = torque();
+      for (int round = 0; round < 4; ++round) {
+        const double before = best;
+        const auto along = [&](double& x, double low, double high, int count) {
+          double kept = x;
+          for (int i = 0; i < count; ++i) {
+            x = low + (high - low) * i / (count - 1);
+            const double value = torque();
+            if (value > best) {
+              best = value;
+              kept = x;
+            }
+          }
+          x = kept;
+        };
+        for (std::size_t j = 0; j < n; ++j) {
+          const JointFit& joint = model.joints[j];
+          along(state[j].q, joint.q_lower, joint.q_upper, 2 * steps);
+          along(state[j].dq, -joint.dq_limit, joint.dq_limit, 3);
+          along(state[j].ddq, -joint.ddq_limit, joint.ddq_limit, 2);
+        }
+        if (best <= before) break;
+      }
+    }
+    out.structural[static_cast<Eigen::Index>(target)] = structural;
+    out.total[static_cast<Eigen::Index>(target)] = total;
+  });
+  return out;
+}
+
+Eigen::VectorXd prove_structural(const IdentifiedModel& model, const Eigen::VectorXd& attained, double goal, int boxes) {
+  Ranges ignored;
+  const BoundScope scope(ignored, nullptr);
+  Evaluator<BoundedNumbers> evaluator(uncut(model, false), model.tick_s);
+  const auto n = static_cast<Eigen::Index>(model.joints.size());
+  Saturations none;
+  struct Box {
+    std::vector<State> states;
+    Eigen::VectorXd bound;
+    double score;
+    bool operator<(const Box& other) const { return score < other.score; }
+  };
+  const auto make = [&](std::vector<State> states) {
+    Box box{std::move(states), Eigen::VectorXd(n), 0};
+    const auto torques = evaluator.tick(box.states, none);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      box.bound[j] = torques[static_cast<std::size_t>(j)].value.magnitude();
+      if (attained[j] > 0) box.score = std::max(box.score, box.bound[j] / attained[j]);
+    }
+    return box;
+  };
+  std::priority_queue<Box> open;
+  open.push(make(whole_box(model)));
+  Eigen::VectorXd closed = Eigen::VectorXd::Zero(n);
+  for (int used = 0; used < boxes && open.top().score > goal;) {
+    const Box box = open.top();
+    open.pop();
+    // the joint whose halves are best
+    std::optional<std::pair<Box, Box>> best;
+    for (std::size_t j = 0; j < box.states.size(); ++j) {
+      std::vector<State> lower = box.states, upper = box.states;
+      const Bound q = box.states[j].q.value;
+      const double middle = (q.low + q.high) / 2;
+      lower[j].q.value.high = upper[j].q.value.low = middle;
+      Box a = make(std::move(lower)), b = make(std::move(upper));
+      used += 2;
+      if (!best || a.score + b.score < best->first.score + best->second.score)
+        best.emplace(std::move(a), std::move(b));
+    }
+    open.push(std::move(best->first));
+    open.push(std::move(best->second));
+  }
+  for (; !open.empty(); open.pop()) closed = closed.cwiseMax(open.top().bound);
+  return closed;
+}
+
+}  // namespace fxdyn
