@@ -52,7 +52,7 @@ Proof prove(const IdentifiedModel& model, const Formats* formats) {
   }
   Saturations none;
   const auto n = static_cast<Eigen::Index>(model.joints.size());
-  proof.torque = proof.error = Eigen::VectorXd::Zero(n);
+  proof.torque = proof.effects = proof.error = Eigen::VectorXd::Zero(n);
   // Three ticks: a state starts at rest, is anywhere in its range after one, and its memory of memory after two.
   for (int tick = 0; tick < 3; ++tick) {
     const auto torques = evaluator.tick(box, none);
@@ -60,6 +60,8 @@ Proof prove(const IdentifiedModel& model, const Formats* formats) {
       const Bound tau = torques[static_cast<std::size_t>(j)].value;
       proof.torque[j] = std::max(proof.torque[j], tau.magnitude());
       proof.error[j] = std::max(proof.error[j], tau.error);
+      proof.effects[j] =
+          std::max(proof.effects[j], evaluator.effects()[static_cast<std::size_t>(j)].value.magnitude());
     }
   }
   if (formats == nullptr) return proof;
@@ -134,49 +136,44 @@ Attained attain(const IdentifiedModel& model) {
 }
 
 Eigen::VectorXd prove_structural(const IdentifiedModel& model, const Eigen::VectorXd& attained, double goal, int boxes) {
-  Ranges ignored;
-  const BoundScope scope(ignored, nullptr);
-  Evaluator<BoundedNumbers> evaluator(uncut(model, false), model.tick_s);
-  const auto n = static_cast<Eigen::Index>(model.joints.size());
-  Saturations none;
   struct Box {
     std::vector<State> states;
-    Eigen::VectorXd bound;
-    double score;
-    bool operator<(const Box& other) const { return score < other.score; }
+    double bound;
+    bool operator<(const Box& other) const { return bound < other.bound; }
   };
-  const auto make = [&](std::vector<State> states) {
-    Box box{std::move(states), Eigen::VectorXd(n), 0};
-    const auto torques = evaluator.tick(box.states, none);
-    for (Eigen::Index j = 0; j < n; ++j) {
-      box.bound[j] = torques[static_cast<std::size_t>(j)].value.magnitude();
-      if (attained[j] > 0) box.score = std::max(box.score, box.bound[j] / attained[j]);
+  const auto n = model.joints.size();
+  Eigen::VectorXd proven(static_cast<Eigen::Index>(n));
+  parallel_for(n, [&](std::size_t target) {
+    Ranges ignored;
+    const BoundScope scope(ignored, nullptr);
+    Evaluator<BoundedNumbers> evaluator(uncut(model, false), model.tick_s);
+    Saturations none;
+    const auto make = [&](std::vector<State> states) {
+      const double bound = evaluator.tick(states, none)[target].value.magnitude();
+      return Box{std::move(states), bound};
+    };
+    std::priority_queue<Box> open;
+    open.push(make(whole_box(model)));
+    for (int used = 0; used < boxes && open.top().bound > goal * attained[static_cast<Eigen::Index>(target)];) {
+      const Box box = open.top();
+      open.pop();
+      // the joint whose halves are best
+      std::optional<std::pair<Box, Box>> best;
+      for (std::size_t j = 0; j < n; ++j) {
+        std::vector<State> lower = box.states, upper = box.states;
+        const Bound q = box.states[j].q.value;
+        lower[j].q.value.high = upper[j].q.value.low = (q.low + q.high) / 2;
+        Box a = make(std::move(lower)), b = make(std::move(upper));
+        used += 2;
+        if (!best || a.bound + b.bound < best->first.bound + best->second.bound)
+          best.emplace(std::move(a), std::move(b));
+      }
+      open.push(std::move(best->first));
+      open.push(std::move(best->second));
     }
-    return box;
-  };
-  std::priority_queue<Box> open;
-  open.push(make(whole_box(model)));
-  Eigen::VectorXd closed = Eigen::VectorXd::Zero(n);
-  for (int used = 0; used < boxes && open.top().score > goal;) {
-    const Box box = open.top();
-    open.pop();
-    // the joint whose halves are best
-    std::optional<std::pair<Box, Box>> best;
-    for (std::size_t j = 0; j < box.states.size(); ++j) {
-      std::vector<State> lower = box.states, upper = box.states;
-      const Bound q = box.states[j].q.value;
-      const double middle = (q.low + q.high) / 2;
-      lower[j].q.value.high = upper[j].q.value.low = middle;
-      Box a = make(std::move(lower)), b = make(std::move(upper));
-      used += 2;
-      if (!best || a.score + b.score < best->first.score + best->second.score)
-        best.emplace(std::move(a), std::move(b));
-    }
-    open.push(std::move(best->first));
-    open.push(std::move(best->second));
-  }
-  for (; !open.empty(); open.pop()) closed = closed.cwiseMax(open.top().bound);
-  return closed;
+    proven[static_cast<Eigen::Index>(target)] = open.top().bound;
+  });
+  return proven;
 }
 
 }  // namespace fxdyn

@@ -13,6 +13,7 @@ struct IdentifiedModel;
 struct Proof {
   Ranges ranges;           ///< of every kind of number: formats that hold them can't overflow
   Eigen::VectorXd torque;  ///< |tau| of each joint before its torque limit, at most [N*m | N]
+  Eigen::VectorXd effects;  ///< |tau - structural torque| of each joint, at most
   Eigen::VectorXd error;   ///< |fixed - double| of each joint, at most; zero without formats
 };
 

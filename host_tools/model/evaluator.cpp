@@ -73,7 +73,13 @@ Evaluator<N>::Evaluator(const IdentifiedModel& model, double tick_s) {
     const auto q = [](double x) { return from_si<N, Quantity::position>(x); };
     const auto dq = [](double x) { return from_si<N, Quantity::velocity>(x); };
     const auto ddq = [](double x) { return from_si<N, Quantity::acceleration>(x); };
-    const auto tau = [](double x) { return from_si<N, Quantity::torque>(x); };
+    // torques are cut to their limits, so that a limit beyond the format is as good as the format's end
+    const auto tau = [](double x) {
+      if constexpr (std::is_same_v<N, BoundedNumbers>)
+        return Torque<N>{{x, x, 0}};
+      else
+        return from_si<N, Quantity::torque>(x);
+    };
     constants_.push_back({{q(joint.q_lower), q(joint.q_upper), dq(-joint.dq_limit), dq(joint.dq_limit),
                            ddq(-joint.ddq_limit), ddq(joint.ddq_limit), tau(-joint.tau_limit), tau(joint.tau_limit)},
                           from_si<N, Quantity::inverse_velocity>(1 / joint.sign_width)});
@@ -90,6 +96,7 @@ Evaluator<N>::Evaluator(const IdentifiedModel& model, double tick_s) {
   motions_.resize(n);
   wrenches_.resize(n);
   structural_.resize(n);
+  effects_.resize(n);
   tau_.resize(n);
 }
 
@@ -192,6 +199,7 @@ std::span<const Torque<N>> Evaluator<N>::tick(std::span<const JointState<N>> set
     auto sum = N::no_torque();
     JointInput<N> u = inputs_[i];
     for (auto& step : steps_[i]) sum = sum + step->torque(u, sum, saturations);
+    effects_[i] = sum;
     tau_[i] = joint_feedforward<N>(structural_[i], sum, constants_[i].limits, saturations);
   }
   return tau_;

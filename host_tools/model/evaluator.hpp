@@ -72,6 +72,8 @@ class Evaluator {
   std::span<const Torque<N>> tick(std::span<const JointState<N>> setpoints, Saturations& saturations);
   /// Rigid-body torque of the last tick.
   std::span<const Torque<N>> structural() const { return structural_; }
+  /// Sum of each joint's effects in the last tick.
+  std::span<const typename N::TorqueSum> effects() const { return effects_; }
 
   /// The parameters in the order of RobotModel::Parameters, as words; with the effects of the joints
   /// put out only.
@@ -135,6 +137,7 @@ class Evaluator {
   std::vector<LinkMotion<N>> motions_;
   std::vector<Wrench<N>> wrenches_;
   std::vector<Torque<N>> structural_, tau_;
+  std::vector<typename N::TorqueSum> effects_;
 };
 
 extern template class Evaluator<Real>;

@@ -22,8 +22,8 @@ struct Presliding {
   static constexpr void basis(const JointInput<N>& u, Words<N> words, Dahl<N>& state, Saturations& saturations,
                               Emit&& emit) {
     const auto z = state.step(u.dq, words.template number<Quantity::inverse_path>(0), saturations);
-    // |z| <= 1 and |sign| < 1 (fixed-point tanh ends at 1 - 2e-7): the difference stays inside [-2, 2).
-    emit(as<Quantity::unit>, 0, N::template proven_narrow<Unit<N>>(z - u.sign));
+    // 2 itself is just outside the format
+    emit(as<Quantity::unit>, 0, N::template clamp<Unit<N>>(z - u.sign));
   }
 };
 
