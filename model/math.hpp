@@ -217,9 +217,9 @@ constexpr std::int32_t asinh(std::int32_t x) {
 }
 
 constexpr std::int32_t magnitude(std::int32_t x) {
-  const std::int32_t sign = x >> 31;
-  // -2^31 has no positive counterpart: ~x is the nearest
-  return x == static_cast<std::int32_t>(min32) ? ~x : (x ^ sign) - sign;
+  const auto sign = static_cast<std::uint32_t>(x >> 31);
+  const std::uint32_t size = (static_cast<std::uint32_t>(x) ^ sign) - sign;
+  return static_cast<std::int32_t>(size - (size >> 31));  // 2^31 becomes the nearest int32, without a branch
 }
 
 /// sign(x) with 30 bits

@@ -22,7 +22,7 @@ struct Elasticity {
   template <class N>
   struct State {
     Torque<N> load{};
-    bool started = false;
+    std::uint32_t ticks = 0;  ///< 0 or 1: stepped before
   };
   static double stored_shape(std::size_t, double relaxation, double tick_s) {
     return relaxation > 0 ? -std::expm1(-tick_s / relaxation) : 1;
@@ -30,9 +30,10 @@ struct Elasticity {
 
   template <class N, class Emit>
   static constexpr void basis(const JointInput<N>& u, Words<N> words, State<N>& state, Saturations&, Emit&& emit) {
-    const auto share = state.started ? words.template number<Quantity::unit>(0) : N::one();
-    state.started = true;
-    state.load = blend<N>(state.load, u.structural, share);
+    // The first tick takes the torque as it is: no branch, so that every tick costs the same.
+    const std::array<Unit<N>, 2> shares{N::one(), words.template number<Quantity::unit>(0)};
+    state.load = blend<N>(state.load, u.structural, shares[state.ticks]);
+    state.ticks = 1;
     emit(as<Quantity::torque>, 0, state.load);
   }
 };

@@ -62,6 +62,11 @@ TEST(Math, ClippingIsWhatALimiterAdds) {
   }
 }
 
+TEST(Math, MagnitudeSaturatesAtTheEnd) {
+  for (const std::int32_t x : samples())
+    ASSERT_EQ(raw::magnitude(x), std::min<std::int64_t>(std::abs(std::int64_t{x}), INT32_MAX)) << x;
+}
+
 TEST(Math, CountsSplitIntoWholeAndRest) {
   for (const std::int32_t x : samples()) {
     const auto fixed = raw::split_count(x);
