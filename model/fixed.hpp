@@ -41,7 +41,8 @@ constexpr std::int32_t saturate(std::int64_t x, std::uint32_t& outside) {
   const auto high = static_cast<std::int32_t>(x >> 32);
   const std::int32_t bound = (high >> 31) ^ static_cast<std::int32_t>(max32);
   outside = static_cast<std::uint32_t>(high != (low >> 31));
-  return outside != 0 ? bound : low;
+  // a mask instead of a choice, of which compilers make a branch
+  return low ^ ((low ^ bound) & -static_cast<std::int32_t>(outside));
 }
 
 constexpr std::int32_t narrow(std::int64_t x, int shift, std::uint32_t& outside) {

@@ -280,7 +280,7 @@ constexpr WholeAndRest<Fixed<unit_bits>> split_count(Fixed<count_bits> x) {
 template <class N, class T>
 constexpr T blend(T a, T b, Unit<N> share) {
   const auto rest = N::template proven_narrow<Unit<N>>(N::one() - share);
-  return N::between(a, b, N::template proven_narrow<T>(a * rest + b * share));
+  return N::template narrow_between<T>(a * rest + b * share, a, b);
 }
 
 }  // namespace fxdyn

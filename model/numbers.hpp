@@ -18,7 +18,7 @@
 //   N::turned(v, c, s)          v, that was just turned with cosine c and sine s; bounding systems cut its components down
 //                               to its length (vector.hpp)
 //   N::rounded_length<T>(l)     length of a vector whose components were narrowed to T
-//   N::between(a, b, x)         x; bounding systems cut it down to what lies between a and b
+//   N::narrow_between<T>(w, a, b)  proven_narrow of what lies between a and b; bounding systems know no more than that
 //   N::Word, N::load<T>(word)   how parameters are stored in tables, and one of them as a number
 //
 // Coefficients (N::Coefficient<Q>) multiply a number of quantity Q to give a torque; their format follows from that of
@@ -78,7 +78,7 @@ struct Real {
     return {};
   }
   template <class T>
-  static constexpr T between(T, T, T x) {
+  static constexpr T narrow_between(double x, T, T) {
     return x;
   }
 };
@@ -201,9 +201,9 @@ struct FixedNumbers {
   static constexpr NoLength rounded_length(NoLength) {
     return {};
   }
-  template <class T>
-  static constexpr T between(T, T, T x) {
-    return x;
+  template <class T, int bits>
+  static constexpr T narrow_between(Wide<bits> x, T, T) {
+    return proven_narrow<T>(x);
   }
 };
 

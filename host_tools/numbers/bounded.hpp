@@ -217,9 +217,9 @@ struct BoundedNumbers {
     return x;
   }
   template <class T>
-  static T between(T a, T b, T x) {
+  static T narrow_between(BoundedWide x, T a, T b) {
     Bound out = Bound::hull(a.value, b.value);
-    const double own = std::fmax(0.0, x.value.error - out.error);
+    const double own = std::fmax(0.0, rounded<T>(x.value).error - out.error);
     out.error = current_bounding.formats != nullptr ? std::fmax(out.error, creeping_ticks * own) : 0;
     return {out};
   }

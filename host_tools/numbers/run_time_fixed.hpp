@@ -116,8 +116,8 @@ struct RunTimeNumbers {
     return {};
   }
   template <class T>
-  static T between(T, T, T x) {
-    return x;
+  static T narrow_between(RunTimeWide x, T, T) {
+    return proven_narrow<T>(x);
   }
   static Of<Quantity::unit> one() { return {1 << unit_bits}; }
 
