@@ -12,8 +12,8 @@ float='__aeabi_[fd].*|__aeabi_c[fd]cmp.*|__aeabi_(u?[il]2[fdh]|h2f.*|h2d)|__[a-z
 division='__aeabi_[ui]*l?div(mod)?|__aeabi_u?ldivmod|__aeabi_[il]?div0|__u?(div|mod|divmod)[sdt]i[34]'
 
 symbols=$("$1" "$3" | awk '{ print $NF }')
-# Data between the code has no mnemonic: objdump prints it as .word.
-mnemonics=$("$2" -d --no-show-raw-insn "$3" | awk '/^ +[0-9a-f]+:/ { print $2 }' | sort -u)
+# Constants in between are printed as .word.
+mnemonics=$("$2" -d --no-show-raw-insn "$3" | awk '/^ *[0-9a-f]+:\t/ { print $2 }' | sort -u)
 [ -n "$symbols" ] && [ -n "$mnemonics" ] || { echo "check_image: $3: no symbols or no code" >&2; exit 2; }
 
 good=true

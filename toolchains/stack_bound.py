@@ -63,7 +63,7 @@ def read_disassembly(text, functions):
             name = head[1]
             function = functions.setdefault(name, Function())
             continue
-        code = re.match(r'^ +[0-9a-f]+:\t(\S+)(?:\t(.*))?$', line)
+        code = re.match(r'^ *[0-9a-f]+:\t(\S+)(?:\t(.*))?$', line)
         if not code or function is None:
             continue
         operation, operands = code[1].removesuffix('.n').removesuffix('.w'), code[2] or ''
@@ -71,6 +71,8 @@ def read_disassembly(text, functions):
             # A branch into another function is a tail call.
             if operation.startswith('b') and (operation in ('bl', 'blx') or target[1] != name):
                 function.calls.add(target[1])
+        elif operation == 'bl' and f'<{name}+' in operands:
+            pass  # Armv6-M's far jump within a function
         elif operation in ('bl', 'blx') or (operation == 'bx' and operands.split()[0] != 'lr'):
             function.problems.append(f'indirect call ({operation} {operands})')
         if name in known:
