@@ -5,7 +5,7 @@ set(CMAKE_TRY_COMPILE_PLATFORM_VARIABLES FXDYN_CPU)
 set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
 
 if(NOT FXDYN_CPU)
-  message(FATAL_ERROR "set FXDYN_CPU to cortex-m3, cortex-m4, cortex-m7 or cortex-m33")
+  message(FATAL_ERROR "set FXDYN_CPU to cortex-m0, cortex-m3, cortex-m4, cortex-m7 or cortex-m33")
 endif()
 include(${CMAKE_CURRENT_LIST_DIR}/${FXDYN_CPU}.cmake)  # FXDYN_CPU_FLAGS, FXDYN_BOARD, FXDYN_LINKER_SCRIPT
 

@@ -1,0 +1,36 @@
+// My drive: the feedforward torque of fxdyn, once per tick.
+
+#include "firmware/tick_budget.hpp"
+#include "tables.hpp"
+
+namespace {
+
+using Model = fxdyn::tables::Model;
+
+// Instructions as `fxdyn replay` measured them for these tables. If they outgrow the tick, this stops the build.
+constexpr fxdyn::TickBudget budget{.clock_hz = 170'000'000, .tick_us = 2000};
+static_assert(budget.allows(40'000));
+
+Model::State state;              // what the effects remember; {} = at rest
+fxdyn::Saturations saturations;  // stays 0 while the setpoints are within the limits
+
+// Stand-ins for the drive's own: the newest setpoints from the bus, and the torque offset of its control loop.
+volatile std::int32_t bus_setpoints[3 * Model::joints];
+volatile std::int32_t torque_offset[Model::joints];
+
+void on_tick() {
+  Model::Inputs setpoints;
+  for (std::size_t j = 0; j < Model::joints; ++j) {
+    setpoints[j].q.raw = bus_setpoints[3 * j];
+    setpoints[j].dq.raw = bus_setpoints[3 * j + 1];
+    setpoints[j].ddq.raw = bus_setpoints[3 * j + 2];
+  }
+  const Model::Torques torques = Model::tick(fxdyn::tables::parameters, state, setpoints, saturations);
+  for (std::size_t j = 0; j < Model::joints; ++j) torque_offset[j] = torques[j].raw;
+}
+
+}  // namespace
+
+int main() {
+  for (int tick = 0; tick < 3; ++tick) on_tick();  // on a drive: the timer's interrupt, every 2 ms
+}

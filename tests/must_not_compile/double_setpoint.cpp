@@ -1,0 +1,14 @@
+// expect: no match for 'operator='
+#include "tests/golden/tables.hpp"
+
+using fxdyn::tables::Model;
+
+Model::Torques tick(Model::State& state, double velocity, fxdyn::Saturations& saturations) {
+  Model::Inputs setpoints{};
+#ifdef FXDYN_OK
+  setpoints[0].dq.raw = static_cast<std::int32_t>(velocity);
+#else
+  setpoints[0].dq = velocity;
+#endif
+  return Model::tick(fxdyn::tables::parameters, state, setpoints, saturations);
+}

@@ -1,0 +1,120 @@
+// Golden replay: the model's torques and saturation counts, bit for bit, on a board without anything else running, or
+// on the host. Says how many instructions a tick takes where the board can count them.
+
+#include <algorithm>
+#include <cstdint>
+
+#include "tests/golden/vectors.hpp"
+
+#include FXDYN_TABLES_HEADER
+
+#ifdef __arm__
+#include "hal/cortex_m/semihosting.hpp"
+#else
+#include <cstdio>
+#endif
+#ifdef FXDYN_COUNTS_INSTRUCTIONS
+#include "hal/mps2/systick.hpp"
+#endif
+
+namespace {
+
+using fxdyn::tables::Model;
+namespace golden = fxdyn::golden;
+
+#ifdef __arm__
+using fxdyn::hal::semihosting::print;
+#else
+void print(const char* text) { std::fputs(text, stdout); }
+void print(std::uint32_t number) { std::printf("%u", number); }
+#endif
+
+void print(const char* name, std::uint32_t number) {
+  print(name);
+  print(" ");
+  print(number);
+  print("\n");
+}
+
+#ifdef FXDYN_COUNTS_INSTRUCTIONS
+using Counter = fxdyn::hal::mps2::SysTick;
+#else
+struct Counter {
+  void start() {}
+  std::uint32_t stop() { return 0; }
+};
+#endif
+
+Model::State state;
+Model::Inputs setpoints;
+Model::Torques torques;
+fxdyn::Saturations saturations;
+
+/// The tables as the flash holds them: the compiler must not compute with the values that it knows.
+const auto& parameters_in_flash() {
+  const auto* parameters = &fxdyn::tables::parameters;
+  asm volatile("" : "+r"(parameters));
+  return *parameters;
+}
+
+/// A function of its own, so that no part of the tick can leave the measured stretch.
+[[gnu::noinline]] void compute(const Model::Parameters& parameters) {
+  torques = Model::tick(parameters, state, setpoints, saturations);
+}
+
+[[gnu::noinline]] void nothing(const Model::Parameters&) { asm volatile(""); }
+
+}  // namespace
+
+int main() {
+  static_assert(golden::joints == Model::joints && fxdyn::tables::page.header.crc32 == golden::tables_crc,
+                "tables.hpp and vectors.hpp are not of one run of make.sh");
+  const Model::Parameters& parameters = parameters_in_flash();
+  Counter counter;
+  counter.start();
+  nothing(parameters);
+  const std::uint32_t empty = counter.stop();
+
+  std::uint32_t different = 0, fewest = UINT32_MAX, most = 0;
+  std::size_t until_reset = 0;
+  const std::int32_t *in = golden::setpoints.data(), *expected = golden::torques.data();
+  for (std::size_t tick = 0; tick < golden::ticks; ++tick) {
+    if (until_reset == 0) {
+      state = {};
+      until_reset = golden::ticks_per_run;
+    }
+    --until_reset;
+    for (auto& joint : setpoints) {
+      joint.q.raw = *in++;
+      joint.dq.raw = *in++;
+      joint.ddq.raw = *in++;
+    }
+    saturations = {};
+    counter.start();
+    compute(parameters);
+    const std::uint32_t instructions = counter.stop() - empty;
+    fewest = std::min(fewest, instructions);
+    most = std::max(most, instructions);
+
+    bool same = saturations.count == golden::saturations[tick];
+    for (const auto torque : torques) same &= torque.raw == *expected++;
+    if (same) continue;
+    if (different == 0) print("first_different_tick", static_cast<std::uint32_t>(tick));
+    ++different;
+  }
+
+  print("joints", golden::joints);
+  print("effects", golden::effects);
+  print("bls_nodes", golden::bls_nodes);
+  print("ticks", static_cast<std::uint32_t>(golden::ticks));
+  print("different_ticks", different);
+#ifdef FXDYN_COUNTS_INSTRUCTIONS
+  print("fewest_instructions", fewest);
+  print("most_instructions", most);
+#endif
+#ifdef __arm__
+  fxdyn::hal::semihosting::exit(different == 0 ? 0 : 1);
+#else
+  return different == 0 ? 0 : 1;
+#endif
+}
