@@ -16,7 +16,7 @@ set(FXDYN_LINKER_DIRECTORY ${CMAKE_CURRENT_LIST_DIR}/linker)
 # No exceptions, no run-time types, no guards for static locals: nothing that pulls in the heap.
 string(JOIN " " CMAKE_CXX_FLAGS_INIT
   ${FXDYN_CPU_FLAGS} -mthumb -ffreestanding -fno-exceptions -fno-rtti -fno-threadsafe-statics -fno-use-cxa-atexit
-  -ffunction-sections -fdata-sections --specs=nano.specs)
+  -ffunction-sections -fdata-sections -Wno-psabi --specs=nano.specs)
 # The cache variable itself: to the _INIT one CMake would append its own -O3.
 set(CMAKE_CXX_FLAGS_RELEASE "-O2" CACHE STRING "Flags of release builds")
 set(CMAKE_EXE_LINKER_FLAGS_INIT "-nostartfiles -Wl,--gc-sections,--no-warn-rwx-segments,--fatal-warnings")

@@ -9,24 +9,24 @@ using Model = fxdyn::tables::Model;
 
 // Instructions as `fxdyn replay` measured them for these tables. If they outgrow the tick, this stops the build.
 constexpr fxdyn::TickBudget budget{.clock_hz = 170'000'000, .tick_us = 2000};
-static_assert(budget.allows(40'000));
+static_assert(budget.allows(12'000));
 
 Model::State state;              // what the effects remember; {} = at rest
 fxdyn::Saturations saturations;  // stays 0 while the setpoints are within the limits
 
 // Stand-ins for the drive's own: the newest setpoints from the bus, and the torque offset of its control loop.
 volatile std::int32_t bus_setpoints[3 * Model::joints];
-volatile std::int32_t torque_offset[Model::joints];
+volatile std::int32_t torque_offset[Model::outputs];  // of the joints that the tables put out
 
 void on_tick() {
-  Model::Inputs setpoints;
-  for (std::size_t j = 0; j < Model::joints; ++j) {
-    setpoints[j].q.raw = bus_setpoints[3 * j];
-    setpoints[j].dq.raw = bus_setpoints[3 * j + 1];
-    setpoints[j].ddq.raw = bus_setpoints[3 * j + 2];
+  Model::Setpoints setpoints;
+  for (int j = 0; j < static_cast<int>(Model::joints); ++j) {
+    setpoints.q[j].raw = bus_setpoints[3 * j];
+    setpoints.dq[j].raw = bus_setpoints[3 * j + 1];
+    setpoints.ddq[j].raw = bus_setpoints[3 * j + 2];
   }
   const Model::Torques torques = Model::tick(fxdyn::tables::parameters, state, setpoints, saturations);
-  for (std::size_t j = 0; j < Model::joints; ++j) torque_offset[j] = torques[j].raw;
+  for (int j = 0; j < static_cast<int>(Model::outputs); ++j) torque_offset[j] = torques[j].raw;
 }
 
 }  // namespace

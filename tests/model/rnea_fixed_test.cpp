@@ -49,7 +49,7 @@ TickStates random_states(const IdentifiedModel& model, int count, std::uint64_t 
 TEST(RneaFixed, StaysWithinAHundredThousandthOfRatedTorque) {
   for (const bool prismatic : {false, true}) {
     const IdentifiedModel model = arm(prismatic);
-    const Formats formats = choose_formats(model, {});
+    const Formats formats = choose_formats(model);
     const QuantisationError error = quantisation_error(model, formats, {random_states(model, 20'000, 9)});
     EXPECT_EQ(error.saturations, 0U);
     for (std::size_t j = 0; j < model.joints.size(); ++j) {
@@ -101,7 +101,7 @@ TEST(RneaFixed, FormatsFitRobotsOfAnySizeAndSpeed) {
       for (const double mass : {1e-4, 1e-2, 1.0, 1e2}) {
         for (const double speed : {0.01, 0.1, 0.3, 1.0, 3.0}) {
           const IdentifiedModel model = sized_arm(prismatic, mass, speed, base);
-          const Formats formats = choose_formats(model, {});
+          const Formats formats = choose_formats(model);
           const QuantisationError error = quantisation_error(model, formats, {random_states(model, 300, 9)});
           // The last joint carries next to nothing: judged against the largest, whose formats it shares.
           double largest = 0;
@@ -117,7 +117,7 @@ TEST(RneaFixed, FormatsFitRobotsOfAnySizeAndSpeed) {
 
 TEST(RneaFixed, TooNarrowFormatsSaturateAndAreCounted) {
   const IdentifiedModel model = arm(false);
-  Formats formats = choose_formats(model, {});
+  Formats formats = choose_formats(model);
   formats[Quantity::force] += 5;
   const TickStates states = random_states(model, 200, 9);
   EXPECT_GT(quantisation_error(model, formats, {states}).saturations, 0U);

@@ -11,13 +11,14 @@ struct Formats9 {
   static constexpr int position = 28, velocity = 27, acceleration = 23, linear_acceleration = 24, length = 29,
                        force = 18, torque = 19, inverse_velocity = 20, inverse_path = 24, weight = 28,
                        velocity_squared = 20, velocity_cubed = 16, inverse_position = 24, inverse_torque = 24,
-                       force_sum = 45, torque_sum = 50;
+                       force_sum = 45, torque_sum = 50, deflection_sum = 50;
 };
 struct OtherFormats : Formats9 {
   static constexpr int torque = 18;
 };
+using Revolute = Link<JointType::revolute>;
 template <class F>
-using ModelOf = RobotModel<FixedNumbers<F>, JointEffects<Viscous, Coulomb>>;
+using ModelOf = RobotModel<FixedNumbers<F>, 1, JointModel<Revolute, Viscous, Coulomb>>;
 using Model = ModelOf<Formats9>;
 
 TablePage<Model> valid_page() {
@@ -50,8 +51,8 @@ TEST(TablePage, AnyFlippedBitIsFound) {
 }
 
 TEST(TablePage, LayoutTellsFormatsAndEffectsApart) {
-  using Swapped = RobotModel<FixedNumbers<Formats9>, JointEffects<Coulomb, Viscous>>;
-  using Longer = RobotModel<FixedNumbers<Formats9>, JointEffects<Viscous, Coulomb>, JointEffects<>>;
+  using Swapped = RobotModel<FixedNumbers<Formats9>, 1, JointModel<Revolute, Coulomb, Viscous>>;
+  using Longer = RobotModel<FixedNumbers<Formats9>, 1, JointModel<Revolute, Viscous, Coulomb>, JointModel<Revolute>>;
   EXPECT_NE(Model::layout_hash(), ModelOf<OtherFormats>::layout_hash());
   EXPECT_NE(Model::layout_hash(), Swapped::layout_hash());
   EXPECT_NE(Model::layout_hash(), Longer::layout_hash());

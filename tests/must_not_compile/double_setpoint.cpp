@@ -4,7 +4,7 @@
 using fxdyn::tables::Model;
 
 Model::Torques tick(Model::State& state, double velocity, fxdyn::Saturations& saturations) {
-  Model::Inputs setpoints{};
+  Model::Setpoints setpoints{};
 #ifdef FXDYN_OK
   setpoints[0].dq.raw = static_cast<std::int32_t>(velocity);
 #else

@@ -110,9 +110,8 @@ inline Eigen::VectorXd torques(const Robot& robot, const Eigen::VectorXd& q, con
   std::vector<LinkMotion<Real>> motions(n);
   std::vector<Wrench<Real>> wrenches(n);
   std::vector<double> tau(n);
-  Saturations saturations{};
   rnea<Real, std::dynamic_extent>(chain.links, inertia, {chain.up.x(), chain.up.y(), chain.up.z()}, joints, motions,
-                                  wrenches, tau, saturations);
+                                  wrenches, tau);
   return Eigen::Map<const Eigen::VectorXd>(tau.data(), static_cast<Eigen::Index>(n));
 }
 

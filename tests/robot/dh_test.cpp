@@ -7,13 +7,16 @@ namespace {
 
 using test::Chains;
 
+/// The length along z of the textbook's four parameters, for joints at q = 0.
+double along_z(const LinkGeometry<Real>& link) { return -link.p.y * link.sin_alpha + link.p.z * link.cos_alpha; }
+
 /// Frame i in frame i-1, from the convention's definition.
 Eigen::Isometry3d transform(const LinkGeometry<Real>& link, double q) {
-  const double d = link.d + (link.type == JointType::prismatic ? q : 0);
-  const double theta = std::atan2(link.sin_theta, link.cos_theta) + (link.type == JointType::revolute ? q : 0);
+  const double slide = link.type == JointType::prismatic ? q : 0;
+  const double theta = link.theta + (link.type == JointType::revolute ? q : 0);
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose = pose * Eigen::AngleAxisd(std::atan2(link.sin_alpha, link.cos_alpha), Eigen::Vector3d::UnitX());
-  pose.translation() = Eigen::Vector3d(link.a, -d * link.sin_alpha, d * link.cos_alpha);
+  pose.translation() = Eigen::Vector3d(link.p.x, link.p.y - slide * link.sin_alpha, link.p.z + slide * link.cos_alpha);
   return pose * Eigen::AngleAxisd(theta, Eigen::Vector3d::UnitZ());
 }
 
@@ -26,7 +29,7 @@ double error(const Robot& robot, const Eigen::VectorXd& q) {
   double size = 1, worst = 0;
   for (std::size_t i = 0; i < robot.size(); ++i) {
     frame = frame * transform(chain.links[i], q[static_cast<Eigen::Index>(i)]);
-    size = std::max({size, std::abs(chain.links[i].a), std::abs(chain.links[i].d)});
+    size = std::max({size, std::abs(chain.links[i].p.x), std::abs(along_z(chain.links[i]))});
     worst = std::max(worst, ((frame * chain.urdf_in_dh[i]).matrix() - expected[i].matrix()).cwiseAbs().maxCoeff());
   }
   return worst / size;
@@ -45,9 +48,9 @@ TEST(Dh, FirstAndLastFrameAreSimple) {
   for (int k = 0; k < 100; ++k) {
     const DhChain chain = to_dh(chains.robot(1 + static_cast<std::size_t>(k) % 6));
     const auto &first = chain.links.front(), &last = chain.links.back();
-    EXPECT_EQ(std::vector({first.cos_alpha, first.sin_alpha, first.a, first.d, first.cos_theta, first.sin_theta}),
-              std::vector({1.0, 0.0, 0.0, 0.0, 1.0, 0.0}));
-    EXPECT_EQ(std::vector({last.d, last.cos_theta, last.sin_theta}), std::vector({0.0, 1.0, 0.0}));
+    EXPECT_EQ(std::vector({first.cos_alpha, first.sin_alpha, first.p.x, along_z(first), first.theta}),
+              std::vector({1.0, 0.0, 0.0, 0.0, 0.0}));
+    EXPECT_EQ(std::vector({along_z(last), last.theta}), std::vector({0.0, 0.0}));
   }
 }
 
@@ -66,9 +69,9 @@ TEST(Dh, Puma560HasItsTextbookParameters) {
   double offsets = 0;
   for (std::size_t i = 0; i < 6; ++i) {
     EXPECT_EQ(std::abs(chain.links[i].sin_alpha), std::abs(sin_alpha[i])) << i;
-    EXPECT_NEAR(chain.links[i].a, a[i], 1e-15) << i;
-    offsets += std::abs(chain.links[i].d);
-    EXPECT_TRUE(chain.links[i].cos_theta == 0 || chain.links[i].sin_theta == 0) << i;
+    EXPECT_NEAR(chain.links[i].p.x, a[i], 1e-15) << i;
+    offsets += std::abs(along_z(chain.links[i]));
+    EXPECT_NEAR(std::sin(2 * chain.links[i].theta), 0, 1e-15) << i;
   }
   EXPECT_NEAR(offsets, 0.4318 + 0.15005, 1e-15);
   EXPECT_EQ(chain.up, Eigen::Vector3d(0, 0, 9.81));

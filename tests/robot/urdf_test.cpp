@@ -153,7 +153,7 @@ TEST(Urdf, RoundedRightAnglesAreRightAngles) {
   EXPECT_EQ(robot.joints[0].origin.linear()(0, 0), -1);
   const DhChain chain = to_dh(robot);  // parallel axes
   EXPECT_EQ(chain.links[1].sin_alpha, 0);
-  EXPECT_EQ(chain.links[1].a, 1);
+  EXPECT_EQ(chain.links[1].p.x, 1);
 }
 
 }  // namespace
