@@ -162,7 +162,7 @@ inline constexpr auto power_table = [] {
   return table;
 }();
 
-/// exp(-x) (30 bits) of x >= 0 with `argument_bits` (negative x count as 0), |error| < 7e-9. x / ln 2 = k + i/64 + r:
+/// exp(-x) (30 bits) of x >= 0 with `argument_bits` (negative x count as 0), |error| < 1.3e-9. x / ln 2 = k + i/64 + r:
 /// 2^-k by shifting, 2^(-i/64) from the table, 2^-r by its series to the third power.
 constexpr std::int32_t exp_negative(std::int32_t x) {
   x &= ~(x >> 31);

@@ -25,6 +25,10 @@ TickStates perturbed(const TickStates& states, const IdentifiedModel& model, std
 /// time, now and then one joint that creeps.
 TickStates within_limits(const IdentifiedModel& model, Eigen::Index count, std::uint64_t seed);
 
+/// What bounds of effect states are about (creeping_ticks in numbers/bounded.hpp): a reversal at half speed, then every
+/// joint creeps at the smallest velocity of its format.
+TickStates creeping(const IdentifiedModel& model, const Formats& formats);
+
 /// The same states as raw words of the wire: q1 dq1 ddq1 q2 .. per tick.
 std::vector<std::int32_t> raw_states(const TickStates& states, Eigen::Index tick, const Formats& formats);
 

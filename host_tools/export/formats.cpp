@@ -5,6 +5,7 @@
 #include "host_tools/error.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/export/proof.hpp"
+#include "host_tools/numbers/bounded.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/random.hpp"
 
@@ -144,6 +145,21 @@ TickStates within_limits(const IdentifiedModel& model, Eigen::Index count, std::
       s.dq(k, j) = joint.dq_limit * share() * (random.uniform() < 0.1 ? 1e-4 : 1);
       s.ddq(k, j) = joint.ddq_limit * share();
     }
+  }
+  return s;
+}
+
+TickStates creeping(const IdentifiedModel& model, const Formats& formats) {
+  constexpr Eigen::Index run_up = 500;
+  const Eigen::Index count = run_up + static_cast<Eigen::Index>(creeping_ticks);
+  const auto n = static_cast<Eigen::Index>(model.joints.size());
+  TickStates s{"creeping", Eigen::VectorXd::LinSpaced(count, 0, model.tick_s * static_cast<double>(count - 1)),
+               Eigen::MatrixXd(count, n), Eigen::MatrixXd(count, n), Eigen::MatrixXd::Zero(count, n)};
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const JointFit& joint = model.joints[static_cast<std::size_t>(j)];
+    s.q.col(j).setConstant((joint.q_lower + joint.q_upper) / 2);
+    s.dq.col(j).setConstant(from_raw(1, formats[Quantity::velocity]));
+    s.dq.col(j).head(run_up).setConstant(-joint.dq_limit / 2);
   }
   return s;
 }

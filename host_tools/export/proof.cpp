@@ -83,8 +83,8 @@ Attained attain(const IdentifiedModel& model) {
   const auto n = model.joints.size();
   const IdentifiedModel free = uncut(model, true);
   Attained out{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(n)), Eigen::VectorXd::Zero(static_cast<Eigen::Index>(n))};
-  constexpr int starts = 60;
-  constexpr int steps = 9;
+  constexpr int starts = 150;
+  constexpr int steps = 16;
   parallel_for(n, [&](std::size_t target) {
     Evaluator<Real> evaluator(free, model.tick_s);
     Random random(100 + target);
@@ -157,16 +157,20 @@ Eigen::VectorXd prove_structural(const IdentifiedModel& model, const Eigen::Vect
     for (int used = 0; used < boxes && open.top().bound > goal * attained[static_cast<Eigen::Index>(target)];) {
       const Box box = open.top();
       open.pop();
-      // the joint whose halves are best
+      // halved where that helps most
       std::optional<std::pair<Box, Box>> best;
-      for (std::size_t j = 0; j < n; ++j) {
+      const auto halve = [&](auto&& part) {
         std::vector<State> lower = box.states, upper = box.states;
-        const Bound q = box.states[j].q.value;
-        lower[j].q.value.high = upper[j].q.value.low = (q.low + q.high) / 2;
+        Bound &below = part(lower), &above = part(upper);
+        below.high = above.low = (below.low + below.high) / 2;
         Box a = make(std::move(lower)), b = make(std::move(upper));
         used += 2;
         if (!best || a.bound + b.bound < best->first.bound + best->second.bound)
           best.emplace(std::move(a), std::move(b));
+      };
+      for (std::size_t j = 0; j < n; ++j) {
+        halve([&](std::vector<State>& states) -> Bound& { return states[j].q.value; });
+        halve([&](std::vector<State>& states) -> Bound& { return states[j].dq.value; });
       }
       open.push(std::move(best->first));
       open.push(std::move(best->second));

@@ -22,7 +22,7 @@ struct Proof {
 /// @throws DataError where a number could leave its format.
 Proof prove(const IdentifiedModel& model, const Formats* formats);
 
-/// The bounds of prove() on the rigid body's torque are for all positions at once. This one cuts the position limits into
+/// The bounds of prove() on the rigid body's torque are for all positions at once. This one cuts positions and velocities into
 /// boxes, the worst first, until no joint's bound is more than `goal` times what was attained or `boxes` are used up:
 /// |structural torque| of each joint, at most.
 Eigen::VectorXd prove_structural(const IdentifiedModel& model, const Eigen::VectorXd& attained, double goal, int boxes);

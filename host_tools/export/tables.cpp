@@ -107,10 +107,22 @@ class Printer {
     for (std::size_t i = 0; i < count; ++i) text += fmt::format("{}, ", literal(words_[at_++]));
     text += "// " + comment + "\n";
   }
-  void joint_kind(JointType type) {
-    ++at_;
-    text += fmt::format("    JointType::{}, ", type == JointType::prismatic ? "prismatic" : "revolute");
+  /// The next words in the places of # and, as a joint type, of @.
+  void pattern(std::string_view form, const std::string& comment) {
+    text += "    ";
+    for (const char c : form) {
+      if (c == '#') {
+        text += literal(words_[at_++]);
+      } else if (c == '@') {
+        text += words_[at_++] == static_cast<std::int32_t>(JointType::prismatic) ? "JointType::prismatic"
+                                                                                 : "JointType::revolute";
+      } else {
+        text += c;
+      }
+    }
+    text += "  // " + comment + "\n";
   }
+  void plain(const std::string& line) { text += "    " + line + "\n"; }
   /// Many words, ten a line.
   void block(std::size_t count, const std::string& comment) {
     text += "    // " + comment + "\n";
@@ -133,19 +145,21 @@ class Printer {
 std::string parameters_text(const IdentifiedModel& model, const std::vector<std::int32_t>& words,
                             std::uint32_t outputs) {
   Printer printer(words);
-  printer.group(3, "minus gravity in the first DH frame [m/s^2]");
-  printer.group(1, "ticks per second");
-  for (std::size_t i = 0; i < model.robot.size(); ++i) {
-    printer.joint_kind(model.robot.joints[i].type);
-    printer.group(6, fmt::format("{}: cos alpha, sin alpha, p [m], theta [rad]", model.robot.joints[i].name));
-  }
-  for (std::size_t i = 0; i < model.robot.size(); ++i) {
-    printer.group(10, fmt::format("link {}: m [kg], h [kg m], Jxx Jyy Jzz Jxy Jxz Jyz [kg m^2]", i + 1));
-  }
-  for (std::size_t i = 0; i < model.robot.size(); ++i) {
-    printer.group(9, fmt::format("{}: limits of q, dq, ddq, tau (lower, upper), 1 / width of the Coulomb sign",
-                                 model.robot.joints[i].name));
-  }
+  printer.pattern("{#, #, #},", "minus gravity in the first DH frame [m/s^2]");
+  printer.pattern("#,", "ticks per second");
+  printer.plain("{{");
+  for (const Joint& joint : model.robot.joints)
+    printer.pattern("{@, #, #, {#, #, #}, #},",
+                    fmt::format("{}: cos alpha, sin alpha, p [m], theta [rad]", joint.name));
+  printer.plain("}}, {{");
+  for (std::size_t i = 0; i < model.robot.size(); ++i)
+    printer.pattern("{#, {#, #, #}, #, #, #, #, #, #},",
+                    fmt::format("link {}: m [kg], h [kg m], Jxx Jyy Jzz Jxy Jxz Jyz [kg m^2]", i + 1));
+  printer.plain("}}, {{");
+  for (const Joint& joint : model.robot.joints)
+    printer.pattern("{{#, #, #, #, #, #, #, #}, #},",
+                    fmt::format("{}: limits of q, dq, ddq, tau (lower, upper), 1 / width of the Coulomb sign", joint.name));
+  printer.plain("}}, {");
   for (std::size_t i = 0; i < model.robot.size(); ++i) {
     const Joint& joint = model.robot.joints[i];
     const bool prismatic = joint.type == JointType::prismatic;
@@ -173,6 +187,7 @@ std::string parameters_text(const IdentifiedModel& model, const std::vector<std:
     }
     for (const EffectFit* fit : in_order(model.joints[i], true)) print(*fit);
   }
+  printer.plain("}");
   return printer.text;
 }
 
@@ -318,7 +333,7 @@ std::uint32_t write_tables(const IdentifiedModel& model, const Formats& formats,
 //   tau = fxdyn::tables::Model::tick(parameters, state, setpoints, saturations)
 // Raw integers, value = raw * 2^-bits with the bits of Formats. Made from
 {}// |fixed - double|: proven for every motion within the limits (effect states: unless a joint creeps, by less than a
-// presliding distance in a minute, for longer than a minute), and the largest over these logs and their perturbed copies:
+// presliding distance in half a minute, for longer than that), and the largest over these logs and their perturbed copies:
 {}
 #pragma once
 
@@ -335,6 +350,7 @@ using Model = RobotModel<Numbers, {:#x}{}>;
   {{{}U, {}U, {}U, {}U}},  // magic, layout hash, words, CRC-32
   {{
 {}  }}}};
+static_assert(page.header.words == TablePage<Model>::parameter_words, "made for another version of the model library");
 inline constexpr const Model::Parameters& parameters = page.parameters;
 
 }}  // namespace fxdyn::tables

@@ -50,8 +50,8 @@ class BoundScope {
 
 /// The states of Dahl's model and of relaxations forget their rounding errors while they move and add them up while they
 /// creep. Their error is bounded for creeping (less than one presliding distance or time constant in so many ticks) that
-/// lasts no longer than this: one minute at 2 ms.
-inline constexpr double creeping_ticks = 30'000;
+/// lasts no longer than this: half a minute at 2 ms.
+inline constexpr double creeping_ticks = 15'000;
 
 struct Bound {
   double low = 0, high = 0, error = 0;
@@ -188,7 +188,8 @@ struct BoundedNumbers {
     Bound out{std::tanh(x.value.low), std::tanh(x.value.high), 0};
     if (current_bounding.formats != nullptr) {
       // half a unit of the table's argument, the stated error of tanh_line()
-      out.error = steepest_tanh(x.value) * (x.value.error + std::ldexp(0.5, -raw::tanh_argument_bits)) + 3.2e-5;
+      out.error = steepest_tanh(x.value) * (x.value.error + std::ldexp(0.5, -raw::tanh_argument_bits)) +
+                  raw::tanh_line_error;
     }
     return {out};
   }
@@ -295,7 +296,7 @@ inline BoundedNumbers::Of<Quantity::unit> tanh_of(BoundedNumbers::Of<Quantity::a
 }
 inline BoundedNumbers::Of<Quantity::unit> exp_negative(BoundedNumbers::Of<Quantity::argument> x) {
   Bound out{std::exp(-std::fmax(0.0, x.value.high)), std::exp(-std::fmax(0.0, x.value.low)), 0};
-  if (detail::rounding()) out.error = x.value.error + 2e-9;
+  if (detail::rounding()) out.error = x.value.error + 1.3e-9;
   return {out};
 }
 inline BoundedNumbers::Of<Quantity::argument> asinh_of(BoundedNumbers::Of<Quantity::ratio> x) {

@@ -24,7 +24,7 @@ constexpr double largest_error = 1e-3;
 /// The proven range of the rigid body's torque is refined until it is no more than this times what is attained ...
 constexpr double tight_enough = 2;
 /// ... or this many boxes were looked at.
-constexpr int proof_boxes = 20'000;
+constexpr int proof_boxes = 40'000;
 constexpr Eigen::Index random_states = 20'000;
 
 const LogFormat& format_of(const IdentifiedModel& model, const fs::path& log) {
@@ -167,6 +167,7 @@ void Pipeline::export_tables() {
   judged = states;
   for (std::size_t i = 0; i < states.size(); ++i) judged.push_back(perturbed(states[i], model, 1000 + i));
   judged.push_back(within_limits(model, random_states, 77));
+  judged.push_back(creeping(model, formats));
   const QuantisationError clean = quantisation_error(model, formats, states);
   const QuantisationError error = quantisation_error(model, formats, judged);
   progress_.step();

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# make.sh [PROJECT.toml]: makes tests/golden/tables.hpp and vectors.hpp anew, from the demo's project unless told otherwise.
+# make.sh [PROJECT.toml]: makes tests/golden/tables.hpp and vectors.hpp anew, from project.toml here unless told otherwise.
 # Only where the formats, the tables' layout or the arithmetic changed on purpose: these files are what notices otherwise.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
-project=$(realpath "${1:-$root/host_tools/demo/project.toml}")
+project=$(realpath "${1:-$root/tests/golden/project.toml}")
 cd "$root"
 cmake --preset host >/dev/null
 cmake --build --preset host --target fxdyn make_golden -j "${JOBS:-$(nproc)}"

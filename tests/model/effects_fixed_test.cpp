@@ -39,6 +39,7 @@ struct TestFormats {
   static constexpr int inverse_torque = 20;    // +-2048
   static constexpr int force_sum = 44;
   static constexpr int torque_sum = 44;
+  static constexpr int deflection_sum = 44;
 };
 using Fixed32 = FixedNumbers<TestFormats>;
 
@@ -47,6 +48,7 @@ Formats run_time_formats() {
   for (std::size_t i = 0; i < quantity_count; ++i) formats.quantity[i] = Fixed32::bits(static_cast<Quantity>(i));
   formats.force_sum = TestFormats::force_sum;
   formats.torque_sum = TestFormats::torque_sum;
+  formats.deflection_sum = TestFormats::deflection_sum;
   return formats;
 }
 

@@ -196,21 +196,20 @@ TEST(Effects, DahlStepIsExactForConstantVelocity) {
 
 TEST(BodyEffects, PayloadIsAPointMassOnTheLink) {
   Random random(6);
-  Saturations none;
   const auto vector = [&](double size) {
     return Vector3<double>{random.uniform(-size, size), random.uniform(-size, size), random.uniform(-size, size)};
   };
-  const LinkGeometry<Real> geometry{JointType::revolute, std::cos(0.3), std::sin(0.3), 0.2, 0.4, 1, 0};
+  const LinkGeometry<Real> geometry{JointType::revolute, std::cos(0.3), std::sin(0.3), {0.2, -0.1, 0.4}, 0.1};
   LinkMotion<Real> base = base_motion<Real>({1, 2, 9});
   base.omega = vector(2);
   base.omega_dot = vector(5);
-  const LinkMotion<Real> motion = link_motion<Real>(geometry, base, {0.7, 1.5, -3}, none);
+  const LinkMotion<Real> motion = link_motion<Real>(AnyLink{}, geometry, base, {0.7, 1.5, -3});
   const LinkInertia<Real> link{3, vector(1), 0.4, 0.5, 0.6, 0.01, 0.02, 0.03};
   const double mass = 2.5;
   const Vector3<double> com = vector(0.3);
 
-  const Wrench<Real> before = link_wrench<Real>(link, motion, none);
-  const Wrench<Real> after = link_wrench<Real>(Payload::add_to(link, mass, com), motion, none);
+  const Wrench<Real> before = link_wrench<Real>(AnyLink{}, link, motion);
+  const Wrench<Real> after = link_wrench<Real>(AnyLink{}, Payload::add_to(link, mass, com), motion);
   const Vector3<double> force = scale(mass, motion.a + motion.k * com), moment = cross(com, force);
   EXPECT_NEAR(after.force.x, before.force.x + force.x, 1e-12);
   EXPECT_NEAR(after.force.y, before.force.y + force.y, 1e-12);
