@@ -17,12 +17,12 @@ namespace fxdyn {
 /// u W_z W_h); what is left of it are the inputs themselves. A friction force depends on where the joint came from, so
 /// the inputs carry memory; x = [q, dq, ddq] (Eq. 22) has none.
 ///
-/// In fixed point w, u, h and the c_k are int16, sums have 64 bits (dense.hpp). Weights are trained on the grid of their
-/// format, so that only u, h and the c_k are rounded.
+/// In fixed point w, u, h and the c_k are int16, sums have 64 bits (dense.hpp). Weights are trained on the grid of
+/// their format, so that only u, h and the c_k are rounded.
 ///
-/// Words: inverse reference velocity, 1 / span, three tick/distance; per node a row (bias, w_k1 .. w_k4); the coefficients
-/// c_1 .. c_4 of the inputs; those of the nodes. Packed number systems hold two weights or node coefficients a word. The
-/// number of nodes is even.
+/// Words: inverse reference velocity, 1 / span, three tick/distance; per node a row (bias, w_k1 .. w_k4); the
+/// coefficients c_1 .. c_4 of the inputs; those of the nodes. Packed number systems hold two weights or node
+/// coefficients a word. The number of nodes is even.
 struct BroadLearningLayout {
   static constexpr std::size_t inputs = 4;
   static constexpr std::size_t distances = 3;
@@ -127,10 +127,10 @@ struct BroadLearning {
 
   template <class N>
   static constexpr typename N::TorqueSum sum(const JointInput<N>& u, Words<N> data, State<N>& state,
-                                                Saturations& saturations) {
+                                             Saturations& saturations) {
     std::array<typename N::NodeArgument, nodes> scratch;
-    return broad_learning_sum<N>(nodes, std::integral_constant<int, coefficient_bits>{}, u, data, state,
-                                 saturations, scratch);
+    return broad_learning_sum<N>(nodes, std::integral_constant<int, coefficient_bits>{}, u, data, state, saturations,
+                                 scratch);
   }
   static constexpr void hash(LayoutHash& hash) {
     hash.add(name);

@@ -100,8 +100,8 @@ constexpr DualSum dense_row(const std::int32_t*& row, const std::int32_t* u) {
   return sum;
 }
 
-/// out_k = (bias_k + sum_i w_ki u_i) 2^-shift, rounded down (the exporter adds half a unit to the bias) and saturated to
-/// `bits` bits with sign; |sum| 2^-shift must be below 2^31. `outputs` is even (constant in firmware).
+/// out_k = (bias_k + sum_i w_ki u_i) 2^-shift, rounded down (the exporter adds half a unit to the bias) and saturated
+/// to `bits` bits with sign; |sum| 2^-shift must be below 2^31. `outputs` is even (constant in firmware).
 template <std::size_t inputs, int bits>
 [[gnu::always_inline]] constexpr void dense(std::size_t outputs, int shift, const std::int32_t* rows,
                                             const std::int32_t* u, std::int32_t* out) {
@@ -122,8 +122,8 @@ inline constexpr int tanh_argument_width = 20;   ///< bits with sign: +-8
 inline constexpr int tanh_table_step_bits = 10;  ///< step 1/64
 
 /// tanh over [-8, 8), 64 intervals a unit. A word holds slope (lower half, signed) and, as a whole, the value at the
-/// interval's start with 31 bits plus half a unit of the result: word + slope * offset has the result in its upper half.
-/// The line of an interval is shifted by half of its largest distance from the curve.
+/// interval's start with 31 bits plus half a unit of the result: word + slope * offset has the result in its upper
+/// half. The line of an interval is shifted by half of its largest distance from the curve.
 inline constexpr auto tanh_lines = [] {
   std::array<std::int32_t, 1024> table{};
   for (int i = 0; i < 1024; ++i) {

@@ -76,6 +76,15 @@ constexpr std::int32_t proven_narrow(std::int64_t x) {
   return static_cast<std::int32_t>(shift_right(x, shift));
 }
 
+/// x within [lower, upper]; `outside` is 1 where it was not. Minimum and maximum, no branch.
+constexpr std::int32_t limit(std::int32_t x, std::int32_t lower, std::int32_t upper, std::uint32_t& outside) {
+  const std::int32_t raised = x > lower ? x : lower;
+  const std::int32_t result = raised < upper ? raised : upper;
+  const auto difference = static_cast<std::uint32_t>(result ^ x);
+  outside = (difference | (0U - difference)) >> 31;
+  return result;
+}
+
 /// The upper half of the 64-bit product: a b 2^-32, rounded down.
 constexpr std::int32_t multiply_high(std::int32_t a, std::int32_t b) {
   return static_cast<std::int32_t>((std::int64_t{a} * b) >> 32);
@@ -117,6 +126,30 @@ struct Fixed {
   friend constexpr Wide<bits> operator-(Fixed a) { return {-std::int64_t{a.raw}}; }
   friend constexpr auto operator<=>(Fixed, Fixed) = default;
 };
+
+/// x within [lower, upper]; counted where it was not.
+template <int bits>
+constexpr Fixed<bits> limit(Fixed<bits> x, Fixed<bits> lower, Fixed<bits> upper, Saturations& saturations) {
+  std::uint32_t outside = 0;
+  const Fixed<bits> result{raw::limit(x.raw, lower.raw, upper.raw, outside)};
+  saturations.count += outside;
+  return result;
+}
+constexpr double limit(double x, double lower, double upper, Saturations& saturations) {
+  const double result = x < lower ? lower : (x > upper ? upper : x);
+  saturations.count += static_cast<std::uint32_t>(result != x);
+  return result;
+}
+
+/// condition ? a : b, without a branch in fixed point: a tick takes the same number of instructions whatever the data.
+template <class T>
+constexpr T select(bool condition, const T& a, const T& b) {
+  return condition ? a : b;
+}
+template <int bits>
+constexpr Fixed<bits> select(bool condition, Fixed<bits> a, Fixed<bits> b) {
+  return {b.raw ^ ((a.raw ^ b.raw) & -static_cast<std::int32_t>(condition))};
+}
 
 /// x * x; a name of its own since an interval's square is narrower than the product of two intervals.
 template <class T>

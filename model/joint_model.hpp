@@ -34,16 +34,6 @@ struct JointConstants {
   InverseVelocity<N> inverse_width{};  ///< 1 / width of the Coulomb sign [s/rad | s/m]
 };
 
-/// x within [lower, upper]; counts when it was not.
-template <class T>
-constexpr T limit(T x, T lower, T upper, Saturations& saturations) {
-  const bool below = x < lower;
-  const T raised = below ? lower : x;
-  const bool above = upper < raised;
-  saturations.count += static_cast<std::uint32_t>(below) + static_cast<std::uint32_t>(above);
-  return above ? upper : raised;
-}
-
 template <class N>
 constexpr JointState<N> limit_setpoint(const JointState<N>& state, const JointLimits<N>& limits,
                                        Saturations& saturations) {
@@ -72,10 +62,10 @@ struct Deflection {
     const auto now = N::template narrow<Position<N>>(sum, saturations);
     const auto change = N::template narrow<Position<N>>(now - delta, saturations);
     const auto speed = N::template narrow<Velocity<N>>(change * per_second, saturations);
-    const auto new_rate = ticks > 0 ? speed : Velocity<N>{};
+    const auto new_rate = select(ticks > 0, speed, Velocity<N>{});
     const auto speed_change = N::template narrow<Velocity<N>>(new_rate - rate, saturations);
     const auto push = N::template narrow<Acceleration<N>>(speed_change * per_second, saturations);
-    const auto acceleration = ticks > 1 ? push : Acceleration<N>{};
+    const auto acceleration = select(ticks > 1, push, Acceleration<N>{});
     delta = now;
     rate = new_rate;
     ticks += static_cast<std::uint32_t>(ticks < 2);
@@ -91,8 +81,7 @@ template <class N>
 constexpr Torque<N> joint_feedforward(Torque<N> structural, typename N::TorqueSum effects, const JointLimits<N>& limits,
                                       Saturations& saturations) {
   const auto sum = align(structural, N::no_torque()) + effects;
-  return limit(N::template narrow<Torque<N>>(sum, saturations), limits.tau_lower, limits.tau_upper,
-                       saturations);
+  return limit(N::template proven_narrow<Torque<N>>(sum), limits.tau_lower, limits.tau_upper, saturations);
 }
 
 /// Structural torque plus the effects so far, what `needs_total` asks for.
@@ -123,7 +112,8 @@ struct JointModel {
     }();
     [&]<std::size_t... i>(std::index_sequence<i...>) {
       (add<Effects, N, what>(u, data, std::get<i>(state), total, saturations), ...);
-    }(std::index_sequence_for<Effects...>{});
+    }
+    (std::index_sequence_for<Effects...>{});
     return total;
   }
   static constexpr void hash(LayoutHash& hash) {
@@ -146,8 +136,7 @@ struct JointModel {
   static constexpr void add(JointInput<N>& u, const typename N::Word*& data, State& state, Sum& total,
                             Saturations& saturations) {
     if constexpr (acts_on<E> == what) {
-      if constexpr (needs_total<E>)
-        u.total = running_total<N>(u.structural, total);
+      if constexpr (needs_total<E>) u.total = running_total<N>(u.structural, total);
       total = total + contribution<E, N>(u, Words<N>{data}, state, saturations);
     }
     data += words_of<E>;
@@ -155,8 +144,8 @@ struct JointModel {
 };
 
 /// A robot's feedforward model with everything static: number system, which joints' torques this drive puts out
-/// (`outputs`: bit i for joint i+1), and the joints in chain order. RNEA needs the motion of every joint, but wrenches and
-/// effects only those of the joints asked for: the rest is not computed.
+/// (`outputs`: bit i for joint i+1), and the joints in chain order. RNEA needs the motion of every joint, but wrenches
+/// and effects only those of the joints asked for: the rest is not computed.
 template <class N, std::uint32_t outputs_, class... Joints>
 struct RobotModel {
   using Numbers = N;
@@ -200,8 +189,8 @@ struct RobotModel {
     std::array<JointState<N>, joints> limited;
     for (std::size_t i = 0; i < joints; ++i) {
       const auto k = static_cast<int>(i);
-      limited[i] = limit_setpoint<N>({setpoints.q[k], setpoints.dq[k], setpoints.ddq[k]}, parameters.constants[i].limits,
-                                     saturations);
+      limited[i] = limit_setpoint<N>({setpoints.q[k], setpoints.dq[k], setpoints.ddq[k]},
+                                     parameters.constants[i].limits, saturations);
     }
     std::array<JointInput<N>, joints> inputs;
     for (std::size_t i = 0; i < joints; ++i) {
@@ -212,24 +201,39 @@ struct RobotModel {
     rigid_body<deflects ? 0 : first>(parameters, limited, structural);
     if constexpr (deflects) {
       for (std::size_t i = 0; i < joints; ++i) inputs[i].structural = structural[i];
-      each([&]<std::size_t i, class J>(const typename N::Word* data) {
-        const auto sum =
-            J::template sum<N, ActsOn::position>(inputs[i], data, std::get<i>(state.effects), saturations);
-        limited[i] = state.deflections[i].step(limited[i], sum, parameters.ticks_per_second,
-                                               parameters.constants[i].limits, saturations);
-      }, parameters);
+      each(
+          [&]<std::size_t i, class J>(const typename N::Word* data) {
+            const auto sum =
+                J::template sum<N, ActsOn::position>(inputs[i], data, std::get<i>(state.effects), saturations);
+            limited[i] = state.deflections[i].step(limited[i], sum, parameters.ticks_per_second,
+                                                   parameters.constants[i].limits, saturations);
+          },
+          parameters);
       rigid_body<first>(parameters, limited, structural);
     }
     Torques tau;
     int at = 0;
-    each([&]<std::size_t i, class J>(const typename N::Word* data) {
-      if constexpr (is_output(i)) {
-        inputs[i].structural = structural[i];
-        const auto sum = J::template sum<N, ActsOn::torque>(inputs[i], data, std::get<i>(state.effects), saturations);
-        tau[at++] = joint_feedforward<N>(structural[i], sum, parameters.constants[i].limits, saturations);
-      }
-    }, parameters);
+    each(
+        [&]<std::size_t i, class J>(const typename N::Word* data) {
+          if constexpr (is_output(i)) {
+            inputs[i].structural = structural[i];
+            const auto sum =
+                J::template sum<N, ActsOn::torque>(inputs[i], data, std::get<i>(state.effects), saturations);
+            tau[at++] = joint_feedforward<N>(structural[i], sum, parameters.constants[i].limits, saturations);
+          }
+        },
+        parameters);
     return tau;
+  }
+
+  /// Torques of the rigid body for joints `from` .. of states within the limits: the tick's RNEA. One function of its
+  /// own, everything inlined: the links' intermediate results stay in registers.
+  template <std::size_t from>
+  [[gnu::noinline, gnu::flatten]] static void rigid_body(const Parameters& parameters,
+                                                         const std::array<JointState<N>, joints>& states,
+                                                         std::array<Torque<N>, joints>& structural) {
+    rnea_of<N, from, typename Joints::LinkShape...>(parameters.geometry, parameters.inertia, parameters.up, states,
+                                                    structural);
   }
 
   static constexpr std::uint32_t layout_hash() {
@@ -245,22 +249,14 @@ struct RobotModel {
   static constexpr std::size_t first = static_cast<std::size_t>(std::countr_zero(outputs_));
   static constexpr bool is_output(std::size_t i) { return (outputs_ >> i & 1U) != 0; }
 
-  /// One function of its own, everything inlined: the links' intermediate results stay in registers.
-  template <std::size_t from>
-  [[gnu::noinline, gnu::flatten]] static void rigid_body(const Parameters& parameters,
-                                                         const std::array<JointState<N>, joints>& states,
-                                                         std::array<Torque<N>, joints>& structural) {
-    rnea_of<N, from, typename Joints::LinkShape...>(parameters.geometry, parameters.inertia, parameters.up, states,
-                                                    structural);
-  }
-
   /// Calls visit<i, Joint>(its words) for every joint.
   template <class Visit>
   static constexpr void each(Visit&& visit, const Parameters& parameters) {
     const typename N::Word* data = parameters.words.data();
     [&]<std::size_t... i>(std::index_sequence<i...>) {
       ((visit.template operator()<i, Joints>(data), data += Joints::words), ...);
-    }(std::index_sequence_for<Joints...>{});
+    }
+    (std::index_sequence_for<Joints...>{});
   }
 };
 

@@ -99,17 +99,17 @@ inline constexpr auto sine_table = [] {
   return table;
 }();
 
-/// Sine and cosine (30 bits) of phase * 2^-32 turns, |error| < 2e-9. From the nearest node a: sin(a + h) = sin a cos h +
-/// cos a sin h with |h| <= pi / 256, cos h = 1 - h^2/2, sin h = h - h^3/6.
+/// Sine and cosine (30 bits) of phase * 2^-32 turns, |error| < 2e-9. From the nearest node a: sin(a + h) = sin a cos h
+/// + cos a sin h with |h| <= pi / 256, cos h = 1 - h^2/2, sin h = h - h^3/6.
 constexpr SineCosine<std::int32_t> sin_cos_of_phase(std::uint32_t phase) {
   constexpr std::int32_t two_pi = 1686629713;  // 2^28
   constexpr std::int32_t third = 1431655765;   // 2^32
   const std::uint32_t nearest = phase + (1U << 23);
   const std::uint32_t node = nearest >> 24;
   const std::int32_t h = multiply_high(static_cast<std::int32_t>((nearest << 8) ^ 0x80000000U), two_pi);  // 36 bits
-  const std::int32_t half_square = multiply_high(h, h);                                                    // 41 bits
-  const std::int32_t sine_h = h - (multiply_high(multiply_high(h, half_square), third) >> 9);              // 36 bits
-  const std::int32_t versine = half_square >> 5;                                                           // 36 bits
+  const std::int32_t half_square = multiply_high(h, h);                                                   // 41 bits
+  const std::int32_t sine_h = h - (multiply_high(multiply_high(h, half_square), third) >> 9);             // 36 bits
+  const std::int32_t versine = half_square >> 5;                                                          // 36 bits
   const std::int64_t s = sine_table[node];
   const std::int64_t c = sine_table[node + 64];
   return {static_cast<std::int32_t>(s) + proven_narrow<36>(c * sine_h - s * versine),
@@ -119,7 +119,7 @@ constexpr SineCosine<std::int32_t> sin_cos_of_phase(std::uint32_t phase) {
 /// Sine and cosine (30 bits) of q [rad] with `bits` fractional bits, |error| < 4e-9 + 2^-(bits + 1).
 template <int bits>
 constexpr SineCosine<std::int32_t> sin_cos(std::int32_t q) {
-  constexpr std::int64_t inverse_two_pi = 1367130551;  // 2^33 / (2 pi)
+  constexpr std::int64_t inverse_two_pi = 1367130551;                                                // 2^33 / (2 pi)
   return sin_cos_of_phase(static_cast<std::uint32_t>(proven_narrow<bits + 1>(q * inverse_two_pi)));  // wraps
 }
 inline SineCosine<std::int32_t> sin_cos(std::int32_t q, int bits) {
@@ -148,9 +148,9 @@ constexpr std::int32_t tanh(std::int32_t x) {
   const std::uint32_t node = (size + (1U << (argument_bits - 6))) >> (argument_bits - 5);
   const auto d = static_cast<std::int32_t>(size - (node << (argument_bits - 5))) << 5;  // 32 bits
   const std::int32_t t = tanh_table[node];
-  const std::int32_t slope = (1 << 28) - multiply_high(t, t);             // 28 bits
-  const std::int32_t bend = (1 << 30) - multiply_high(d, t);              // 30 bits
-  const std::int32_t step = multiply_high(slope << 2, bend) << 2;         // 30 bits
+  const std::int32_t slope = (1 << 28) - multiply_high(t, t);      // 28 bits
+  const std::int32_t bend = (1 << 30) - multiply_high(d, t);       // 30 bits
+  const std::int32_t step = multiply_high(slope << 2, bend) << 2;  // 30 bits
   const std::int32_t value = t + multiply_high(d, step);
   return (value ^ sign) - sign;
 }
@@ -171,9 +171,9 @@ constexpr std::int32_t exp_negative(std::int32_t x) {
   const auto fraction = static_cast<std::uint32_t>(product >> 25);  // 32 bits
   const std::uint32_t node = fraction >> 26;
   const auto r = static_cast<std::int32_t>((fraction & 0x03ffffffU) << 5);  // 37 bits, r < 2^-6
-  const std::int32_t u = multiply_high(r, 1488522236) << 1;                // r ln 2, 37 bits
-  const std::int32_t square = multiply_high(u, u);                         // 42 bits
-  const std::int32_t cube = multiply_high(square, u);                      // 47 bits
+  const std::int32_t u = multiply_high(r, 1488522236) << 1;                 // r ln 2, 37 bits
+  const std::int32_t square = multiply_high(u, u);                          // 42 bits
+  const std::int32_t cube = multiply_high(square, u);                       // 47 bits
   // 1 - 2^-r = u - u^2 / 2 + u^3 / 6
   const std::int32_t loss = u - (square >> 6) + (multiply_high(cube, 715827883) >> 10);  // 37 bits
   const std::int32_t value = power_table[node];
@@ -280,7 +280,7 @@ constexpr WholeAndRest<Fixed<unit_bits>> split_count(Fixed<count_bits> x) {
 template <class N, class T>
 constexpr T blend(T a, T b, Unit<N> share) {
   const auto rest = N::template proven_narrow<Unit<N>>(N::one() - share);
-  return N::template narrow_between<T>(a * rest + b * share, a, b);
+  return N::template narrow_between<T>(a * rest + b * share, a, b, share);
 }
 
 }  // namespace fxdyn

@@ -34,10 +34,16 @@ enum class Quantity : std::uint8_t {
 };
 inline constexpr std::size_t quantity_count = 20;
 
-inline constexpr std::array<std::string_view, quantity_count> quantity_names{
-    "position", "velocity", "acceleration", "linear_acceleration", "length", "force", "torque", "unit", "argument",
-    "ratio", "inverse_velocity", "inverse_path", "weight", "velocity_squared", "velocity_cubed", "inverse_position",
-    "inverse_torque", "count", "feature", "activation"};
+inline constexpr std::array<std::string_view, quantity_count> quantity_names{"position",         "velocity",
+                                                                             "acceleration",     "linear_acceleration",
+                                                                             "length",           "force",
+                                                                             "torque",           "unit",
+                                                                             "argument",         "ratio",
+                                                                             "inverse_velocity", "inverse_path",
+                                                                             "weight",           "velocity_squared",
+                                                                             "velocity_cubed",   "inverse_position",
+                                                                             "inverse_torque",   "count",
+                                                                             "feature",          "activation"};
 
 /// Fractional bits that are the same for every robot: quantities without a unit have a known range.
 inline constexpr int unit_bits = 30;      ///< [-2, 2)

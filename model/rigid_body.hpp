@@ -85,14 +85,11 @@ struct Link {
   }
   template <class N>
   static constexpr LinkInertia<N> inertia(const LinkInertia<N>& b) {
-    return {used<parameters, 0>(b.m),
-            {used<parameters, 1>(b.h.x), used<parameters, 2>(b.h.y), used<parameters, 3>(b.h.z)},
-            used<parameters, 4>(b.xx),
-            used<parameters, 5>(b.yy),
-            used<parameters, 6>(b.zz),
-            used<parameters, 7>(b.xy),
-            used<parameters, 8>(b.xz),
-            used<parameters, 9>(b.yz)};
+    return {
+        used<parameters, 0>(b.m),  {used<parameters, 1>(b.h.x), used<parameters, 2>(b.h.y), used<parameters, 3>(b.h.z)},
+        used<parameters, 4>(b.xx), used<parameters, 5>(b.yy),
+        used<parameters, 6>(b.zz), used<parameters, 7>(b.xy),
+        used<parameters, 8>(b.xz), used<parameters, 9>(b.yz)};
   }
 
  private:
@@ -325,7 +322,8 @@ constexpr void rnea_of(const std::array<LinkGeometry<N>, sizeof...(Links)>& geom
   [&]<std::size_t... i>(std::index_sequence<i...>) {
     (outward.template operator()<i, std::tuple_element_t<i, Shapes>>(), ...);
     (inward.template operator()<n - 1 - i, std::tuple_element_t<n - 1 - i, Shapes>>(), ...);
-  }(std::make_index_sequence<n>{});
+  }
+  (std::make_index_sequence<n>{});
 }
 
 }  // namespace fxdyn

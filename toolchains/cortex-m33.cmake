@@ -1,4 +1,5 @@
-# Single-precision FPU.
-set(FXDYN_CPU_FLAGS -mcpu=cortex-m33 -mfloat-abi=hard -mfpu=fpv5-sp-d16)
+# The library computes in integers only. Without the FPU the compiler can't park integers in its registers either, which
+# interrupts would have to save; a firmware of your own that needs it sets its own float ABI.
+set(FXDYN_CPU_FLAGS -mcpu=cortex-m33 -mfloat-abi=soft)
 set(FXDYN_BOARD mps2-an505)
 set(FXDYN_LINKER_SCRIPT mps2-an505.ld)

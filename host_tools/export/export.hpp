@@ -74,8 +74,8 @@ QuantisationError quantisation_error(const IdentifiedModel& model, const Formats
 /// Torques of the fixed-point model over a log at its own states, samples x joints [N*m | N].
 Eigen::MatrixXd predict_fixed(const IdentifiedModel& model, const Formats& formats, const TickStates& states);
 
-/// Writes tables.hpp and tables.bin for a drive that puts out the torques of the joints in `outputs` (bit i: joint i+1);
-/// returns the CRC-32 of the parameters. `proven`: bound of |fixed - double| of each joint.
+/// Writes tables.hpp and tables.bin for a drive that puts out the torques of the joints in `outputs` (bit i: joint
+/// i+1); returns the CRC-32 of the parameters. `proven`: bound of |fixed - double| of each joint.
 std::uint32_t write_tables(const IdentifiedModel& model, const Formats& formats, const QuantisationError& error,
                            const Eigen::VectorXd& proven, std::uint32_t outputs,
                            const std::filesystem::path& directory);

@@ -5,8 +5,8 @@
 #include "host_tools/error.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/export/proof.hpp"
-#include "host_tools/numbers/bounded.hpp"
 #include "host_tools/model/effects.hpp"
+#include "host_tools/numbers/bounded.hpp"
 #include "host_tools/random.hpp"
 
 #include <nlohmann/json.hpp>
@@ -19,10 +19,8 @@ int fitting_bits(double range, int width) {
   return width - static_cast<int>(std::ceil(std::log2(std::max(range, 1e-9))));
 }
 
-}  // namespace
-
-Formats choose_formats(const IdentifiedModel& model) {
-  const Ranges ranges = prove(model, nullptr).ranges;
+/// Formats that hold these ranges.
+Formats formats_for(const IdentifiedModel& model, const Ranges& ranges) {
   using Q = Quantity;
   Formats formats;
   for (std::size_t i = 0; i < quantity_count; ++i) {
@@ -54,9 +52,10 @@ Formats choose_formats(const IdentifiedModel& model) {
   const int fa = bits(Q::linear_acceleration), fw = bits(Q::acceleration);
   const double mass = ranges[Kind{Kind::mass}], first = ranges[Kind{Kind::first_moment}],
                second = ranges[Kind{Kind::second_moment}];
-  formats.force_sum = std::min({fitting_bits(mass, 31) + fa, fitting_bits(first, 31) + fw,
-                                fitting_bits(second, 31) + 2 * fw - fa, fitting_bits(2 * (mass * a + 3 * w * first), 62),
-                                fitting_bits(2 * (2 * first * a + 6 * w * second), 62) + fw - fa});
+  formats.force_sum =
+      std::min({fitting_bits(mass, 31) + fa, fitting_bits(first, 31) + fw, fitting_bits(second, 31) + 2 * fw - fa,
+                fitting_bits(2 * (mass * a + 3 * w * first), 62),
+                fitting_bits(2 * (2 * first * a + 6 * w * second), 62) + fw - fa});
   at_most(Q::force, formats.force_sum);
   at_most(Q::torque, std::min(formats.force_sum - fw + fa, bits(Q::length) + bits(Q::force)));
 
@@ -94,6 +93,23 @@ Formats choose_formats(const IdentifiedModel& model) {
         "the joints' coefficients differ too much in size for one sum: leave out the joint's BLS or raise train.ridge");
   }
   return formats;
+}
+
+}  // namespace
+
+Formats choose_formats(const IdentifiedModel& model) {
+  Ranges ranges = prove(model, nullptr).ranges;
+  // Roundings widen the ranges, mostly within the reserve. Where not, the widened ranges choose again.
+  constexpr int rounds = 12;
+  for (int round = 0; round < rounds; ++round) {
+    const Formats formats = formats_for(model, ranges);
+    const Proof proof = prove(model, &formats);
+    if (proof.too_large.empty()) return formats;
+    for (const Kind kind : proof.too_large) ranges.see(kind, std::min(proof.ranges[kind], 2 * ranges[kind]));
+  }
+  throw DataError(
+      "no fixed-point formats can be proven for this model: its effects on the position are too strong for its limits; "
+      "check the project's limits and those effects' parameters");
 }
 
 TickStates at_ticks(const ProcessedLog& log, double tick_s, bool whole) {

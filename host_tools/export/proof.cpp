@@ -60,20 +60,16 @@ Proof prove(const IdentifiedModel& model, const Formats* formats) {
       const Bound tau = torques[static_cast<std::size_t>(j)].value;
       proof.torque[j] = std::max(proof.torque[j], tau.magnitude());
       proof.error[j] = std::max(proof.error[j], tau.error);
-      proof.effects[j] =
-          std::max(proof.effects[j], evaluator.effects()[static_cast<std::size_t>(j)].value.magnitude());
+      proof.effects[j] = std::max(proof.effects[j], evaluator.effects()[static_cast<std::size_t>(j)].value.magnitude());
     }
   }
   if (formats == nullptr) return proof;
   for (std::size_t g = 0; g < group_count; ++g) {
     for (std::size_t i = 0; i < quantity_count; ++i) {
       const Kind kind{static_cast<Kind::Group>(g), static_cast<Quantity>(i)};
-      const double most = proof.ranges[kind];
       const bool small = kind.quantity == Quantity::weight && kind.group == Kind::number;
-      if (most > std::ldexp(small ? 32767.0 : 2147483647.0, -bits_of(*formats, kind))) {
-        throw DataError(fmt::format("can't prove that {} stays in its format (up to {:.3g}, {} fractional bits)",
-                                    quantity_names[i], most, bits_of(*formats, kind)));
-      }
+      if (proof.ranges[kind] > std::ldexp(small ? 32767.0 : 2147483647.0, -bits_of(*formats, kind)))
+        proof.too_large.push_back(kind);
     }
   }
   return proof;
@@ -82,7 +78,8 @@ Proof prove(const IdentifiedModel& model, const Formats* formats) {
 Attained attain(const IdentifiedModel& model) {
   const auto n = model.joints.size();
   const IdentifiedModel free = uncut(model, true);
-  Attained out{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(n)), Eigen::VectorXd::Zero(static_cast<Eigen::Index>(n))};
+  Attained out{Eigen::VectorXd::Zero(static_cast<Eigen::Index>(n)),
+               Eigen::VectorXd::Zero(static_cast<Eigen::Index>(n))};
   constexpr int starts = 150;
   constexpr int steps = 16;
   parallel_for(n, [&](std::size_t target) {
@@ -135,7 +132,8 @@ Attained attain(const IdentifiedModel& model) {
   return out;
 }
 
-Eigen::VectorXd prove_structural(const IdentifiedModel& model, const Eigen::VectorXd& attained, double goal, int boxes) {
+Eigen::VectorXd prove_structural(const IdentifiedModel& model, const Eigen::VectorXd& attained, double goal,
+                                 int boxes) {
   struct Box {
     std::vector<State> states;
     double bound;

@@ -157,8 +157,9 @@ std::string parameters_text(const IdentifiedModel& model, const std::vector<std:
                     fmt::format("link {}: m [kg], h [kg m], Jxx Jyy Jzz Jxy Jxz Jyz [kg m^2]", i + 1));
   printer.plain("}}, {{");
   for (const Joint& joint : model.robot.joints)
-    printer.pattern("{{#, #, #, #, #, #, #, #}, #},",
-                    fmt::format("{}: limits of q, dq, ddq, tau (lower, upper), 1 / width of the Coulomb sign", joint.name));
+    printer.pattern(
+        "{{#, #, #, #, #, #, #, #}, #},",
+        fmt::format("{}: limits of q, dq, ddq, tau (lower, upper), 1 / width of the Coulomb sign", joint.name));
   printer.plain("}}, {");
   for (std::size_t i = 0; i < model.robot.size(); ++i) {
     const Joint& joint = model.robot.joints[i];
@@ -180,10 +181,11 @@ std::string parameters_text(const IdentifiedModel& model, const std::vector<std:
     for (const EffectFit* fit : in_order(model.joints[i])) print(*fit);
     if (const auto& bls = model.joints[i].bls) {
       const std::size_t nodes = stored_nodes(*bls);
-      printer.block(BroadLearningLayout::words(nodes, true),
-                    fmt::format("{}: BLS, {} nodes: 1 / reference velocity, 1 / span, tick / distances; a row of bias and "
-                                "weights a node; coefficients of inputs and nodes",
-                                joint.name, nodes));
+      printer.block(
+          BroadLearningLayout::words(nodes, true),
+          fmt::format("{}: BLS, {} nodes: 1 / reference velocity, 1 / span, tick / distances; a row of bias and "
+                      "weights a node; coefficients of inputs and nodes",
+                      joint.name, nodes));
     }
     for (const EffectFit* fit : in_order(model.joints[i], true)) print(*fit);
   }
@@ -317,7 +319,8 @@ std::uint32_t write_tables(const IdentifiedModel& model, const Formats& formats,
       "deflection_sum = {};\n",
       formats.force_sum, formats.torque_sum, formats.deflection_sum);
   for (std::size_t j = 0; j < model.joints.size(); ++j) {
-    model_lines += fmt::format(",\n                         {}", joint_type(model.joints[j], shapes[j], has_effects(model, j, outputs)));
+    model_lines += fmt::format(",\n                         {}",
+                               joint_type(model.joints[j], shapes[j], has_effects(model, j, outputs)));
     const auto k = static_cast<Eigen::Index>(j);
     error_lines += fmt::format("//   {}: proven <= {:.3g}, observed {:.3g} {}, {:.2g} of rated\n",
                                model.robot.joints[j].name, proven[k], error.largest[k],
@@ -355,8 +358,9 @@ inline constexpr const Model::Parameters& parameters = page.parameters;
 
 }}  // namespace fxdyn::tables
 )",
-      version, model.project, model.project_hash, model.tick_s, log_lines, error_lines, format_lines, outputs, model_lines,
-      header.magic, header.layout_hash, header.words, header.crc32, parameters_text(model, words, outputs));
+      version, model.project, model.project_hash, model.tick_s, log_lines, error_lines, format_lines, outputs,
+      model_lines, header.magic, header.layout_hash, header.words, header.crc32,
+      parameters_text(model, words, outputs));
   write_file(directory / "tables.hpp", text);
 
   std::string bytes(sizeof header + 4 * words.size(), '\0');

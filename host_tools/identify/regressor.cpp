@@ -19,7 +19,8 @@ const Eigen::MatrixXd& Regressor::operator()(const Eigen::VectorXd& q, const Eig
   const std::size_t n = chain_.links.size();
   for (std::size_t i = 0; i < n; ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    motions_[i] = link_motion<Real>(AnyLink{}, chain_.links[i], i == 0 ? base_ : motions_[i - 1], {q[k], dq[k], ddq[k]});
+    motions_[i] =
+        link_motion<Real>(AnyLink{}, chain_.links[i], i == 0 ? base_ : motions_[i - 1], {q[k], dq[k], ddq[k]});
   }
   for (std::size_t link = 0; link < n; ++link) {
     for (std::size_t p = 0; p < parameters_per_link; ++p) {

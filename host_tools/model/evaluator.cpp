@@ -24,7 +24,6 @@ std::vector<const EffectFit*> in_order(const JointFit& joint, bool of_total) {
   return order;
 }
 
-
 int node_coefficient_bits(const BroadLearningFit& fit) {
   const double most = fit.coefficients.tail(fit.nodes()).cwiseAbs().maxCoeff() * 32768 / raw::activation_one;
   int bits = 40;
@@ -188,8 +187,7 @@ std::span<const Torque<N>> Evaluator<N>::tick(std::span<const JointState<N>> set
     for (std::size_t i = 0; i < n; ++i) {
       auto sum = N::no_deflection();
       for (auto& step : steps_[i]) sum = sum + step->deflection(inputs_[i], saturations);
-      limited_[i] =
-          deflections_[i].step(limited_[i], sum, ticks_per_second_, constants_[i].limits, saturations);
+      limited_[i] = deflections_[i].step(limited_[i], sum, ticks_per_second_, constants_[i].limits, saturations);
     }
     rigid_body();
   }

@@ -14,7 +14,8 @@
 //   BoundedNumbers without formats in force: interval arithmetic; the largest magnitudes seen choose the formats.
 //   BoundedNumbers with formats in force (BoundScope): every narrowing adds its rounding, the functions of math.hpp add
 //   their stated errors; what could leave its format is an error of the export.
-// Intervals are evaluated in double precision without directed rounding: 2^-52 against a reserve of 2^-1 in the formats.
+// Intervals are evaluated in double precision without directed rounding: 2^-52 against a reserve of 2^-1 in the
+// formats.
 
 namespace fxdyn {
 
@@ -48,9 +49,9 @@ class BoundScope {
   Bounding previous_;
 };
 
-/// The states of Dahl's model and of relaxations forget their rounding errors while they move and add them up while they
-/// creep. Their error is bounded for creeping (less than one presliding distance or time constant in so many ticks) that
-/// lasts no longer than this: half a minute at 2 ms.
+/// The states of Dahl's model and of relaxations forget their rounding errors while they move and add them up while
+/// they creep. Their error is bounded for creeping (less than one presliding distance or time constant in so many
+/// ticks) that lasts no longer than this: half a minute at 2 ms.
 inline constexpr double creeping_ticks = 15'000;
 
 struct Bound {
@@ -70,7 +71,9 @@ struct Bound {
   static Bound hull(Bound a, Bound b) {
     return {std::fmin(a.low, b.low), std::fmax(a.high, b.high), std::fmax(a.error, b.error)};
   }
-  Bound cut(double from, double to) const { return {std::fmin(std::fmax(low, from), to), std::fmax(std::fmin(high, to), from), error}; }
+  Bound cut(double from, double to) const {
+    return {std::fmin(std::fmax(low, from), to), std::fmax(std::fmin(high, to), from), error};
+  }
 };
 
 /// Length of a vector and of its error; unknown: infinite.
@@ -117,8 +120,7 @@ BoundedLength length_of(const Bounded<kind>& x) {
   return length_of(x.value);
 }
 template <class T>
-  requires std::same_as<typename LengthOf<T>::type, BoundedLength>
-BoundedLength length_of(const Vector3<T>& v) {
+requires std::same_as<typename LengthOf<T>::type, BoundedLength> BoundedLength length_of(const Vector3<T>& v) {
   const Bound x = v.x.value, y = v.y.value, z = v.z.value;
   return {std::fmin(v.length.length, std::hypot(x.magnitude(), y.magnitude(), z.magnitude())),
           std::fmin(v.length.error, std::hypot(x.error, y.error, z.error))};
@@ -168,7 +170,10 @@ struct BoundedNumbers {
   }
   template <class T>
   static T narrow(BoundedWide x, Saturations&) {
-    return proven_narrow<T>(x);
+    // saturates, so that its range is no demand on the format
+    if (current_bounding.formats == nullptr) return {x.value};
+    const double most = 2147483647 * unit<T>();
+    return {rounded<T>(x.value).cut(-most, most)};
   }
   template <class T>
   static T clamp(BoundedWide x) {
@@ -188,8 +193,8 @@ struct BoundedNumbers {
     Bound out{std::tanh(x.value.low), std::tanh(x.value.high), 0};
     if (current_bounding.formats != nullptr) {
       // half a unit of the table's argument, the stated error of tanh_line()
-      out.error = steepest_tanh(x.value) * (x.value.error + std::ldexp(0.5, -raw::tanh_argument_bits)) +
-                  raw::tanh_line_error;
+      out.error =
+          steepest_tanh(x.value) * (x.value.error + std::ldexp(0.5, -raw::tanh_argument_bits)) + raw::tanh_line_error;
     }
     return {out};
   }
@@ -217,11 +222,16 @@ struct BoundedNumbers {
     if (current_bounding.formats != nullptr) x.error += unit<T>() * std::sqrt(0.75);
     return x;
   }
+  /// a + share (b - a), where one of a and b may be what came out the tick before. Each tick adds its own error e and
+  /// keeps the state's with a weight of at most w: e / (1 - w) in the end, or what creeping_ticks allow.
   template <class T>
-  static T narrow_between(BoundedWide x, T a, T b) {
+  static T narrow_between(BoundedWide x, T a, T b, Of<Quantity::unit> share) {
     Bound out = Bound::hull(a.value, b.value);
+    if (current_bounding.formats == nullptr) return {out};
     const double own = std::fmax(0.0, rounded<T>(x.value).error - out.error);
-    out.error = current_bounding.formats != nullptr ? std::fmax(out.error, creeping_ticks * own) : 0;
+    const double forgotten = std::fmin(share.value.low, 1 - share.value.high);
+    const double ticks = forgotten > 1 / creeping_ticks ? 1 / forgotten : creeping_ticks;
+    out.error = std::fmax(out.error, std::fmin(a.value.error, b.value.error) + ticks * own);
     return {out};
   }
   static double steepest_tanh(Bound x) {
@@ -258,7 +268,9 @@ struct BoundedNumbers {
 
 template <Kind kind>
 Bounded<kind> limit(Bounded<kind> x, Bounded<kind> lower, Bounded<kind> upper, Saturations&) {
-  return {x.value.cut(lower.value.low, upper.value.high)};
+  Bound out = x.value.cut(lower.value.low, upper.value.high);
+  out.error = std::fmin(out.error, upper.value.high - lower.value.low);
+  return {out};
 }
 
 // ---- the functions of math.hpp with their stated errors --------------------------------------------------------

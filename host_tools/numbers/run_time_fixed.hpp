@@ -78,6 +78,15 @@ RunTimeWide align(RunTimeFixed<kind> x, RunTimeWide like) {
   return align(RunTimeWide{x.raw, x.bits()}, like);
 }
 
+template <Kind kind>
+RunTimeFixed<kind> limit(RunTimeFixed<kind> x, RunTimeFixed<kind> lower, RunTimeFixed<kind> upper,
+                         Saturations& saturations) {
+  std::uint32_t outside = 0;
+  const RunTimeFixed<kind> result{raw::limit(x.raw, lower.raw, upper.raw, outside)};
+  saturations.count += outside;
+  return result;
+}
+
 struct RunTimeNumbers {
   template <Quantity quantity>
   using Of = RunTimeFixed<Kind{Kind::number, quantity}>;
@@ -116,7 +125,7 @@ struct RunTimeNumbers {
     return {};
   }
   template <class T>
-  static T narrow_between(RunTimeWide x, T, T) {
+  static T narrow_between(RunTimeWide x, T, T, Of<Quantity::unit>) {
     return proven_narrow<T>(x);
   }
   static Of<Quantity::unit> one() { return {1 << unit_bits}; }

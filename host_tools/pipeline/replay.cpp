@@ -128,12 +128,9 @@ bool replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index
     progress.step();
   }
   progress.done();
-  json document = {{"schema", "fxdyn.replay/1"},
-                   {"image", image.filename().string()},
-                   {"tables_crc", fixed.crc()},
-                   {"outputs", identity.outputs},
-                   {"bit_exact", same},
-                   {"logs", logs}};
+  json document = {{"schema", "fxdyn.replay/1"}, {"image", image.filename().string()},
+                   {"tables_crc", fixed.crc()},  {"outputs", identity.outputs},
+                   {"bit_exact", same},          {"logs", logs}};
   const std::filesystem::path size_file = image.parent_path() / "size.json";
   if (std::filesystem::exists(size_file)) document["size"] = json::parse(read_file(size_file));
   write_file(pipeline.directory() / "replay.json", document.dump(1) + "\n");

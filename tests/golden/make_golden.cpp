@@ -53,6 +53,14 @@ TickStates smooth_run(const IdentifiedModel& model, double amplitude) {
   return run;
 }
 
+/// A bus that stopped: the same setpoints over and over.
+TickStates held_run(const IdentifiedModel& model, Random& random) {
+  TickStates run = random_run(model, random, 1, false);
+  for (Eigen::MatrixXd* column : {&run.q, &run.dq, &run.ddq})
+    *column = column->row(0).replicate(ticks_per_run, 1).eval();
+  return run;
+}
+
 std::string array_text(const char* type, const char* name, const std::vector<std::int64_t>& values,
                        std::size_t a_line) {
   std::string text = fmt::format("inline constexpr std::array<{}, {}> {}{{\n", type, values.size(), name);
@@ -70,9 +78,10 @@ void make(const std::filesystem::path& directory, const std::filesystem::path& o
   Random random(20260911);
   std::vector<TickStates> runs{smooth_run(model, 0.002), smooth_run(model, 0.05)};
   for (int i = 0; i < 2; ++i) runs.push_back(random_run(model, random, 1, true));
-  for (int i = 0; i < 3; ++i) runs.push_back(random_run(model, random, 1, false));
+  for (int i = 0; i < 2; ++i) runs.push_back(random_run(model, random, 1, false));
   for (int i = 0; i < 2; ++i) runs.push_back(random_run(model, random, 3, false));  // beyond the limits
   runs.push_back(random_run(model, random, 1e9, true));                             // the ends of the words themselves
+  runs.push_back(held_run(model, random));
 
   std::vector<std::int64_t> setpoints, torques, saturation_counts;
   for (const TickStates& run : runs) {

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include "host_tools/error.hpp"
 #include "host_tools/export/export.hpp"
+#include "host_tools/export/proof.hpp"
 #include "host_tools/identify/regressor.hpp"
 #include "host_tools/model/evaluator.hpp"
 #include "host_tools/random.hpp"
@@ -115,12 +117,45 @@ TEST(RneaFixed, FormatsFitRobotsOfAnySizeAndSpeed) {
   }
 }
 
-TEST(RneaFixed, TooNarrowFormatsSaturateAndAreCounted) {
+TEST(RneaFixed, FormatsThatAreTooNarrowFailTheProof) {
   const IdentifiedModel model = arm(false);
   Formats formats = choose_formats(model);
+  EXPECT_TRUE(prove(model, &formats).too_large.empty());
   formats[Quantity::force] += 5;
+  const std::vector<Kind> too_large = prove(model, &formats).too_large;
+  ASSERT_EQ(too_large.size(), 1U);
+  EXPECT_EQ(too_large[0].quantity, Quantity::force);
+  // and where such a number really overflows, the host says so instead of wrapping
   const TickStates states = random_states(model, 200, 9);
-  EXPECT_GT(quantisation_error(model, formats, {states}).saturations, 0U);
+  EXPECT_THROW(quantisation_error(model, formats, {states}), DataError);
+}
+
+TEST(RneaFixed, SetpointsBeyondTheLimitsAreCutAndCounted) {
+  const IdentifiedModel model = arm(false);
+  const Formats formats = choose_formats(model);
+  TickStates states = random_states(model, 200, 9);
+  states.q *= 1e6;
+  states.dq *= -1e6;
+  EXPECT_GT(quantisation_error(model, formats, {states}).saturations, 2000U);
+}
+
+TEST(RneaFixed, ProvenBoundsHoldForRandomMotion) {
+  for (const bool prismatic : {false, true}) {
+    for (const bool base : {false, true}) {
+      const IdentifiedModel model = sized_arm(prismatic, 1, 1, base);
+      const Formats formats = choose_formats(model);
+      const Proof proof = prove(model, &formats);
+      const QuantisationError error = quantisation_error(model, formats, {within_limits(model, 20'000, 3)});
+      const Attained attained = attain(model);
+      const Eigen::VectorXd structural = prove_structural(model, attained.structural, 1, 2000);
+      for (Eigen::Index j = 0; j < 6; ++j) {
+        EXPECT_LE(error.largest[j], proof.error[j]) << "joint " << j + 1;
+        EXPECT_LE(proof.error[j], 100 * error.largest[j]) << "joint " << j + 1;
+        EXPECT_LE(attained.structural[j], structural[j]) << "joint " << j + 1;
+        EXPECT_LE(structural[j], proof.torque[j]) << "joint " << j + 1;
+      }
+    }
+  }
 }
 
 TEST(Regressor, TimesParametersIsRnea) {

@@ -6,9 +6,9 @@ using fxdyn::tables::Model;
 Model::Torques tick(Model::State& state, double velocity, fxdyn::Saturations& saturations) {
   Model::Setpoints setpoints{};
 #ifdef FXDYN_OK
-  setpoints[0].dq.raw = static_cast<std::int32_t>(velocity);
+  setpoints.dq[0].raw = static_cast<std::int32_t>(velocity);
 #else
-  setpoints[0].dq = velocity;
+  setpoints.dq[0] = velocity;
 #endif
   return Model::tick(fxdyn::tables::parameters, state, setpoints, saturations);
 }

@@ -1,0 +1,123 @@
+// Instructions of the tick's kernels, of the tick itself and of a drive's tick that puts out one joint only. The
+// kernels are the functions that the tick calls, with the golden tables.
+
+#include "hal/cortex_m/semihosting.hpp"
+#include "hal/mps2/systick.hpp"
+
+#include FXDYN_TABLES_HEADER
+
+namespace {
+
+using namespace fxdyn;
+using hal::semihosting::print;
+using tables::Model;
+using tables::Numbers;
+
+/// The model's types taken apart: the same robot with other outputs, or with links of which nothing is known.
+template <class>
+struct Parts;
+template <class N, std::uint32_t outputs, class... Joints>
+struct Parts<RobotModel<N, outputs, Joints...>> {
+  template <std::uint32_t other>
+  using With = RobotModel<N, other, Joints...>;
+  using Any = RobotModel<N, outputs, JointModel<Link<Joints::LinkShape::type>>...>;
+};
+
+template <class M>
+typename M::Parameters& parameters() {
+  static typename M::Parameters copy{};
+  const auto& page = tables::parameters;
+  copy.up = page.up;
+  copy.ticks_per_second = page.ticks_per_second;
+  copy.geometry = page.geometry;
+  copy.inertia = page.inertia;
+  copy.constants = page.constants;
+  for (std::size_t i = 0; i < copy.words.size(); ++i) copy.words[i] = page.words[i];
+  return copy;
+}
+
+hal::mps2::SysTick* counter;
+
+/// `run` is a function of its own that works on memory, so that nothing of it can leave the measured stretch.
+template <class Run>
+std::uint32_t count(Run&& run) {
+  const auto measure = [](auto&& f) {
+    counter->start();
+    f();
+    return counter->stop();
+  };
+  const std::uint32_t empty = measure([] { asm volatile("" ::: "memory"); });
+  return measure([&] {
+           asm volatile("" ::: "memory");
+           run();
+           asm volatile("" ::: "memory");
+         }) -
+         empty;
+}
+
+void report(const char* name, std::uint32_t instructions) {
+  print(name);
+  print(" ");
+  print(instructions);
+  print("\n");
+}
+
+template <class M>
+[[gnu::noinline]] void tick(typename M::Torques& out, const typename M::Parameters& in, typename M::State& state,
+                            const typename M::Setpoints& setpoints, Saturations& saturations) {
+  out = M::tick(in, state, setpoints, saturations);
+}
+
+template <class M>
+std::uint32_t tick_of() {
+  static typename M::State state{};
+  static typename M::Setpoints setpoints{};
+  static typename M::Torques torques{};
+  static Saturations saturations;
+  auto& page = parameters<M>();
+  return count([&] { tick<M>(torques, page, state, setpoints, saturations); });
+}
+
+template <class M>
+std::uint32_t rnea_of_model() {
+  static std::array<JointState<Numbers>, M::joints> states{};
+  static std::array<Torque<Numbers>, M::joints> torques{};
+  auto& page = parameters<M>();
+  return count([&] { M::template rigid_body<0>(page, states, torques); });
+}
+
+template <std::size_t outputs, std::size_t inputs>
+std::uint32_t dense_of() {
+  static std::array<std::int32_t, outputs * raw::row_words<inputs>> rows{};
+  static std::array<std::int32_t, inputs / 2> u{};
+  static std::array<std::int32_t, outputs> out{};
+  return count([&] { raw::dense<inputs, 16>(outputs, Numbers::weight_bits(), rows.data(), u.data(), out.data()); });
+}
+
+template <std::size_t nodes>
+std::uint32_t tanh_of_nodes() {
+  static std::array<std::int32_t, nodes / 2> coefficients{};
+  static std::array<std::int32_t, nodes> x{};
+  static volatile std::int64_t sum;
+  return count([&] { sum = raw::weighted_tanh(nodes, coefficients.data(), x.data()); });
+}
+
+template <std::size_t... i>
+std::uint32_t one_joint_mean(std::index_sequence<i...>) {
+  return ((tick_of<typename Parts<Model>::template With<1U << i>>() + ...) + sizeof...(i) / 2) / sizeof...(i);
+}
+
+}  // namespace
+
+int main() {
+  hal::mps2::SysTick systick;
+  counter = &systick;
+  report("rnea", rnea_of_model<Model>());
+  report("rnea_any_links", rnea_of_model<Parts<Model>::Any>());
+  report("dense_40x4", dense_of<40, 4>());
+  report("dense_40x6", dense_of<40, 6>());
+  report("dense_60x40", dense_of<60, 40>());
+  report("tanh_40", tanh_of_nodes<40>());
+  report("one_joint_mean", one_joint_mean(std::make_index_sequence<Model::joints>{}));
+  hal::semihosting::exit(0);
+}
