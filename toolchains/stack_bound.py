@@ -56,8 +56,22 @@ def registers(operands):
 
 
 def read_disassembly(text, functions):
-    name, function, measured = None, None, 0
+    name, function = None, None
     known = set(functions)
+    starts = [(int(head[1], 16), head[2]) for head in re.finditer(r'^([0-9a-f]+) <(.+)>:$', text, re.MULTILINE)]
+    heads = {head for _, head in starts}
+
+    def named(operands):
+        """Where a branch goes. Its label may be any symbol of about that value, so that the address decides."""
+        target = re.search(r'([0-9a-f]+) <([^>+]+)(\+?)', operands)
+        if not target or target[2] in heads:
+            return operands
+        address = int(target[1], 16)
+        begin, head = max((start for start in starts if start[0] <= address), default=(None, None))
+        if head is None:
+            return operands
+        return f'{target[1]} <{head}>' if begin == address else f'{target[1]} <{head}+{address - begin:#x}>'
+
     for line in text.splitlines():
         if head := re.match(r'^[0-9a-f]+ <(.+)>:$', line):
             name = head[1]
@@ -66,7 +80,7 @@ def read_disassembly(text, functions):
         code = re.match(r'^ *[0-9a-f]+:\t(\S+)(?:\t(.*))?$', line)
         if not code or function is None:
             continue
-        operation, operands = code[1].removesuffix('.n').removesuffix('.w'), code[2] or ''
+        operation, operands = code[1].removesuffix('.n').removesuffix('.w'), named(code[2] or '')
         if target := re.search(r'<([^>+]+)>', operands):
             # A branch into another function is a tail call.
             if operation.startswith('b') and (operation in ('bl', 'blx') or target[1] != name):

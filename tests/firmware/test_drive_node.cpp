@@ -88,7 +88,7 @@ class DriveNodeTest : public ::testing::Test {
 
 TEST_F(DriveNodeTest, HelloTellsIdentity) {
   EXPECT_EQ(answers(serial::Type::hello, {}),
-            (std::vector{Message{serial::Type::identity, {serial::protocol_version, 2, 0x1234, 0x5678, 0, 0}}}));
+            (std::vector{Message{serial::Type::identity, {serial::protocol_version, 2, 0x1234, 0x5678, 0, 0, 3}}}));
 }
 
 TEST_F(DriveNodeTest, TickAnswersSequenceTorquesSaturationsCycles) {
@@ -113,7 +113,7 @@ TEST_F(DriveNodeTest, InvalidTablesAreToldAndNeverComputedWith) {
   EXPECT_FALSE(locked.poll());
   EXPECT_EQ(
       sent(),
-      (std::vector{Message{serial::Type::identity, {serial::protocol_version, 2, 0x1234, 0x5678, 1, 0}},
+      (std::vector{Message{serial::Type::identity, {serial::protocol_version, 2, 0x1234, 0x5678, 1, 0, 3}},
                    Message{serial::Type::refused, {3, static_cast<std::uint32_t>(serial::Refusal::tables_invalid)}}}));
 }
 

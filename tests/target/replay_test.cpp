@@ -121,7 +121,11 @@ IdentifiedModel every_effect() {
     }
     model.joints.push_back(joint);
   }
-  model.body = {{"payload", {}, {1.5, 0.02, -0.01, 0.1}}, {"gravity_tilt", {}, {0.05, -0.02}}};
+  model.body.resize(2);
+  model.body[0].effect = "payload";
+  model.body[0].linear = {1.5, 0.02, -0.01, 0.1};
+  model.body[1].effect = "gravity_tilt";
+  model.body[1].linear = {0.05, -0.02};
   return model;
 }
 

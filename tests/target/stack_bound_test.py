@@ -34,6 +34,11 @@ class StackBound(unittest.TestCase):
         self.assertEqual(done.returncode, 1)
         self.assertIn(message, done.stderr)
 
+    def test_a_label_that_is_no_function_does_not_mislead(self):
+        # an absolute symbol whose value happens to lie within the function
+        code = '00000100 <main>:\n 100:\tbne.n\t10c <some_size+0xc>\n 10c:\tbx\tlr\n'
+        self.accepted(16, node('main', 16), code)
+
     def test_the_deepest_path_counts(self):
         graph = node('main', 16) + node('a', 100) + node('b', 8) + node('c', 120) + edge('main', 'a') + edge(
             'main', 'b') + edge('b', 'c')
