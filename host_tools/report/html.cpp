@@ -281,18 +281,24 @@ std::string limits_section(const json& model) {
 std::string fixed_point_section(const json& model, const json& exported) {
   std::string out = section("Fixed point");
   if (exported.is_null()) return out + paragraph("Not exported from this model: run fxdyn export.");
-  Table errors({{"joint"}, {"unit"}, {"largest |fixed - double|", "n"}, {"of rated", "n"}, {"RMS", "n"}});
+  Table errors({{"joint"}, {"unit"}, {"observed |fixed - double|", "n"}, {"of rated", "n"}, {"RMS", "n"},
+                {"proven at most", "n"}, {"of rated", "n"}, {"torque attained", "n"}, {"proven at most", "n"}});
   for (const json& joint : exported.at("joints")) {
     errors.add({{text(joint.at("joint"))},
                 {text(joint.at("unit"))},
                 number(joint.at("observed_max"), 3),
                 {fmt::format("{:.2g}", joint.at("observed_max_of_rated").get<double>()), "n"},
-                number(joint.at("quantisation_rms"), 3)});
+                number(joint.at("quantisation_rms"), 3),
+                number(joint.at("proven_bound"), 3),
+                {fmt::format("{:.2g}", joint.at("proven_bound_of_rated").get<double>()), "n"},
+                number(joint.at("torque_range").at("attained"), 4),
+                number(joint.at("torque_range").at("proven"), 4)});
   }
   out += errors.html();
   out += paragraph(
-      "Observed on the train and validate logs and on disturbed copies of them, with states far beyond the limits; not "
-      "a proven bound.");
+      "Observed on the train and validate logs, on disturbed copies of them with states far beyond the limits, on random "
+      "states within them and while creeping. Proven for every motion within the limits. The last two columns: the "
+      "largest torque of the model that a search within the limits finds, and what it can't exceed.");
   out += paragraph(fmt::format("Tables: {} bytes. Saturated numbers on the undisturbed logs: {}.",
                                exported.at("table_bytes").get<std::int64_t>(),
                                exported.at("saturations_on_logs").get<std::int64_t>()));

@@ -1,40 +1,41 @@
-// The inner loops of the tick, a function each, for mca.sh. Without loops: llvm-mca doesn't follow branches.
+// The inner loops of the tick, a function each, for mca.sh: the library's own functions, without loops, since llvm-mca
+// doesn't follow branches.
 
-#include "model/math.hpp"
-#include "model/numbers.hpp"
+#include "model/joint_model.hpp"
 #include "tests/golden/tables.hpp"
 
 using N = fxdyn::tables::Numbers;
-using fxdyn::Argument;
-using fxdyn::Saturations;
-using fxdyn::Unit;
-using fxdyn::Weight;
+namespace raw = fxdyn::raw;
 
 extern "C" {
 
-/// Weighted sum of a BLS node with its four inputs and its bias.
-void kernel_node(const Weight<N>* w, const Argument<N>* u, Argument<N>* out) {
-  auto sum = w[0] * u[0] + w[1] * u[1] + w[2] * u[2] + w[3] * u[3];
-  *out = N::clamp<Argument<N>>(sum + align(w[4], sum));
+/// Two BLS nodes: their arguments from four inputs.
+void kernel_two_nodes(const std::int32_t* rows, const std::int32_t* u, std::int32_t* out) {
+  raw::dense<4, raw::tanh_argument_width>(2, N::weight_bits() - 1, rows, u, out);
 }
 
-/// Its activation.
-void kernel_tanh(const Argument<N>* x, Unit<N>* out) { *out = fxdyn::tanh_of(*x); }
+/// Their activations, weighted and added up.
+void kernel_two_tanh(const std::int32_t* coefficients, const std::int32_t* x, std::int64_t* out) {
+  *out = raw::weighted_tanh(2, coefficients, x);
+}
+
+/// Sixteen products of a dense row.
+void kernel_row_16(const std::int32_t* row, const std::int32_t* u, std::int64_t* out) {
+  *out = raw::dense_row<16>(row, u).value();
+}
 
 /// Sine and cosine of a joint's position.
-void kernel_sin_cos(const fxdyn::Position<N>* q, Unit<N>* sine, Unit<N>* cosine) {
-  const auto result = fxdyn::sin_cos(*q);
-  *sine = result.sine;
-  *cosine = result.cosine;
+void kernel_sin_cos(const fxdyn::Position<N>* q, fxdyn::SineCosine<fxdyn::Unit<N>>* out) { *out = fxdyn::sin_cos(*q); }
+
+/// A vector turned into the next link's frame, any twist.
+void kernel_rotate(const fxdyn::LinkGeometry<N>* link, const fxdyn::LinkMotion<N>* motion,
+                   fxdyn::Vector3<fxdyn::LinearAcceleration<N>>* v) {
+  *v = fxdyn::detail::to_child<N>(fxdyn::AnyLink{}, *link, *motion, *v);
 }
 
-/// A vector turned into the next link's frame.
-void kernel_rotate(const Unit<N>* r, const fxdyn::LinearAcceleration<N>* v, fxdyn::LinearAcceleration<N>* out,
-                   Saturations& saturations) {
-#pragma GCC unroll 3
-  for (int i = 0; i < 3; ++i) {
-    out[i] = N::narrow<fxdyn::LinearAcceleration<N>>(r[3 * i] * v[0] + r[3 * i + 1] * v[1] + r[3 * i + 2] * v[2],
-                                                     saturations);
-  }
+/// A step of Dahl's model.
+void kernel_dahl(fxdyn::Dahl<N>* state, const fxdyn::Velocity<N>* dq, const fxdyn::InversePath<N>* inverse_path,
+                 fxdyn::Saturations* saturations) {
+  state->step(*dq, *inverse_path, *saturations);
 }
 }
