@@ -38,10 +38,10 @@ IdentifiedModel uncut(const IdentifiedModel& model, bool effects) {
   return out;
 }
 
-/// The error bound of one joint's torque. A state that moves fast rounds coarsely and forgets fast, one that creeps does
-/// neither; over all velocities at once the bound would be that of a state which rounds coarsely and forgets slowly. So
-/// the joint's velocity is cut into octaves. States keep the largest error of all octaves: the first round collects it,
-/// the second one counts.
+/// The error bound of one joint's torque. A state that moves fast rounds coarsely and forgets fast, one that creeps
+/// does neither; over all velocities at once the bound would be that of a state which rounds coarsely and forgets
+/// slowly. So the joint's velocity is cut into octaves. States keep the largest error of all octaves: the first round
+/// collects it, the second one counts.
 double error_of(Evaluator<BoundedNumbers>& evaluator, std::vector<State> box, std::size_t joint) {
   constexpr int octaves = 28;
   const double most = box[joint].dq.value.high;

@@ -281,8 +281,15 @@ std::string limits_section(const json& model) {
 std::string fixed_point_section(const json& model, const json& exported) {
   std::string out = section("Fixed point");
   if (exported.is_null()) return out + paragraph("Not exported from this model: run fxdyn export.");
-  Table errors({{"joint"}, {"unit"}, {"observed |fixed - double|", "n"}, {"of rated", "n"}, {"RMS", "n"},
-                {"proven at most", "n"}, {"of rated", "n"}, {"torque attained", "n"}, {"proven at most", "n"}});
+  Table errors({{"joint"},
+                {"unit"},
+                {"observed |fixed - double|", "n"},
+                {"of rated", "n"},
+                {"RMS", "n"},
+                {"proven at most", "n"},
+                {"of rated", "n"},
+                {"torque attained", "n"},
+                {"proven at most", "n"}});
   for (const json& joint : exported.at("joints")) {
     errors.add({{text(joint.at("joint"))},
                 {text(joint.at("unit"))},
@@ -296,7 +303,8 @@ std::string fixed_point_section(const json& model, const json& exported) {
   }
   out += errors.html();
   out += paragraph(
-      "Observed on the train and validate logs, on disturbed copies of them with states far beyond the limits, on random "
+      "Observed on the train and validate logs, on disturbed copies of them with states far beyond the limits, on "
+      "random "
       "states within them and while creeping. Proven for every motion within the limits. The last two columns: the "
       "largest torque of the model that a search within the limits finds, and what it can't exceed.");
   out += paragraph(fmt::format("Tables: {} bytes. Saturated numbers on the undisturbed logs: {}.",

@@ -12,8 +12,8 @@ namespace {
 constexpr double worth_keeping = 0.05;
 constexpr double nearly = 1.05;
 
-/// The nodes of fixed point are off by up to 4e-5 (model/dense.hpp), and by a tenth of that on the average: coefficients
-/// that add up to more than this many times the rated torque would show.
+/// The nodes of fixed point are off by up to 4e-5 (model/dense.hpp), and by a tenth of that on the average:
+/// coefficients that add up to more than this many times the rated torque would show.
 constexpr double largest_sum = 20;
 
 struct Choice {

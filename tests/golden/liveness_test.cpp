@@ -1,5 +1,5 @@
-// Every word of the exported parameters that the model's type does not declare unused changes a torque: a parameter that
-// nothing depends on is a parameter that was forgotten.
+// Every word of the exported parameters that the model's type does not declare unused changes a torque: a parameter
+// that nothing depends on is a parameter that was forgotten.
 
 #include <gtest/gtest.h>
 
