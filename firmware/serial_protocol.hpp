@@ -20,7 +20,7 @@
 
 namespace fxdyn::serial {
 
-inline constexpr std::uint32_t protocol_version = 1;
+inline constexpr std::uint32_t protocol_version = 2;
 inline constexpr std::array<std::uint8_t, 2> sync{0xA5, 0x5F};
 inline constexpr std::size_t largest_payload = 255;  ///< words: one byte tells how many
 

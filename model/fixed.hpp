@@ -28,11 +28,11 @@ namespace raw {
 inline constexpr std::int64_t max32 = std::numeric_limits<std::int32_t>::max();
 inline constexpr std::int64_t min32 = std::numeric_limits<std::int32_t>::min();
 
-/// x * 2^-shift, rounded half up (towards +infinity on a tie) for shift > 0, exact for shift <= 0. The rounding term is
-/// added to the value above the last dropped bit, so it can't overflow.
+/// x * 2^-shift, rounded half up (towards +infinity on a tie) for shift > 0, exact for shift <= 0. The rounding is
+/// added after the shift, so that it can't overflow.
 constexpr std::int64_t shift_right(std::int64_t x, int shift) {
   if (shift <= 0) return static_cast<std::int64_t>(static_cast<std::uint64_t>(x) << -shift);
-  return ((x >> (shift - 1)) + 1) >> 1;
+  return (x >> shift) + ((x >> (shift - 1)) & 1);
 }
 
 /// The nearest int32 to x; `outside` is 1 where x was out of range, else 0. No branch: both results are computed.
@@ -62,7 +62,7 @@ constexpr std::int32_t proven_narrow(std::int64_t x) {
     if constexpr (shift < 32) {
       auto low = static_cast<std::uint32_t>(x);
       asm("lsrs %0, %0, %2\n\torr %0, %0, %1, lsl %3\n\tadc %0, %0, #0"
-          : "+r"(low)
+          : "+&r"(low)
           : "r"(high), "i"(shift), "i"((32 - shift) & 31)
           : "cc");
       return static_cast<std::int32_t>(low);
@@ -106,9 +106,15 @@ constexpr std::int32_t saturate_to(std::int32_t x) {
 template <int bits>
 struct Wide {
   std::int64_t raw = 0;
-  friend constexpr Wide operator+(Wide a, Wide b) { return {a.raw + b.raw}; }
-  friend constexpr Wide operator-(Wide a, Wide b) { return {a.raw - b.raw}; }
-  friend constexpr Wide operator-(Wide a) { return {-a.raw}; }
+  // Unsigned inside: whatever stands in a table that was flashed with a valid CRC, a sum wraps and nothing else
+  // happens.
+  friend constexpr Wide operator+(Wide a, Wide b) { return wrapped(unsigned_of(a) + unsigned_of(b)); }
+  friend constexpr Wide operator-(Wide a, Wide b) { return wrapped(unsigned_of(a) - unsigned_of(b)); }
+  friend constexpr Wide operator-(Wide a) { return wrapped(0U - unsigned_of(a)); }
+
+ private:
+  static constexpr std::uint64_t unsigned_of(Wide x) { return static_cast<std::uint64_t>(x.raw); }
+  static constexpr Wide wrapped(std::uint64_t x) { return {static_cast<std::int64_t>(x)}; }
 };
 
 /// A stored number, value = raw * 2^-bits. There is no conversion from double: firmware can't contain one.

@@ -8,21 +8,28 @@
 
 // A number system says which type stands for which quantity, so that every formula of the model is written once.
 //
-//   a * b, a + b, a - b, -a     widen and are exact (for Real: double)
-//   align(x, w)                 x in the format of the accumulator w
-//   N::proven_narrow<T>(w)      w as a stored number of type T, rounded half up, no check: the export has proven that
-//   it
-//                               fits (host_tools/export/proof.hpp)
-//   N::narrow<T>(w, s)          the same, saturated and counted in s: for what no proof covers
-//   N::clamp<T>(w)              the same where saturation is meant, not counted
-//   N::convert<T>(x)            a stored number as another quantity of the same unit (a prismatic joint's q is a
-//   length) N::turned(v, c, s)          v, that was just turned with cosine c and sine s; bounding systems cut its
-//   components down
-//                               to its length (vector.hpp)
-//   N::rounded_length<T>(l)     length of a vector whose components were narrowed to T
-//   N::narrow_between<T>(w, a, b, share)  proven_narrow of w = a + share (b - a); bounding systems know that it lies
-//                               between a and b
-//   N::Word, N::load<T>(word)   how parameters are stored in tables, and one of them as a number
+//   a * b, a + b, a - b, -a
+//     widen and are exact (for Real: double)
+//   align(x, w)
+//     x in the format of the accumulator w
+//   N::proven_narrow<T>(w)
+//     w as a stored number of type T, rounded half up, no check: the export has proven that it fits (host_tools/export)
+//   N::narrow<T>(w, s)
+//     the same, saturated and counted in s: for what no proof covers
+//   N::clamp<T>(w)
+//     the same where saturation is meant, not counted
+//   N::convert<T>(x)
+//     a stored number as another quantity of the same unit (a prismatic joint's q is a length), proven to fit
+//   N::turned(v, c, s)
+//     v, that was just turned with cosine c and sine s; bounding systems cut its components down to its length
+//   N::rounded_length<T>(l, units)
+//     length of a vector whose components were narrowed to T; how long their rounding can be, in units of T
+//   N::narrow_between<T>(w, a, b)
+//     proven_narrow of w, that lies between a and b
+//   N::narrow_relaxed<T>(w, state, target, share)
+//     proven_narrow of w = state + share (target - state), the state's next value
+//   N::Word, N::load<T>(word)
+//     how parameters are stored in tables, and one of them as a number
 //
 // Coefficients (N::Coefficient<Q>) multiply a number of quantity Q to give a torque; their format follows from that of
 // Q, so that products of a sum need no shifts.
@@ -77,11 +84,15 @@ struct Real {
     return v;
   }
   template <class T>
-  static constexpr NoLength rounded_length(NoLength) {
+  static constexpr NoLength rounded_length(NoLength, double) {
     return {};
   }
   template <class T>
-  static constexpr T narrow_between(double x, T, T, double) {
+  static constexpr T narrow_between(double x, T, T) {
+    return x;
+  }
+  template <class T>
+  static constexpr T narrow_relaxed(double x, T, T, double) {
     return x;
   }
 };
@@ -201,11 +212,15 @@ struct FixedNumbers {
     return v;
   }
   template <class T>
-  static constexpr NoLength rounded_length(NoLength) {
+  static constexpr NoLength rounded_length(NoLength, double) {
     return {};
   }
   template <class T, int bits>
-  static constexpr T narrow_between(Wide<bits> x, T, T, Of<Quantity::unit>) {
+  static constexpr T narrow_between(Wide<bits> x, T, T) {
+    return proven_narrow<T>(x);
+  }
+  template <class T, int bits>
+  static constexpr T narrow_relaxed(Wide<bits> x, T, T, Of<Quantity::unit>) {
     return proven_narrow<T>(x);
   }
 };

@@ -185,7 +185,8 @@ constexpr Matrix3<Acceleration<N>> acceleration_matrix(const Vector3<Velocity<N>
   return {{entry(-(yy + zz)), entry(xy - wd.z), entry(xz + wd.y)},
           {entry(xy + wd.z), entry(-(xx + zz)), entry(yz - wd.x)},
           {entry(xz - wd.y), entry(yz + wd.x), entry(-(xx + yy))},
-          length_of(wd) + length_of(w) * length_of(w)};
+          // products rounded before they are added: up to one unit in the diagonal, half a unit elsewhere
+          N::template rounded_length<Acceleration<N>>(length_of(wd) + length_of(w) * length_of(w), 2.13)};
 }
 
 }  // namespace detail

@@ -54,11 +54,11 @@ constexpr auto align(const Vector3<T>& v, const Vector3<W>& like) {
                                                length_of(v)};
 }
 
-/// Componentwise proven_narrow() (numbers.hpp).
+/// Componentwise proven_narrow() (numbers.hpp): half a unit each, sqrt(3) / 2 of a unit together.
 template <class N, class T, class W>
 constexpr Vector3<T> proven_narrow(const Vector3<W>& v) {
   return {N::template proven_narrow<T>(v.x), N::template proven_narrow<T>(v.y), N::template proven_narrow<T>(v.z),
-          N::template rounded_length<T>(length_of(v))};
+          N::template rounded_length<T>(length_of(v), 0.87)};
 }
 
 /// 3 x 3, row by row. `length`: the largest factor by which it stretches a vector.

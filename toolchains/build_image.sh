@@ -13,6 +13,11 @@ tables=$(realpath "$1")
 mkdir -p "$2"
 out=$(realpath "$2")
 preset=${3:-cortex-m4}
+case $preset in cortex-m3 | cortex-m4 | cortex-m7 | cortex-m33) ;; *)
+  echo "build_image: no image for '$preset': cortex-m3, cortex-m4, cortex-m7 or cortex-m33" >&2
+  exit 2 ;;
+esac
+rm -f "$out"/fxdyn-*.elf "$out/size.json"
 build=$out/build-$preset
 
 log=$out/build-$preset.log
@@ -20,4 +25,5 @@ log=$out/build-$preset.log
   >"$log" 2>&1 || { cat "$log" >&2; exit 1; }
 
 elf=$(echo "$build"/firmware/fxdyn-*.elf)
-cp "$elf" "$build/firmware/size.json" "$out/"
+cp "$elf" "$out/"
+cp "${elf%.elf}.size.json" "$out/size.json"

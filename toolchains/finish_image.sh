@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # finish_image.sh PREFIX IMAGE.elf OBJECT_DIR.. -- ROOT..: after linking: checks what the image contains, bounds its
-# stack and writes size.json beside it. PREFIX: of the binutils, e.g. arm-none-eabi-; ROOT: as in stack_bound.py.
+# stack and writes IMAGE.size.json beside it. PREFIX: of the binutils, e.g. arm-none-eabi-; ROOT: as in stack_bound.py.
 set -euo pipefail
 here=$(dirname "$0")
 prefix=$1 elf=$2
@@ -8,7 +8,7 @@ shift 2
 objects=()
 while [ "$1" != -- ]; do objects+=("$1"); shift; done
 shift
-size=$(dirname "$elf")/size.json
+size=${elf%.elf}.size.json
 rm -f "$size"
 
 "$here/check_image.sh" "${prefix}nm" "${prefix}objdump" "$elf"

@@ -33,4 +33,5 @@ void on_tick() {
 
 int main() {
   for (int tick = 0; tick < 3; ++tick) on_tick();  // on a drive: the timer's interrupt, every 2 ms
+  return 0;
 }

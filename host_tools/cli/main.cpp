@@ -75,7 +75,8 @@ int run(int argc, char** argv) {
   Eigen::Index ticks = 5000;
   const auto stage = [&](const char* name, const char* what) {
     CLI::App* verb =
-        app.add_subcommand(name, fmt::format("{}\nExample: fxdyn {} robot.toml --out out/robot", what, name));
+        app.add_subcommand(name, fmt::format("{}\nExample: fxdyn {} robot.toml --out out/robot{}", what, name,
+                                             std::string_view(name) == "replay" ? " --image drive.elf" : ""));
     verb->add_option("PROJECT", project, "project file (TOML)")->required();
     verb->add_option("--out", out, "directory for the results")->required();
     return verb;
@@ -130,8 +131,10 @@ int run(int argc, char** argv) {
     if (*train_verb) pipeline.train();
     if (*export_verb) pipeline.export_tables();
     if (*report_verb) pipeline.report();
-    if (*replay_verb && !replay(pipeline, image, ticks)) {
-      throw DataError(fmt::format("firmware and host differ: see {}", (pipeline.directory() / "replay.json").string()));
+    if (*replay_verb) {
+      const Replay done = replay(pipeline, image, ticks);
+      if (!done.same) throw DataError(fmt::format("firmware and host differ: see {}", done.file.string()));
+      fmt::print("bit-exact: {}\n", done.file.string());
     }
     fmt::print("{}", summary_table(pipeline.directory()));
   }

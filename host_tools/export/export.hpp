@@ -37,8 +37,7 @@ class FixedModel {
  public:
   /// @param outputs bit i: the drive puts out the torque of joint i+1
   FixedModel(const IdentifiedModel& model, const Formats& formats, std::uint32_t outputs);
-  FixedModel(const IdentifiedModel& model, const Formats& formats)
-      : FixedModel(model, formats, (1U << model.joints.size()) - 1) {}
+  FixedModel(const IdentifiedModel& model, const Formats& formats) : FixedModel(model, formats, all_joints(model)) {}
   const Formats& formats() const { return formats_; }
   /// Indices of the joints whose torques tick() gives.
   const std::vector<std::size_t>& outputs() const { return output_joints_; }

@@ -38,34 +38,45 @@ IdentifiedModel uncut(const IdentifiedModel& model, bool effects) {
   return out;
 }
 
+/// Delay remembers what was so many ticks ago; a tick more for what its input remembers.
+constexpr int memory_ticks = static_cast<int>(Delay::capacity) + 4;
+
+bool delays(const IdentifiedModel& model) {
+  for (const JointFit& joint : model.joints) {
+    if (joint.find(Delay::name) != nullptr) return true;
+  }
+  return false;
+}
+
 /// The error bound of one joint's torque. A state that moves fast rounds coarsely and forgets fast, one that creeps
 /// does neither; over all velocities at once the bound would be that of a state which rounds coarsely and forgets
-/// slowly. So the joint's velocity is cut into octaves. States keep the largest error of all octaves: the first round
-/// collects it, the second one counts.
+/// slowly. So the joint's velocity is cut into octaves. States keep the largest error of all octaves, which the first
+/// round collects; then comes a creep, which adds to it, and after it the octaves again.
 double error_of(Evaluator<BoundedNumbers>& evaluator, std::vector<State> box, std::size_t joint) {
   constexpr int octaves = 28;
   const double most = box[joint].dq.value.high;
   Saturations none;
   double error = 0;
-  evaluator.reset();
-  for (int round = 0; round < 2; ++round) {
-    for (int octave = 0; octave <= octaves; ++octave) {
-      const double high = std::ldexp(most, -octave), low = octave < octaves ? high / 2 : 0;
-      for (const Bound dq : {Bound{low, high, 0}, Bound{-high, -low, 0}}) {
-        box[joint].dq.value = dq;
-        for (int tick = 0; tick < 2; ++tick) {
-          const double now = evaluator.tick(box, none)[joint].value.error;
-          if (round > 0) error = std::max(error, now);
-        }
-      }
+  const auto at = [&](double low, double high, int ticks) {
+    for (const Bound dq : {Bound{low, high, 0}, Bound{-high, -low, 0}}) {
+      box[joint].dq.value = dq;
+      for (int tick = 0; tick < ticks; ++tick) error = std::max(error, evaluator.tick(box, none)[joint].value.error);
     }
+  };
+  evaluator.reset();
+  for (int round = 0; round < 3; ++round) {
+    for (int octave = 0; octave < octaves; ++octave) at(std::ldexp(most, -octave - 1), std::ldexp(most, -octave), 2);
+    current_bounding.creeps = round == 1;
+    if (round == 1) at(0, std::ldexp(most, -octaves), 1);
+    current_bounding.creeps = false;
   }
   return error;
 }
 
 }  // namespace
 
-Proof prove(const IdentifiedModel& model, const Formats* formats) {
+Proof prove(const IdentifiedModel& identified, const Formats* formats) {
+  const IdentifiedModel model = formats != nullptr ? with_stored_limits(identified, *formats) : identified;
   Proof proof;
   const BoundScope scope(proof.ranges, formats);
   Evaluator<BoundedNumbers> evaluator(uncut(model, true), model.tick_s);
@@ -78,16 +89,17 @@ Proof prove(const IdentifiedModel& model, const Formats* formats) {
   Saturations none;
   const auto n = static_cast<Eigen::Index>(model.joints.size());
   proof.torque = proof.effects = proof.error = Eigen::VectorXd::Zero(n);
-  // Three ticks: a state starts at rest, is anywhere in its range after one, and its memory of memory after two.
-  for (int tick = 0; tick < 3; ++tick) {
+  for (int tick = 0; tick < memory_ticks; ++tick) {
     const auto torques = evaluator.tick(box, none);
     for (Eigen::Index j = 0; j < n; ++j) {
       const auto i = static_cast<std::size_t>(j);
       proof.torque[j] = std::max(proof.torque[j], torques[i].value.magnitude());
       proof.effects[j] = std::max(proof.effects[j], evaluator.effects()[i].value.magnitude());
+      proof.error[j] = std::max(proof.error[j], torques[i].value.error);
     }
   }
-  if (formats != nullptr) {
+  // What a delay has kept may come from any velocity: then only the bound over all of them at once holds.
+  if (formats != nullptr && !delays(model)) {
     for (Eigen::Index j = 0; j < n; ++j) proof.error[j] = error_of(evaluator, box, static_cast<std::size_t>(j));
   }
   if (formats == nullptr) return proof;

@@ -227,12 +227,12 @@ class ProjectReader {
     set(project_.target.board, table.find("board"), [](const Value& v) { return v.name(board_names, "board"); });
     if (const auto tick = table.find("tick_s")) {
       project_.target.tick_s = tick->positive();
-      if (project_.target.tick_s < 1e-5 || project_.target.tick_s > 0.1) tick->place().fail("expected 1e-5 .. 0.1 s");
+      if (project_.target.tick_s < 5e-5 || project_.target.tick_s > 0.1) tick->place().fail("expected 5e-5 .. 0.1 s");
     }
     if (const auto joints = table.find("joints"); joints && !joints->is_string()) {
       for (const Value& value : joints->items()) {
         const auto joint = static_cast<std::size_t>(value.integer(1));
-        if (joint > this->joints()) value.place().fail(fmt::format("the robot has {} joints", this->joints()));
+        if (joint > this->joints()) value.place().fail(fmt::format("expected 1 .. {}", this->joints()));
         project_.target.joints.push_back(joint - 1);
       }
     } else if (joints && joints->string() != "all") {

@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 namespace fxdyn {
 namespace {
 
@@ -14,6 +16,24 @@ T number(Kind kind, double value) {
 }
 
 }  // namespace
+
+std::uint32_t all_joints(const IdentifiedModel& model) {
+  return model.joints.size() >= 32 ? ~0U : (1U << model.joints.size()) - 1;
+}
+
+IdentifiedModel with_stored_limits(const IdentifiedModel& model, const Formats& formats) {
+  IdentifiedModel out = model;
+  const auto stored = [&](double& limit, Quantity quantity) {
+    limit = from_raw(to_raw(limit, formats[quantity]), formats[quantity]);
+  };
+  for (JointFit& joint : out.joints) {
+    stored(joint.q_lower, Quantity::position);
+    stored(joint.q_upper, Quantity::position);
+    stored(joint.dq_limit, Quantity::velocity);
+    stored(joint.ddq_limit, Quantity::acceleration);
+  }
+  return out;
+}
 
 std::vector<const EffectFit*> in_order(const JointFit& joint, bool of_total) {
   std::vector<const EffectFit*> order;
@@ -26,7 +46,7 @@ std::vector<const EffectFit*> in_order(const JointFit& joint, bool of_total) {
 
 int node_coefficient_bits(const BroadLearningFit& fit) {
   const double most = fit.coefficients.tail(fit.nodes()).cwiseAbs().maxCoeff() * 32768 / raw::activation_one;
-  int bits = 40;
+  int bits = 24;  // enough for coefficients that are next to nothing
   while (std::ldexp(most, bits) > 32767) --bits;
   return bits;
 }
@@ -102,12 +122,27 @@ Evaluator<N>::Evaluator(const IdentifiedModel& model, double tick_s) {
 template <class N>
 void Evaluator<N>::add_effect(std::size_t joint, const EffectFit& fit, double tick_s) {
   bool found = false;
+  const std::size_t joints_of_robot = geometry_.size();
   Catalogue::for_each([&]<class E>() {
     if (E::name != fit.effect) return;
     found = true;
     constexpr bool position = acts_on<E> == ActsOn::position;
     deflects_ |= position;
     couples_ |= needs_peers<E>;
+    if constexpr (std::is_same_v<E, JointCoupling>) {
+      const double other = fit.shape[0];
+      if (other != std::floor(other) || other < 1 || other > static_cast<double>(joints_of_robot) ||
+          other == static_cast<double>(joint + 1)) {
+        throw InputError(fmt::format("joint {}: joint_coupling with joint {}: expected another one of 1 .. {}",
+                                     joint + 1, other, joints_of_robot));
+      }
+    }
+    if constexpr (std::is_same_v<E, Delay>) {
+      if (fit.shape[0] > Delay::largest * tick_s) {
+        throw InputError(fmt::format("joint {}: delay of {} s: at most {} ticks of {} s", joint + 1, fit.shape[0],
+                                     Delay::largest, tick_s));
+      }
+    }
     auto step = std::make_unique<EffectStep<E>>();
     for (std::size_t i = 0; i < E::shape.size(); ++i) {
       step->words.push_back(word(Kind::number, E::shape[i].quantity, E::stored_shape(i, fit.shape[i], tick_s)));

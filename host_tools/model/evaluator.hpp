@@ -31,7 +31,8 @@ struct FromSi<BoundedNumbers> {
   }
   static Bound node_coefficient(double value, int bits) {
     if (current_bounding.formats == nullptr) return {value, value, 0};
-    return with_error(value, bits);
+    const double scale = 32768.0 / raw::activation_one;
+    return {value, value, std::fabs(from_raw(to_raw(value * scale, bits), bits) / scale - value)};
   }
 };
 template <>
@@ -48,6 +49,13 @@ std::size_t stored_nodes(const BroadLearningFit& fit);
 /// A joint's effects in the order of the tables: those of its own motion first (then the BLS), then those that need the
 /// running total (`of_total`).
 std::vector<const EffectFit*> in_order(const JointFit& joint, bool of_total = false);
+
+/// Bit i: joint i+1, for every joint of the model.
+std::uint32_t all_joints(const IdentifiedModel& model);
+
+/// The model with the setpoints' limits as the tables hold them, rounded to their formats: what fixed point is compared
+/// with, so that both cut alike.
+IdentifiedModel with_stored_limits(const IdentifiedModel& model, const Formats& formats);
 
 /// A double as a number of quantity Q in number system N.
 template <class N, Quantity quantity>

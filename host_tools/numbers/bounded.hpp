@@ -33,6 +33,7 @@ struct Ranges {
 struct Bounding {
   Ranges* ranges = nullptr;
   const Formats* formats = nullptr;
+  bool creeps = false;  ///< this tick stands for a whole creep: states add its error to what they have
 };
 inline thread_local Bounding current_bounding;
 
@@ -173,12 +174,14 @@ struct BoundedNumbers {
     // saturates, so that its range is no demand on the format
     if (current_bounding.formats == nullptr) return {x.value};
     const double most = 2147483647 * unit<T>();
-    return {rounded<T>(x.value).cut(-most, most)};
+    Bound out = rounded<T>(x.value);
+    out.error += std::fmax(0.0, out.magnitude() + out.error - most);  // double does not saturate
+    return {out};
   }
+  /// Where fixed point is cut, what is lost shows in the functions behind it.
   template <class T>
   static T clamp(BoundedWide x) {
-    const double most = largest<T>();
-    return {rounded<T>(x.value).cut(-most, most)};
+    return {rounded<T>(x.value)};
   }
   template <class T, Kind kind>
   static T convert(Bounded<kind> x) {
@@ -218,20 +221,31 @@ struct BoundedNumbers {
     return v;
   }
   template <class T>
-  static BoundedLength rounded_length(BoundedLength x) {
-    if (current_bounding.formats != nullptr) x.error += unit<T>() * std::sqrt(0.75);
+  static BoundedLength rounded_length(BoundedLength x, double units) {
+    if (current_bounding.formats != nullptr) x.error += unit<T>() * units;
     return x;
   }
-  /// a + share (b - a), where one of a and b may be what came out the tick before. Each tick adds its own error e and
-  /// keeps the state's with a weight of at most w: e / (1 - w) in the end, or what creeping_ticks allow.
   template <class T>
-  static T narrow_between(BoundedWide x, T a, T b, Of<Quantity::unit> share) {
+  static T narrow_between(BoundedWide x, T a, T b) {
     Bound out = Bound::hull(a.value, b.value);
+    if (current_bounding.formats != nullptr) out.error = rounded<T>(x.value).error;
+    return {out};
+  }
+  /// Each tick adds an own error p and keeps the state's with a weight of 1 - share: p / share in the end, on top of
+  /// the target's. A state that creeps keeps its error, to which creeping_ticks times p come.
+  template <class T>
+  static T narrow_relaxed(BoundedWide, T state, T target, Of<Quantity::unit> share) {
+    Bound out = Bound::hull(state.value, target.value);
     if (current_bounding.formats == nullptr) return {out};
-    const double own = std::fmax(0.0, rounded<T>(x.value).error - out.error);
-    const double forgotten = std::fmin(share.value.low, 1 - share.value.high);
-    const double ticks = forgotten > 1 / creeping_ticks ? 1 / forgotten : creeping_ticks;
-    out.error = std::fmax(out.error, std::fmin(a.value.error, b.value.error) + ticks * own);
+    const double kept = state.value.error, from_target = target.value.error;
+    const double own = (state.value.magnitude() + kept + target.value.magnitude() + from_target) *
+                           (share.value.error + unit<Of<Quantity::unit>>()) +
+                       unit<T>() / 2;
+    const bool forgets =
+        share.value.low > 1 / creeping_ticks || (share.value.low > 0 && share.value.low == share.value.high);
+    const double in_the_end = from_target + own * (forgets ? 1 / share.value.low : creeping_ticks);
+    out.error = std::fmax(kept, in_the_end);
+    if (!forgets && current_bounding.creeps) out.error = std::fmax(kept, from_target) + own * creeping_ticks;
     return {out};
   }
   static double steepest_tanh(Bound x) {
@@ -253,11 +267,6 @@ struct BoundedNumbers {
   static Bound rounded(Bound x) {
     if (current_bounding.formats != nullptr) x.error += unit<T>() / 2;
     return x;
-  }
-  template <class T>
-  static double largest() {
-    const int bits = common_bits(kind_of(T{}).quantity);
-    return bits > 0 ? std::ldexp(1.0, 31 - bits) : std::numeric_limits<double>::infinity();
   }
   template <Kind kind>
   static Bounded<kind> see(Bounded<kind> x) {
@@ -295,7 +304,7 @@ inline SineCosine<BoundedNumbers::Of<Quantity::unit>> sine_cosine(Bound angle, d
 
 template <Kind kind>
 SineCosine<BoundedNumbers::Of<Quantity::unit>> sin_cos(Bounded<kind> q) {
-  return detail::sine_cosine(q.value, 4e-9);
+  return detail::sine_cosine(q.value, 4e-9 + 1.1e-10 * q.value.magnitude());
 }
 inline SineCosine<BoundedNumbers::Of<Quantity::unit>> sin_cos_turns(BoundedWide turns) {
   const double scale = 2 * raw::pi;
@@ -308,12 +317,19 @@ inline BoundedNumbers::Of<Quantity::unit> tanh_of(BoundedNumbers::Of<Quantity::a
 }
 inline BoundedNumbers::Of<Quantity::unit> exp_negative(BoundedNumbers::Of<Quantity::argument> x) {
   Bound out{std::exp(-std::fmax(0.0, x.value.high)), std::exp(-std::fmax(0.0, x.value.low)), 0};
-  if (detail::rounding()) out.error = x.value.error + 1.3e-9;
+  if (detail::rounding()) {
+    const double end = std::ldexp(1.0, 31 - argument_bits);
+    out.error = std::exp(-std::fmax(0.0, x.value.low - x.value.error)) * x.value.error + 1.4e-9;
+    if (x.value.high + x.value.error > end) out.error += std::exp(-end);  // fixed point goes no further
+  }
   return {out};
 }
 inline BoundedNumbers::Of<Quantity::argument> asinh_of(BoundedNumbers::Of<Quantity::ratio> x) {
   Bound out{std::asinh(x.value.low), std::asinh(x.value.high), 0};
-  if (detail::rounding()) out.error = x.value.error + 7e-6;
+  if (detail::rounding()) {
+    const double end = std::ldexp(1.0, 31 - ratio_bits);
+    out.error = x.value.error + 7e-6 + std::fmax(0.0, std::asinh(x.value.magnitude()) - std::asinh(end));
+  }
   return {out};
 }
 template <Kind kind>

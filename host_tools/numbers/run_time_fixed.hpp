@@ -121,11 +121,15 @@ struct RunTimeNumbers {
     return v;
   }
   template <class T>
-  static NoLength rounded_length(NoLength) {
+  static NoLength rounded_length(NoLength, double) {
     return {};
   }
   template <class T>
-  static T narrow_between(RunTimeWide x, T, T, Of<Quantity::unit>) {
+  static T narrow_between(RunTimeWide x, T, T) {
+    return proven_narrow<T>(x);
+  }
+  template <class T>
+  static T narrow_relaxed(RunTimeWide x, T, T, Of<Quantity::unit>) {
     return proven_narrow<T>(x);
   }
   static Of<Quantity::unit> one() { return {1 << unit_bits}; }

@@ -172,6 +172,13 @@ void Pipeline::export_tables() {
   const QuantisationError error = quantisation_error(model, formats, judged);
   progress_.step();
   for (std::size_t j = 0; j < model.joints.size(); ++j) {
+    const auto k = static_cast<Eigen::Index>(j);
+    if (error.largest[k] > proof.error[k]) {
+      throw DataError(fmt::format(
+          "joint {} ({}): fixed point is off by {:.3g}, more than the {:.3g} that were proven: please "
+          "report this with {}",
+          j + 1, model.robot.joints[j].name, error.largest[k], proof.error[k], (directory_ / "model.json").string()));
+    }
     const double share = clean.largest[static_cast<Eigen::Index>(j)] / model.joints[j].rated_torque;
     if (!(share <= largest_error)) {
       throw DataError(fmt::format(
@@ -181,11 +188,18 @@ void Pipeline::export_tables() {
     }
   }
   const auto n = model.joints.size();
-  model.tables_crc = write_tables(model, formats, error, proof.error, (1U << n) - 1, directory_);
+  model.tables_crc = write_tables(model, formats, error, proof.error, all_joints(model), directory_);
+  // Tables of drives that the project no longer asks for would be of another model.
+  for (std::size_t j = 0; j < n; ++j) {
+    for (const char* name : {"tables.hpp", "tables.bin", "replay.json"})
+      fs::remove(directory_ / fmt::format("joint_{}", j + 1) / name);
+  }
+  json drives = json::array();
   for (const std::size_t j : project_.target.joints) {
     const fs::path own = directory_ / fmt::format("joint_{}", j + 1);
     fs::create_directories(own);
-    write_tables(model, formats, error, proof.error, 1U << j, own);
+    const std::uint32_t crc = write_tables(model, formats, error, proof.error, 1U << j, own);
+    drives.push_back({{"index", j + 1}, {"tables_crc", crc}, {"table_bytes", fs::file_size(own / "tables.bin")}});
   }
   model.formats = formats;
   json joints = json::array();
@@ -213,6 +227,7 @@ void Pipeline::export_tables() {
                          {"tables_crc", model.tables_crc},
                          {"formats", formats_json(formats)},
                          {"joints", joints},
+                         {"drives", drives},
                          {"saturations_on_logs", clean.saturations},
                          {"table_bytes", fs::file_size(directory_ / "tables.bin")}};
   write_file(directory_ / "export.json", document.dump(1) + "\n");

@@ -44,8 +44,11 @@ class Pipeline {
 void predict_log(const std::filesystem::path& model, const std::filesystem::path& log, bool fixed,
                  const std::filesystem::path& directory);
 
+struct Replay {
+  bool same = false;           ///< every torque and saturation count
+  std::filesystem::path file;  ///< replay.json: in DIR, or in DIR/joint_N for the drive of one joint
+};
 /// `fxdyn replay`: streams the test logs (and a perturbed copy) to the firmware image under QEMU.
-/// @return false if a bit differs.
-bool replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index max_ticks);
+Replay replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index max_ticks);
 
 }  // namespace fxdyn

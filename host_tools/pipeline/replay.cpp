@@ -31,7 +31,7 @@ Replayed play(QemuTarget& target, const IdentifiedModel& model, FixedModel& fixe
   const std::vector<TickReply> replies = target.run(stream, per_tick);
 
   fixed.reset();
-  Evaluator<Real> exact(model, model.tick_s);
+  Evaluator<Real> exact(with_stored_limits(model, fixed.formats()), model.tick_s);
   Replayed out;
   out.ticks = ticks;
   out.largest_error = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(model.robot.size()));
@@ -86,9 +86,16 @@ json to_json(const Replayed& replayed, const TickStates& states, const Identifie
           {"joints", joints}};
 }
 
+/// Where the tables and the replay of these joints are: of all of them, or of a drive with one.
+std::filesystem::path directory_of(const std::filesystem::path& directory, const std::vector<std::size_t>& outputs,
+                                   std::size_t joints) {
+  if (outputs.size() != 1 || joints == 1) return directory;
+  return directory / fmt::format("joint_{}", outputs[0] + 1);
+}
+
 }  // namespace
 
-bool replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index max_ticks) {
+Replay replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index max_ticks) {
   const IdentifiedModel model = pipeline.model();
   if (!model.formats) {
     throw InputError(
@@ -108,18 +115,19 @@ bool replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index
   const serial::Identity identity = target.hello();
   if (identity.state != serial::NodeState::ready)
     throw InputError(fmt::format("{}: the image refuses its tables (CRC or layout)", image.string()));
-  const std::uint32_t all = (1U << model.robot.size()) - 1;
+  const std::uint32_t all = all_joints(model);
   FixedModel fixed(model, *model.formats, identity.outputs & all);
   if (identity.joints != model.robot.size() || identity.outputs == 0 || (identity.outputs & ~all) != 0 ||
       identity.layout_hash != fixed.layout_hash() || identity.tables_crc != fixed.crc()) {
     throw InputError(
         fmt::format("{}: holds other tables (layout {:08x}, CRC {:08x}; expected {:08x}, {:08x}); build it from {}",
                     image.string(), identity.layout_hash, identity.tables_crc, fixed.layout_hash(), fixed.crc(),
-                    (pipeline.directory() / "tables.hpp").string()));
+                    (directory_of(pipeline.directory(), fixed.outputs(), model.robot.size()) / "tables.hpp").string()));
   }
   Progress progress;
   progress.stage("replaying on the firmware", streams.size());
-  json logs = json::array();
+  json logs = json::array(), output_joints = json::array();
+  for (const std::size_t joint : fixed.outputs()) output_joints.push_back(joint + 1);
   bool same = true;
   for (const TickStates& states : streams) {
     const Replayed replayed = play(target, model, fixed, states, std::min(max_ticks, states.t.size()));
@@ -129,12 +137,14 @@ bool replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index
   }
   progress.done();
   json document = {{"schema", "fxdyn.replay/1"}, {"image", image.filename().string()},
-                   {"tables_crc", fixed.crc()},  {"outputs", identity.outputs},
+                   {"tables_crc", fixed.crc()},  {"output_joints", output_joints},
                    {"bit_exact", same},          {"logs", logs}};
   const std::filesystem::path size_file = image.parent_path() / "size.json";
   if (std::filesystem::exists(size_file)) document["size"] = json::parse(read_file(size_file));
-  write_file(pipeline.directory() / "replay.json", document.dump(1) + "\n");
-  return same;
+  const std::filesystem::path directory = directory_of(pipeline.directory(), fixed.outputs(), model.robot.size());
+  std::filesystem::create_directories(directory);
+  write_file(directory / "replay.json", document.dump(1) + "\n");
+  return {same, directory / "replay.json"};
 }
 
 }  // namespace fxdyn

@@ -74,7 +74,8 @@ std::vector<TrainOutcome> train(Fitter& fitter, const TrainSettings& settings, P
     const double range = span(fitter, j);
     JointFit design = fitter.design(j);
     BroadLearningFit bls;
-    bls.reference_velocity = 0.02 * top_speed(fitter, j);
+    // fixed point's asinh ends at 128
+    bls.reference_velocity = std::max(0.02 * top_speed(fitter, j), design.dq_limit / 120);
     bls.span = std::asinh(std::max(top_speed(fitter, j), design.dq_limit) / bls.reference_velocity);
     const auto attempt = [&](double distance, double scale, Eigen::Index nodes) {
       bls.distances = {distance / 3, distance, distance * 3};

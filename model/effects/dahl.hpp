@@ -15,7 +15,7 @@ struct Dahl {
   /// @param inverse_path tick / distance [s/rad | s/m]
   constexpr Unit<N> step(Velocity<N> dq, InversePath<N> inverse_path, Saturations&) {
     const auto decay = exp_negative(N::template clamp<Argument<N>>(magnitude(dq) * inverse_path));
-    z = blend<N>(sign_of(dq), z, decay);
+    z = relax<N>(z, sign_of(dq), N::template proven_narrow<Unit<N>>(N::one() - decay));
     return z;
   }
 };

@@ -32,7 +32,7 @@ struct Elasticity {
   static constexpr void basis(const JointInput<N>& u, Words<N> words, State<N>& state, Saturations&, Emit&& emit) {
     // The first tick takes the torque as it is: no branch, so that every tick costs the same.
     const std::array<Unit<N>, 2> shares{N::one(), words.template number<Quantity::unit>(0)};
-    state.load = blend<N>(state.load, u.structural, shares[state.ticks]);
+    state.load = relax<N>(state.load, u.structural, shares[state.ticks]);
     state.ticks = 1;
     emit(as<Quantity::torque>, 0, state.load);
   }

@@ -31,7 +31,7 @@ struct FrictionDrift {
   static constexpr void basis(const JointInput<N>& u, Words<N> words, State<N>& state, Saturations&, Emit&& emit) {
     emit(as<Quantity::unit>, 0, N::template proven_narrow<Unit<N>>(state.w * u.sign));
     emit(as<Quantity::velocity>, 1, N::template proven_narrow<Velocity<N>>(state.w * u.dq));
-    state.w = blend<N>(state.w, N::one(), words.template number<Quantity::unit>(0));
+    state.w = relax<N>(state.w, N::one(), words.template number<Quantity::unit>(0));
   }
 };
 

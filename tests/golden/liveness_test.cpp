@@ -73,7 +73,7 @@ TEST(Golden, EveryParameterChangesATorque) {
     const auto shows = [&](std::uint32_t other) {
       raw[word] = static_cast<std::int32_t>(other);
       Parameters changed;
-      std::memcpy(&changed, raw.data(), sizeof raw);
+      std::memcpy(static_cast<void*>(&changed), raw.data(), sizeof raw);
       return torques(changed) != before;
     };
     const bool lower = shows(static_cast<std::uint32_t>(value) + 300);

@@ -245,7 +245,7 @@ double coefficient_of(Quantity quantity, double value) {
 }
 
 /// A one-joint robot with every effect that a model can have and a BLS.
-IdentifiedModel one_joint(bool every = false) {
+IdentifiedModel one_joint() {
   IdentifiedModel model;
   Joint joint;
   joint.name = "joint";
@@ -263,7 +263,7 @@ IdentifiedModel one_joint(bool every = false) {
   double value = 1.3;
   for (const std::string_view effect : joint_effect_names()) {
     const EffectInfo& info = *find_effect(effect);
-    if (!every && (info.acts_on != ActsOn::torque || info.needs_total || info.needs_peers)) continue;
+    if (info.acts_on != ActsOn::torque || info.needs_total || info.needs_peers) continue;
     EffectFit e;
     e.effect = effect;
     e.shape = shape_of(effect);

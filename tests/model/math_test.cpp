@@ -1,4 +1,5 @@
 #include "model/math.hpp"
+#include "model/dense.hpp"
 
 #include <gtest/gtest.h>
 
@@ -88,7 +89,7 @@ TEST(Math, TanhKeepsTheStatedErrorAndIsOdd) {
 TEST(Math, ExponentialKeepsTheStatedError) {
   for (const std::int32_t x : samples()) {
     const double expected = x < 0 ? 1.0 : std::exp(-value(x, argument_bits));
-    ASSERT_NEAR(value(raw::exp_negative(x), 30), expected, 7e-9) << x;
+    ASSERT_NEAR(value(raw::exp_negative(x), 30), expected, 1.4e-9) << x;
   }
   EXPECT_EQ(raw::exp_negative(0), 1 << 30);  // a joint at rest keeps its presliding state exactly
 }
@@ -136,6 +137,65 @@ TEST(Fixed, NarrowingMatchesArithmeticOnRandomValues) {
     ASSERT_EQ(static_cast<long double>(result), clamped) << x << " >> " << shift;
     ASSERT_EQ(outside != 0, rounded != clamped);
   }
+}
+
+TEST(Math, TanhLinesStayWithinTheirStatedError) {
+  double worst = 0;
+  for (std::int32_t x = -(1 << 19); x < 1 << 19; ++x) {
+    const double value = static_cast<double>(raw::upper_half(raw::tanh_line(x))) / raw::activation_one;
+    worst = std::max(worst, std::fabs(value - std::tanh(std::ldexp(x, -raw::tanh_argument_bits))));
+  }
+  EXPECT_LT(worst, raw::tanh_line_error);
+  EXPECT_GT(worst, 0.5 * raw::tanh_line_error);  // and the statement is not idle
+}
+
+TEST(Dense, IsTheSumThatItsCommentSays) {
+  Random random(12);
+  const auto small = [&] { return static_cast<std::int32_t>(random.uniform(-32768, 32768)); };
+  for (int round = 0; round < 200; ++round) {
+    std::array<std::int32_t, 4 * raw::row_words<6>> rows;
+    std::array<std::int32_t, 3> u;
+    std::array<std::array<std::int64_t, 7>, 4> w;
+    std::array<std::int64_t, 6> in;
+    for (std::size_t i = 0; i < 6; ++i) in[i] = small();
+    for (std::size_t i = 0; i < 3; ++i)
+      u[i] = raw::pack(static_cast<std::int32_t>(in[2 * i]), static_cast<std::int32_t>(in[2 * i + 1]));
+    for (std::size_t k = 0; k < 4; ++k) {
+      w[k][6] = rows[4 * k] = small() * 10000;
+      for (std::size_t i = 0; i < 6; ++i) w[k][i] = small();
+      for (std::size_t i = 0; i < 3; ++i)
+        rows[4 * k + 1 + i] =
+            raw::pack(static_cast<std::int32_t>(w[k][2 * i]), static_cast<std::int32_t>(w[k][2 * i + 1]));
+    }
+    std::array<std::int32_t, 4> out;
+    raw::dense<6, 20>(4, 9, rows.data(), u.data(), out.data());
+    for (std::size_t k = 0; k < 4; ++k) {
+      std::int64_t sum = w[k][6];
+      for (std::size_t i = 0; i < 6; ++i) sum += w[k][i] * in[i];
+      EXPECT_EQ(out[k], std::clamp<std::int64_t>(sum >> 9, -(1 << 19), (1 << 19) - 1));
+    }
+  }
+}
+
+template <int shift>
+void expect_rounded(std::int64_t x) {
+  // only what fits is promised
+  const std::int64_t whole = raw::shift_right(x, shift);
+  if (whole != static_cast<std::int32_t>(whole)) return;
+  EXPECT_EQ(raw::proven_narrow<shift>(x), whole) << x << " >> " << shift;
+}
+
+TEST(Fixed, ProvenNarrowRoundsHalfUpAtEveryShift) {
+  Random random(13);
+  for (int round = 0; round < 2000; ++round) {
+    const auto magnitude = static_cast<int>(random.uniform(0, 63));
+    auto x = static_cast<std::int64_t>(std::ldexp(random.uniform(-1, 1), magnitude));
+    if (round % 4 == 0) x = (x | 0xffff) ^ 0x7fff;  // halves
+    [&]<int... shift>(std::integer_sequence<int, shift...>) { (expect_rounded<shift>(x), ...); }
+    (std::make_integer_sequence<int, 64>{});
+  }
+  EXPECT_EQ(raw::shift_right(INT64_MAX, 1), INT64_MAX / 2 + 1);
+  EXPECT_EQ(raw::shift_right(-1, 1), 0);  // a tie goes up
 }
 
 }  // namespace

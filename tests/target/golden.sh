@@ -22,7 +22,7 @@ echo "$board: $(tr '\n' ',' <<<"$said")"
 [ $result -eq 0 ] || { echo "golden: not bit for bit the host's, or stopped (exit code $result)" >&2; exit 1; }
 
 figure() { awk -v name="$1" '$1 == name { print $2 }' <<<"$said"; }
-size() { sed -E "s/.*\"$1\": ([0-9]+).*/\1/" "$build/tests/golden/size.json"; }
+size() { sed -E "s/.*\"$1\": ([0-9]+).*/\1/" "${elf%.elf}.size.json"; }
 fewest=$(figure fewest_instructions)
 most=$(figure most_instructions)
 if [ "$fewest" != "$most" ]; then

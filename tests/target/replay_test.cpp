@@ -30,7 +30,7 @@ json replay_on_target(const fs::path& project, const fs::path& out) {
   shell(FXDYN_SOURCE_DIR "/toolchains/build_image.sh " + (out / "tables.hpp").string() + " " +
         (out / "firmware").string());
   const fs::path image = out / "firmware" / "fxdyn-mps2-an386.elf";
-  EXPECT_TRUE(replay(pipeline, image, 1500));
+  EXPECT_TRUE(replay(pipeline, image, 1500).same);
 
   // The page in flash is tables.bin, byte for byte: one can be flashed for the other.
   const fs::path page = out / "page.bin";
