@@ -340,7 +340,7 @@ std::uint32_t write_tables(const IdentifiedModel& model, const Formats& formats,
 //   tau = fxdyn::tables::Model::tick(parameters, state, setpoints, saturations)
 // Raw integers, value = raw * 2^-bits with the bits of Formats. Made from
 {}// |fixed - double|: proven for every motion within the limits (effect states: unless a joint creeps, by less than a
-// presliding distance in half a minute, for longer than that), and the largest over these logs, disturbed copies of them and
+// presliding distance in ten seconds, for longer than that), and the largest over these logs, disturbed copies of them and
 // random and creeping motion within the limits:
 {}
 #pragma once

@@ -52,8 +52,8 @@ class BoundScope {
 
 /// The states of Dahl's model and of relaxations forget their rounding errors while they move and add them up while
 /// they creep. Their error is bounded for creeping (less than one presliding distance or time constant in so many
-/// ticks) that lasts no longer than this: half a minute at 2 ms.
-inline constexpr double creeping_ticks = 15'000;
+/// ticks) that lasts no longer than this: ten seconds at 2 ms.
+inline constexpr double creeping_ticks = 5'000;
 
 struct Bound {
   double low = 0, high = 0, error = 0;

@@ -10,14 +10,14 @@
 //   validate validate_fast.csv [0, 20) s, hash e414233ea78114da
 //   validate validate_slow.csv [0, 20) s, hash 895e8f2e34c76f54
 // |fixed - double|: proven for every motion within the limits (effect states: unless a joint creeps, by less than a
-// presliding distance in half a minute, for longer than that), and the largest over these logs, disturbed copies of them and
+// presliding distance in ten seconds, for longer than that), and the largest over these logs, disturbed copies of them and
 // random and creeping motion within the limits:
-//   joint_1: proven <= 0.0343, observed 0.000253 N*m (2.6e-06 of rated)
-//   joint_2: proven <= 0.0406, observed 0.000555 N*m (3e-06 of rated)
-//   joint_3: proven <= 0.0278, observed 0.000577 N*m (6.4e-06 of rated)
-//   joint_4: proven <= 0.00404, observed 6.54e-05 N*m (2.7e-06 of rated)
-//   joint_5: proven <= 0.00159, observed 5.29e-05 N*m (2.6e-06 of rated)
-//   joint_6: proven <= 0.00123, observed 4.38e-05 N*m (2.1e-06 of rated)
+//   joint_1: proven <= 0.0135, observed 0.000253 N*m (2.6e-06 of rated)
+//   joint_2: proven <= 0.0162, observed 0.000448 N*m (2.4e-06 of rated)
+//   joint_3: proven <= 0.0121, observed 0.000577 N*m (6.4e-06 of rated)
+//   joint_4: proven <= 0.00164, observed 6.54e-05 N*m (2.7e-06 of rated)
+//   joint_5: proven <= 0.000697, observed 5.29e-05 N*m (2.6e-06 of rated)
+//   joint_6: proven <= 0.000531, observed 2.38e-05 N*m (1.1e-06 of rated)
 
 #pragma once
 
