@@ -358,7 +358,8 @@ using Model = RobotModel<Numbers, {:#x}{}>;
   {{{}U, {}U, {}U, {}U}},  // magic, layout hash, words, CRC-32
   {{
 {}  }}}};
-static_assert(page.header.words == TablePage<Model>::parameter_words, "made for another version of the model library");
+static_assert(page.header.words == TablePage<Model>::parameter_words && page.header.layout_hash == Model::layout_hash(),
+              "these tables are for another version of the model library: export them anew");
 inline constexpr const Model::Parameters& parameters = page.parameters;
 
 }}  // namespace fxdyn::tables

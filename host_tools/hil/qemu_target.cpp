@@ -16,6 +16,7 @@
 #include <bit>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <utility>
 
 #include "host_tools/error.hpp"
@@ -43,7 +44,16 @@ void become(char* const* arguments, int line, int messages, pid_t parent) {
 }  // namespace
 
 QemuTarget::QemuTarget(const std::filesystem::path& image, Options options) : options_(std::move(options)) {
-  if (!std::filesystem::exists(image)) throw InputError(fmt::format("no firmware image {}", image.string()));
+  if (!std::filesystem::exists(image))
+    throw InputError(fmt::format("no firmware image {}: toolchains/build_image.sh makes one", image.string()));
+  std::array<char, 20> head{};
+  std::ifstream(image, std::ios::binary).read(head.data(), head.size());
+  // ELF header: magic, 32 bits (byte 4), machine 40 = Arm (byte 18)
+  if (std::string_view(head.data(), 4) !=
+          "\x7f"
+          "ELF" ||
+      head[4] != 1 || head[18] != 40)
+    throw InputError(fmt::format("{}: not a firmware image; toolchains/build_image.sh makes one", image.string()));
   try {
     start(image);
   } catch (...) {

@@ -50,6 +50,10 @@ void read_effect(Table table, Scenario& scenario) {
   fit.named = true;
   const EffectInfo& info = *find_effect(fit.effect);
   JointFit* target = nullptr;  // an effect on the body has no joint
+  if (info.acts_on == ActsOn::body) {
+    if (const auto joint = table.find("joint"))
+      joint->place().fail(fmt::format("{} acts on the robot as a whole: remove joint", fit.effect));
+  }
   if (info.acts_on != ActsOn::body) {
     const Value joint_value = table.need("joint", "1 for the first moving joint");
     const auto joint = static_cast<std::size_t>(joint_value.integer(1));

@@ -202,7 +202,8 @@ using Model = RobotModel<Numbers, 0x3f,
     529731311, 522519766, 124131212, 1433593977, 152692975, 91957334, -101586845, -213458012, -736890964,
     }
   }};
-static_assert(page.header.words == TablePage<Model>::parameter_words, "made for another version of the model library");
+static_assert(page.header.words == TablePage<Model>::parameter_words && page.header.layout_hash == Model::layout_hash(),
+              "these tables are for another version of the model library: export them anew");
 inline constexpr const Model::Parameters& parameters = page.parameters;
 
 }  // namespace fxdyn::tables

@@ -87,18 +87,20 @@ TEST(Target, FirmwareGivesTheHostsBitsOnASimulatedRobot) {
   expect_exact(replay_on_target(project, test::folder() / "simulated"), 3000);
 }
 
-/// An arm whose joints 2 and 5 have every effect of the catalogue and a BLS, with a load and on a tilted base.
+/// An arm whose joints 2 and 5 have every effect of the catalogue and a BLS and whose joint 3 slides, with a load and
+/// on a tilted base.
 IdentifiedModel every_effect() {
   IdentifiedModel model;
   model.robot = read_urdf(FXDYN_SOURCE_DIR "/host_tools/demo/puma560.urdf");
+  model.robot.joints[2].type = JointType::prismatic;
   const DhChain chain = to_dh(model.robot);
   Random random(8);
   for (std::size_t j = 0; j < 6; ++j) {
     model.inertia.push_back(to_link_inertia(*model.robot.joints[j].inertial, chain.urdf_in_dh[j]));
     JointFit joint;
     joint.rated_torque = joint.tau_limit = 200;
-    joint.q_lower = -2.5;
-    joint.q_upper = 2;
+    joint.q_lower = j == 2 ? -0.4 : -2.5;
+    joint.q_upper = j == 2 ? 0.5 : 2;
     joint.dq_limit = 3;
     joint.ddq_limit = 15;
     joint.sign_width = 0.02;
@@ -137,13 +139,23 @@ TEST(Target, EveryEffectGivesTheHostsBits) {
   states.q.bottomRows(100) *= 1e3;  // far beyond the limits
   const QuantisationError error = quantisation_error(model, formats, {within_limits(model, 2000, 3)});
   for (Eigen::Index j = 0; j < 6; ++j) EXPECT_LE(error.largest[j], proven[j]) << "joint " << j + 1;
-  // all joints, the two with effects, one without
-  for (const std::uint32_t outputs : {0x3fU, 0x12U, 0x04U}) {
-    const fs::path out = test::folder() / ("every" + std::to_string(outputs));
+  struct Case {
+    std::uint32_t outputs;
+    const char *preset, *machine;
+  };
+  // all joints; the two with effects, on every core; one without
+  for (const Case& on : {Case{0x3f, "cortex-m4", "mps2-an386"}, Case{0x12, "cortex-m3", "mps2-an385"},
+                         Case{0x12, "cortex-m7", "mps2-an500"}, Case{0x12, "cortex-m33", "mps2-an505"},
+                         Case{0x04, "cortex-m4", "mps2-an386"}}) {
+    const std::uint32_t outputs = on.outputs;
+    const fs::path out = test::folder() / ("every" + std::to_string(outputs) + on.preset);
     fs::create_directories(out);
     write_tables(model, formats, error, proven, outputs, out);
-    shell(FXDYN_SOURCE_DIR "/toolchains/build_image.sh " + (out / "tables.hpp").string() + " " + out.string());
-    QemuTarget target(out / "fxdyn-mps2-an386.elf");
+    shell(FXDYN_SOURCE_DIR "/toolchains/build_image.sh " + (out / "tables.hpp").string() + " " + out.string() + " " +
+          on.preset);
+    QemuTarget::Options options;
+    options.machine = on.machine;
+    QemuTarget target(out / ("fxdyn-" + std::string(on.machine) + ".elf"), options);
     FixedModel fixed(model, formats, outputs);
     const serial::Identity identity = target.hello();
     ASSERT_EQ(identity.state, serial::NodeState::ready);
