@@ -11,34 +11,50 @@ namespace fxdyn {
 Regressor::Regressor(const DhChain& chain)
     : chain_(chain),
       base_(base_motion<Real>({chain.up.x(), chain.up.y(), chain.up.z()})),
-      motions_(chain.links.size()),
+      states_(chain.links.size()),
+      axes_(chain.links.size()),
       y_(Eigen::MatrixXd::Zero(joints(), joints() * static_cast<Eigen::Index>(parameters_per_link))) {}
 
-const Eigen::MatrixXd& Regressor::operator()(const Eigen::VectorXd& q, const Eigen::VectorXd& dq,
-                                             const Eigen::VectorXd& ddq) {
+namespace {
+
+/// work(p, wrench of the unit parameter e_p) for all ten. The compiler sees the constants and drops what they make zero
+/// (this file is compiled without signed zeros and infinities).
+template <class Work, std::size_t... p>
+[[gnu::always_inline]] inline void for_unit_wrenches(const LinkMotion<Real>& motion, const Work& work,
+                                                     std::index_sequence<p...>) {
+  const auto unit = [](std::size_t k) {
+    std::array<double, parameters_per_link> parameters{};
+    parameters[k] = 1;
+    return to_inertia(parameters);
+  };
+  (work(p, link_wrench<Real>(AnyLink{}, unit(p), motion)), ...);
+}
+
+}  // namespace
+
+[[gnu::flatten]] void Regressor::evaluate() {
   const std::size_t n = chain_.links.size();
+  LinkMotion<Real> motion = base_;
   for (std::size_t i = 0; i < n; ++i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    motions_[i] =
-        link_motion<Real>(AnyLink{}, chain_.links[i], i == 0 ? base_ : motions_[i - 1], {q[k], dq[k], ddq[k]});
-  }
-  for (std::size_t link = 0; link < n; ++link) {
-    for (std::size_t p = 0; p < parameters_per_link; ++p) {
-      std::array<double, parameters_per_link> unit{};
-      unit[p] = 1;
-      Wrench<Real> wrench = link_wrench<Real>(AnyLink{}, to_inertia(unit), motions_[link]);
-      const auto column = static_cast<Eigen::Index>(link * parameters_per_link + p);
-      for (std::size_t i = link + 1; i-- > 0;) {
-        y_(static_cast<Eigen::Index>(i), column) = joint_torque<Real>(AnyLink{}, chain_.links[i], wrench);
-        if (i > 0) {
-          Wrench<Real> parent;
-          add_to_parent<Real>(AnyLink{}, parent, wrench, chain_.links[i], motions_[i]);
-          wrench = parent;
-        }
-      }
+    motion = link_motion<Real>(AnyLink{}, chain_.links[i], motion, states_[i]);
+    for (std::size_t j = 0; j < i; ++j) {
+      Screw& axis = axes_[j];
+      axis.moment = detail::to_child<Real>(AnyLink{}, chain_.links[i], motion, axis.moment + cross(axis.direction, motion.p));
+      axis.direction = detail::to_child<Real>(AnyLink{}, chain_.links[i], motion, axis.direction);
+    }
+    const Vector3<double> z{0, 0, 1}, none{0, 0, 0};
+    axes_[i] = AnyLink::revolute(chain_.links[i]) ? Screw{z, none} : Screw{none, z};
+    for (std::size_t j = 0; j <= i; ++j) {
+      const Screw axis = axes_[j];
+      double* const columns = &y_(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(i * parameters_per_link));
+      for_unit_wrenches(
+          motion,
+          [&](std::size_t p, const Wrench<Real>& wrench) {
+            columns[p * n] = dot(axis.direction, wrench.moment) + dot(axis.moment, wrench.force);
+          },
+          std::make_index_sequence<parameters_per_link>{});
     }
   }
-  return y_;
 }
 
 namespace {

@@ -191,14 +191,6 @@ const EffectFit* JointFit::find(std::string_view effect) const {
   return nullptr;
 }
 
-std::array<double, parameters_per_link> to_array(const LinkInertia<Real>& link) {
-  return {link.m, link.h.x, link.h.y, link.h.z, link.xx, link.yy, link.zz, link.xy, link.xz, link.yz};
-}
-
-LinkInertia<Real> to_inertia(const std::array<double, parameters_per_link>& v) {
-  return {v[0], {v[1], v[2], v[3]}, v[4], v[5], v[6], v[7], v[8], v[9]};
-}
-
 json formats_json(const Formats& formats) {
   json out;
   for (std::size_t i = 0; i < quantity_count; ++i) out[std::string(quantity_names[i])] = formats.quantity[i];

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "tests/robot/chains.hpp"
+#include "tests/support/chains.hpp"
 
 namespace fxdyn {
 namespace {

@@ -1,9 +1,9 @@
 #include <gtest/gtest.h>
 
-#include <kdl/chain.hpp>
 #include <kdl/chainidsolver_recursive_newton_euler.hpp>
 
-#include "tests/robot/chains.hpp"
+#include "tests/support/chains.hpp"
+#include "tests/support/kdl.hpp"
 
 namespace fxdyn {
 namespace {
@@ -11,25 +11,7 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 using test::Chains;
-
-KDL::Vector to_kdl(const Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-
-KDL::Chain to_kdl(const Robot& robot) {
-  KDL::Chain chain;
-  for (const Joint& joint : robot.joints) {
-    const Eigen::Matrix3d r = joint.origin.linear();
-    const Inertial body = joint.inertial.value_or(Inertial{});
-    const auto& i = body.tensor;
-    const auto type = joint.type == JointType::revolute ? KDL::Joint::RotAxis : KDL::Joint::TransAxis;
-    chain.addSegment(KDL::Segment(
-        joint.name, KDL::Joint(joint.name, to_kdl(joint.origin.translation()), to_kdl(Vector3d(r * joint.axis)), type),
-        KDL::Frame(KDL::Rotation(r(0, 0), r(0, 1), r(0, 2), r(1, 0), r(1, 1), r(1, 2), r(2, 0), r(2, 1), r(2, 2)),
-                   to_kdl(joint.origin.translation())),
-        KDL::RigidBodyInertia(body.mass, to_kdl(body.centre),
-                              KDL::RotationalInertia(i(0, 0), i(1, 1), i(2, 2), i(0, 1), i(0, 2), i(1, 2)))));
-  }
-  return chain;
-}
+using test::to_kdl;
 
 VectorXd kdl_torques(const Robot& robot, const VectorXd& q, const VectorXd& dq, const VectorXd& ddq) {
   const KDL::Chain chain = to_kdl(robot);

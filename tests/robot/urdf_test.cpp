@@ -4,7 +4,7 @@
 #include <numbers>
 
 #include "host_tools/error.hpp"
-#include "tests/robot/chains.hpp"
+#include "tests/support/chains.hpp"
 
 namespace fxdyn {
 namespace {
