@@ -8,6 +8,7 @@
 #include <cstring>
 #include <fstream>
 #include <sstream>
+#include <vector>
 
 #include "host_tools/error.hpp"
 
@@ -44,10 +45,37 @@ void write_file(const std::filesystem::path& file, std::string_view content) {
   }
 }
 
+namespace {
+
+class Fnv1a {
+ public:
+  void add(std::string_view content) {
+    for (const char c : content) hash_ = (hash_ ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
+  }
+  std::string text() const { return fmt::format("{:016x}", hash_); }
+
+ private:
+  std::uint64_t hash_ = 14695981039346656037ULL;
+};
+
+}  // namespace
+
 std::string hash_of(std::string_view content) {
-  std::uint64_t hash = 14695981039346656037ULL;
-  for (const char c : content) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
-  return fmt::format("{:016x}", hash);
+  Fnv1a hash;
+  hash.add(content);
+  return hash.text();
+}
+
+std::string hash_of_file(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::vector<char> piece(std::size_t{1} << 20);
+  Fnv1a hash;
+  while (stream) {
+    stream.read(piece.data(), static_cast<std::streamsize>(piece.size()));
+    hash.add({piece.data(), static_cast<std::size_t>(stream.gcount())});
+  }
+  if (!stream.eof()) throw InputError(file.string() + ": can't be read");
+  return hash.text();
 }
 
 }  // namespace fxdyn

@@ -118,6 +118,7 @@ TickStates at_ticks(const ProcessedLog& log, double tick_s, bool whole) {
   const auto ticks = static_cast<Eigen::Index>(std::floor((to - from) / tick_s + 1e-9)) + 1;
   TickStates out{log.name, Eigen::VectorXd(ticks), Eigen::MatrixXd(ticks, log.q.cols()),
                  Eigen::MatrixXd(ticks, log.q.cols()), Eigen::MatrixXd(ticks, log.q.cols())};
+  const MotionRows motion = log.motion();
   for (Eigen::Index k = 0; k < ticks; ++k) {
     const double t = from + tick_s * static_cast<double>(k);
     const double place = (t - from) / log.step_s;
@@ -125,9 +126,9 @@ TickStates at_ticks(const ProcessedLog& log, double tick_s, bool whole) {
     const double share = std::clamp((t - log.t[i]) / log.step_s, 0.0, 1.0);
     out.t[k] = t;
     const auto blend = [&](const Eigen::MatrixXd& m) { return ((1 - share) * m.row(i) + share * m.row(i + 1)).eval(); };
-    out.q.row(k) = blend(log.q);
-    out.dq.row(k) = blend(log.dq);
-    out.ddq.row(k) = blend(log.ddq);
+    out.q.row(k) = blend(motion.q);
+    out.dq.row(k) = blend(motion.dq);
+    out.ddq.row(k) = blend(motion.ddq);
   }
   return out;
 }

@@ -4,127 +4,302 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <complex>
 
 #include "host_tools/error.hpp"
+#include "host_tools/log/spectrum.hpp"
+#include "host_tools/model/evaluator.hpp"
 
 namespace fxdyn {
 namespace {
 
-/// Frequency below which `share` of the power of the columns lies, at most `ceiling`. Goertzel sums on a coarse grid.
-double power_frequency(const Eigen::MatrixXd& columns, double step_s, double share, double ceiling) {
-  const Eigen::Index samples = columns.rows();
-  const double resolution = std::max(1.0 / (static_cast<double>(samples) * step_s), ceiling / 400);
-  const auto bins = static_cast<int>(ceiling / resolution);
-  double highest = resolution;
-  for (Eigen::Index j = 0; j < columns.cols(); ++j) {
-    const Eigen::VectorXd x = columns.col(j).array() - columns.col(j).mean();
-    std::vector<double> power;
-    for (int bin = 1; bin <= bins; ++bin) {
-      const double angle = 2 * std::numbers::pi * bin * resolution * step_s;
-      double re = 0, im = 0;
-      std::complex<double> phase = 1;
-      const std::complex<double> turn = std::polar(1.0, angle);
-      for (Eigen::Index k = 0; k < samples; ++k) {
-        re += x[k] * phase.real();
-        im += x[k] * phase.imag();
-        phase *= turn;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Samples beside a block that differences of sixth order look at, its one-sided ends included.
+constexpr Index halo = 8;
+
+/// Rows [from, from + count) of q and its derivatives; what is measured is not differentiated.
+MotionRows slice(const MatrixXd& q, const MatrixXd& dq, const MatrixXd& ddq, Index from, Index count, double step_s) {
+  const Index begin = std::max<Index>(0, from - halo), end = std::min(q.rows(), from + count + halo);
+  const auto around = [&](const MatrixXd& m) { return m.middleRows(begin, end - begin); };
+  const auto cut = [&](const MatrixXd& m) { return MatrixXd(m.middleRows(from - begin, count)); };
+  MotionRows out;
+  out.q = q.middleRows(from, count);
+  out.dq = dq.size() > 0 ? MatrixXd(dq.middleRows(from, count)) : cut(differentiate(around(q), step_s));
+  if (ddq.size() > 0)
+    out.ddq = ddq.middleRows(from, count);
+  else
+    out.ddq = cut(dq.size() > 0 ? differentiate(around(dq), step_s) : differentiate_twice(around(q), step_s));
+  return out;
+}
+
+/// Runs in which the torque does not move from its extreme (or stays at the project's limit), four samples or longer,
+/// and into which it jumped: the peak of a coarsely measured torque is entered by a step of its resolution.
+std::vector<std::array<Index, 2>> saturated_runs(const VectorXd& tau, double limit) {
+  constexpr Index shortest = 4;
+  const Index n = tau.size();
+  double resolution = 1e300;
+  for (Index k = 1; k < n; ++k) {
+    const double step = std::fabs(tau[k] - tau[k - 1]);
+    if (step > 0) resolution = std::min(resolution, step);
+  }
+  std::vector<std::array<Index, 2>> runs;
+  bool jumped = false;
+  for (const double sign : {1.0, -1.0}) {
+    const double extreme = limit > 0 ? std::min(0.995 * limit, (sign * tau).maxCoeff()) : (sign * tau).maxCoeff();
+    if (limit > 0 && (sign * tau).maxCoeff() < 0.995 * limit) continue;
+    for (Index k = 0; k < n;) {
+      if (sign * tau[k] < extreme * (1 - 1e-12)) {
+        ++k;
+        continue;
       }
-      power.push_back(re * re + im * im);
-    }
-    double total = 0, sum = 0;
-    for (const double p : power) total += p;
-    for (std::size_t bin = 0; bin < power.size(); ++bin) {
-      sum += power[bin];
-      if (sum >= share * total) {
-        highest = std::max(highest, static_cast<double>(bin + 1) * resolution);
-        break;
+      Index end = k;
+      while (end < n && sign * tau[end] >= extreme * (1 - 1e-12)) ++end;
+      if (end - k >= shortest) {
+        runs.push_back({k, end});
+        jumped |= limit > 0 || (k > 0 && std::fabs(tau[k] - tau[k - 1]) > 3 * resolution);
       }
+      k = end;
     }
   }
-  return highest;
+  if (!jumped) runs.clear();
+  return runs;
+}
+
+/// RMS of the noise that stays in the filtered torque, estimated from what lies above the cut-off (white noise
+/// assumed).
+double noise_floor(const VectorXd& raw, const VectorXd& filtered, double cutoff_hz, double step_s) {
+  const double nyquist = 0.5 / step_s, kept = std::min(cutoff_hz, 0.95 * nyquist);
+  return std::sqrt(kept / (nyquist - kept)) * (raw - filtered).norm() / std::sqrt(static_cast<double>(raw.size()));
+}
+
+/// Whether velocity holds anything above the cut-off: noise, or motion that a filter would bend.
+bool is_noisy(const VectorXd& velocity, double cutoff_hz, double step_s) {
+  const VectorXd above = velocity - ZeroPhaseFilter(cutoff_hz, step_s).apply(velocity);
+  const Index edge = std::min<Index>(velocity.rows() / 4, static_cast<Index>(2 / (cutoff_hz * step_s)));
+  const Index rows = velocity.rows() - 2 * edge;
+  return above.middleRows(edge, rows).norm() > 1e-6 * velocity.middleRows(edge, rows).norm();
+}
+
+/// Smallest step of an encoder: what all differences between samples are multiples of; 0 if there is none.
+double encoder_step(const VectorXd& q) {
+  double smallest = 1e300, largest = 0;
+  for (Index k = 1; k < q.size(); ++k) {
+    const double step = std::fabs(q[k] - q[k - 1]);
+    largest = std::max(largest, step);
+    if (step > 1e-12) smallest = std::min(smallest, step);
+  }
+  if (smallest > largest) return 0;
+  Index counted = 0, multiples = 0;
+  for (Index k = 1; k < q.size(); ++k) {
+    const double steps = std::fabs(q[k] - q[k - 1]) / smallest;
+    if (steps < 0.5 || steps > 100) continue;
+    ++counted;
+    multiples += std::fabs(steps - std::round(steps)) < 0.02 * steps + 0.02;
+  }
+  return counted > 20 && static_cast<double>(multiples) > 0.9 * static_cast<double>(counted) ? smallest : 0;
+}
+
+/// Where the motion sinks into the noise: the first frequency from which the density of q stays below twice the level
+/// of its highest octave.
+double crossing_frequency(const Spectrum& spectrum) {
+  const Index n = spectrum.density.size();
+  VectorXd high = spectrum.density.tail(n / 2);
+  std::nth_element(high.begin(), high.begin() + high.size() / 2, high.end());
+  const double level = 2 * high[high.size() / 2];
+  for (Index k = 1; k + 3 < n; ++k) {
+    // four bins, since a spectrum of lines has gaps
+    if (spectrum.density.segment(k, 4).maxCoeff() < level) return spectrum.frequency(k);
+  }
+  return spectrum.frequency(n - 1);
 }
 
 }  // namespace
 
-Eigen::MatrixXd ProcessedLog::filter_columns(const Eigen::Ref<const Eigen::MatrixXd>& full_rate) const {
-  return ZeroPhaseFilter(filter.torque_cutoff_hz, step_s).apply(full_rate);
+MotionRows ProcessedLog::motion(Index from, Index count) const {
+  return slice(q, measured_dq, measured_ddq, from, count, step_s);
 }
 
-Eigen::MatrixXd ProcessedLog::decimate(const Eigen::Ref<const Eigen::MatrixXd>& filtered) const {
-  Eigen::MatrixXd out(rows(), filtered.cols());
-  for (Eigen::Index i = 0; i < out.rows(); ++i) out.row(i) = filtered.row(first + i * decimation);
+MotionRows ProcessedLog::link_motion(Index from, Index count) const {
+  MotionRows out = motion(from, count);
+  if (qlink.size() == 0) return out;
+  const MotionRows link = slice(qlink, {}, {}, from, count, step_s);
+  for (std::size_t j = 0; j < has_link.size(); ++j) {
+    if (!has_link[j]) continue;
+    const auto k = static_cast<Index>(j);
+    out.q.col(k) = link.q.col(k);
+    out.dq.col(k) = link.dq.col(k);
+    out.ddq.col(k) = link.ddq.col(k);
+  }
   return out;
 }
 
-/// Whether velocity holds anything above the cut-off: noise, or motion that a filter would bend.
-static bool is_noisy(const Eigen::MatrixXd& velocity, double cutoff_hz, double step_s) {
-  const Eigen::MatrixXd above = velocity - ZeroPhaseFilter(cutoff_hz, step_s).apply(velocity);
-  const Eigen::Index edge =
-      std::min<Eigen::Index>(velocity.rows() / 4, static_cast<Eigen::Index>(2 / (cutoff_hz * step_s)));
-  const Eigen::Index rows = velocity.rows() - 2 * edge;
-  return above.middleRows(edge, rows).norm() > 1e-6 * velocity.middleRows(edge, rows).norm();
+MotionRows ProcessedLog::joint_motion(Index joint) const {
+  const auto column = [&](const MatrixXd& m) { return m.size() > 0 ? MatrixXd(m.col(joint)) : MatrixXd(); };
+  return slice(column(q), column(measured_dq), column(measured_ddq), 0, samples(), step_s);
+}
+
+bool ProcessedLog::is_saturated(Index joint, Index row) const {
+  const auto& runs = saturated[static_cast<std::size_t>(joint)];
+  // The filter spreads a sample over about one period of its cut-off.
+  const auto reach = static_cast<Index>(1 / (filter.torque_cutoff_hz * step_s));
+  const Index sample = first + row * decimation;
+  return std::any_of(runs.begin(), runs.end(),
+                     [&](const auto& run) { return sample >= run[0] - reach && sample < run[1] + reach; });
+}
+
+MatrixXd ProcessedLog::filter_columns(const Eigen::Ref<const MatrixXd>& full_rate) const {
+  return ZeroPhaseFilter(filter.torque_cutoff_hz, step_s).apply(full_rate);
+}
+
+MatrixXd ProcessedLog::decimate(const Eigen::Ref<const MatrixXd>& filtered) const {
+  MatrixXd out(rows(), filtered.cols());
+  for (Index i = 0; i < out.rows(); ++i) out.row(i) = filtered.row(first + i * decimation);
+  return out;
+}
+
+std::vector<RowBlock> row_blocks(const ProcessedLog& log) {
+  const Index pad = ZeroPhaseFilter(log.filter.torque_cutoff_hz, log.step_s).edge_samples() * 13 / 2 + 1;
+  const Index step = std::max<Index>(8192, 4 * pad), rows = log.rows();
+  std::vector<RowBlock> blocks;
+  for (Index from = 0, row = 0; row < rows; from += step) {
+    RowBlock block;
+    block.begin = std::max<Index>(0, from - pad);
+    block.samples = std::min(log.samples(), from + step + pad) - block.begin;
+    block.row = row;
+    while (row < rows && log.first + row * log.decimation < from + step) ++row;
+    block.rows = row - block.row;
+    if (block.rows > 0) blocks.push_back(block);
+  }
+  return blocks;
+}
+
+MatrixXd RowBlock::filter_and_keep(const ProcessedLog& log, const MatrixXd& full) const {
+  const MatrixXd filtered = log.filter_columns(full);
+  MatrixXd out(rows, full.cols());
+  for (Index i = 0; i < rows; ++i) out.row(i) = filtered.row(log.first + (row + i) * log.decimation - begin);
+  return out;
 }
 
 FilterFit choose_filter(const std::vector<Log>& logs, const SignalSettings& settings) {
-  double excited = 0, rate = 1e30;
-  std::vector<Eigen::MatrixXd> velocities;
-  for (const Log& log : logs) {
-    rate = std::min(rate, 1 / log.step_s);
-    if (settings.position_cutoff_hz && settings.torque_cutoff_hz) continue;
-    velocities.push_back(log.dq.size() > 0 ? log.dq : differentiate(log.q, log.step_s));
-    excited = std::max(excited, power_frequency(velocities.back(), log.step_s, 0.999, std::min(30.0, 0.4 * rate)));
-  }
-  const double position = std::min(0.4 * rate, std::max(10 * excited, 10.0));
-  bool noisy = false;
-  for (std::size_t i = 0; i < velocities.size(); ++i) noisy |= is_noisy(velocities[i], position, logs[i].step_s);
   FilterFit filter;
+  const Index n = logs.front().joints();
+  filter.encoder_step.assign(static_cast<std::size_t>(n), 0.0);
+  filter.position_noise.assign(static_cast<std::size_t>(n), 0.0);
+  double rate = 1e30;
+  bool noisy = false;
+  for (const Log& log : logs) rate = std::min(rate, 1 / log.step_s);
+  for (const Log& log : logs) {
+    for (Index j = 0; j < n; ++j) {
+      const auto k = static_cast<std::size_t>(j);
+      const VectorXd q = log.q.col(j);
+      if (!(q.maxCoeff() > q.minCoeff())) continue;
+      const VectorXd dq = log.dq.size() > 0 ? VectorXd(log.dq.col(j)) : VectorXd(differentiate(q, log.step_s));
+      const Spectrum velocity = welch(dq, log.step_s), position = welch(q, log.step_s);
+      const double ceiling = std::min(30.0, 0.4 * rate);
+      filter.excited_hz = std::max(filter.excited_hz, velocity.frequency_of_share(0.999, ceiling));
+      filter.encoder_step[k] = std::max(filter.encoder_step[k], encoder_step(q));
+      filter.position_noise[k] = std::max(filter.position_noise[k], position.noise_rms());
+      filter.crossing_hz = std::max(filter.crossing_hz, crossing_frequency(position));
+    }
+  }
+  const double position = std::min(0.4 * rate, std::max(10.0, 2 * filter.crossing_hz));
+  if (!settings.position_cutoff_hz) {
+    for (const Log& log : logs) {
+      for (Index j = 0; j < n && !noisy; ++j) {
+        const VectorXd q = log.q.col(j);
+        noisy = is_noisy(log.dq.size() > 0 ? VectorXd(log.dq.col(j)) : VectorXd(differentiate(q, log.step_s)), position,
+                         log.step_s);
+      }
+    }
+  }
   filter.position_cutoff_hz =
       settings.position_cutoff_hz.value_or(noisy ? position : rate / 2);  // half the rate: no filter
-  filter.torque_cutoff_hz = settings.torque_cutoff_hz.value_or(std::min(0.4 * rate, std::max(5 * excited, 10.0)));
+  filter.torque_cutoff_hz =
+      settings.torque_cutoff_hz.value_or(std::min(0.4 * rate, std::max(5 * filter.excited_hz, 10.0)));
   filter.edge_s = settings.edge_s.value_or(3 / std::min(filter.torque_cutoff_hz, filter.position_cutoff_hz));
   return filter;
 }
 
-ProcessedLog process(const Log& log, const FilterFit& filter) {
+ProcessedLog process(Log log, const FilterFit& filter, const ProcessSettings& settings) {
   ProcessedLog out;
   out.name = log.file.filename().string();
   out.role = log.role;
   out.from_s = log.from_s;
   out.to_s = log.to_s;
   out.step_s = log.step_s;
-  out.t = log.t;
+  out.load = log.load;
   out.filter = filter;
-  const ZeroPhaseFilter motion(filter.position_cutoff_hz, log.step_s);
-  out.q = motion.apply(log.q);
-  out.dq = log.dq.size() > 0 ? motion.apply(log.dq) : differentiate(out.q, log.step_s);
-  out.ddq = log.ddq.size() > 0
-                ? motion.apply(log.ddq)
-                : (log.dq.size() > 0 ? differentiate(out.dq, log.step_s) : differentiate_twice(out.q, log.step_s));
-  out.tau_raw = log.tau;
-  if (log.tau.size() > 0) out.tau = out.filter_columns(log.tau);
-  const auto edge = static_cast<Eigen::Index>(std::ceil(filter.edge_s / log.step_s));
+  const Index samples = log.samples(), n = log.joints();
+  const auto edge = static_cast<Index>(std::ceil(filter.edge_s / log.step_s));
   out.first = edge;
-  out.last = log.samples() - edge;
+  out.last = samples - edge;
   if (out.last - out.first < 10) {
     throw DataError(fmt::format(
         "{}: {:.2f} s from {} s is too short: {:.2f} s at either end go to the filters; take a longer window", out.name,
-        static_cast<double>(log.samples()) * log.step_s, log.from_s, filter.edge_s));
+        static_cast<double>(samples) * log.step_s, log.from_s, filter.edge_s));
   }
-  const auto inside = [&](const Eigen::MatrixXd& m) { return m.middleRows(out.first, out.last - out.first); };
-  out.q_range = (inside(out.q).colwise().maxCoeff() - inside(out.q).colwise().minCoeff()).transpose();
-  const Eigen::MatrixXd taken = inside(log.q) - inside(out.q);
-  out.q_noise = (taken.colwise().norm() / std::sqrt(static_cast<double>(taken.rows()))).transpose();
+  const Index inside = out.last - out.first;
+  const ZeroPhaseFilter motion(filter.position_cutoff_hz, log.step_s), torque(filter.torque_cutoff_hz, log.step_s);
+  out.q_range.setZero(n);
+  out.q_noise.setZero(n);
+  out.torque_noise.setZero(n);
+  out.saturated.resize(static_cast<std::size_t>(n));
+  out.has_link.assign(static_cast<std::size_t>(n), false);
+  // In place, column by column: a long log is not held twice.
+  for (Index j = 0; j < n; ++j) {
+    const VectorXd raw = log.q.col(j);
+    log.q.col(j) = motion.apply(raw);
+    const auto middle = log.q.col(j).segment(out.first, inside);
+    out.q_range[j] = middle.maxCoeff() - middle.minCoeff();
+    out.q_noise[j] = (raw.segment(out.first, inside) - middle).norm() / std::sqrt(static_cast<double>(inside));
+    if (log.dq.size() > 0) log.dq.col(j) = motion.apply(log.dq.col(j));
+    if (log.ddq.size() > 0) log.ddq.col(j) = motion.apply(log.ddq.col(j));
+    if (log.qlink.size() > 0) {
+      out.has_link[static_cast<std::size_t>(j)] = !std::isnan(log.qlink(0, j));
+      log.qlink.col(j) =
+          out.has_link[static_cast<std::size_t>(j)] ? MatrixXd(motion.apply(log.qlink.col(j))) : MatrixXd(log.q.col(j));
+    }
+    if (log.tau.size() > 0) {
+      const VectorXd tau = log.tau.col(j);
+      out.torque_noise[j] = noise_floor(tau.segment(out.first, inside), torque.apply(tau).col(0).segment(out.first, inside),
+                                        filter.torque_cutoff_hz, log.step_s);
+      out.saturated[static_cast<std::size_t>(j)] =
+          saturated_runs(tau, settings.torque_limits.empty() ? 0 : settings.torque_limits[static_cast<std::size_t>(j)]);
+    }
+  }
+  out.t = std::move(log.t);
+  out.q = std::move(log.q);
+  out.measured_dq = std::move(log.dq);
+  out.measured_ddq = std::move(log.ddq);
+  out.qlink = std::move(log.qlink);
+  out.tau = std::move(log.tau);
   // Eight samples a period of the cut-off lose nothing and spare work.
-  out.decimation = std::max<Eigen::Index>(1, static_cast<Eigen::Index>(1 / (log.step_s * 8 * filter.torque_cutoff_hz)));
+  out.decimation = std::max<Index>(1, static_cast<Index>(1 / (log.step_s * 8 * filter.torque_cutoff_hz)));
+  while (out.rows() > settings.most_rows) ++out.decimation;
   return out;
 }
 
-Eigen::VectorXd noise_floor(const ProcessedLog& log) {
-  const Eigen::MatrixXd above = (log.tau_raw - log.tau).middleRows(log.first, log.last - log.first);
-  const double nyquist = 0.5 / log.step_s, kept = std::min(log.filter.torque_cutoff_hz, 0.95 * nyquist);
-  const double scale = std::sqrt(kept / (nyquist - kept));
-  return scale * (above.colwise().norm() / std::sqrt(static_cast<double>(above.rows()))).transpose();
+MatrixXd predict(const IdentifiedModel& model, const ProcessedLog& log) {
+  IdentifiedModel loaded = model;
+  if (log.load) {
+    const Eigen::Vector3d& com = log.load->com;
+    EffectFit payload;
+    payload.effect = Payload::name;
+    payload.linear = {log.load->mass, com.x(), com.y(), com.z()};
+    loaded.body.push_back(payload);
+  }
+  Predictor predictor(loaded, log.step_s);
+  constexpr Index block = 8192;
+  MatrixXd tau(log.samples(), log.q.cols());
+  for (Index from = 0; from < log.samples(); from += block) {
+    const Index count = std::min(block, log.samples() - from);
+    const MotionRows motion = log.motion(from, count);
+    predictor(motion.q, motion.dq, motion.ddq, tau.middleRows(from, count));
+  }
+  return tau;
 }
 
 }  // namespace fxdyn

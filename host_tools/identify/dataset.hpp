@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,36 +11,82 @@
 
 namespace fxdyn {
 
-/// A log ready for fitting and judging: motion filtered at the position cut-off, torque raw and filtered at the torque
-/// cut-off. Every column goes through filter_columns(), so torque and regressor see the same filter.
+/// Joint motion over some samples: samples x joints.
+struct MotionRows {
+  Eigen::MatrixXd q, dq, ddq;
+};
+
+/// A log ready for fitting and judging. Held is what can't be made again: the filtered position and the raw torque;
+/// velocity and acceleration are differentiated when they are asked for, rows of regressors made in blocks. So a log
+/// takes little more memory than its own columns.
 struct ProcessedLog {
   std::string name;  ///< file name for messages
   Role role = Role::train;
   double from_s = 0, to_s = 0, step_s = 0;
   Eigen::VectorXd t;
-  Eigen::MatrixXd q, dq, ddq;        ///< full rate, filtered
-  Eigen::MatrixXd tau_raw, tau;      ///< empty without torque
-  Eigen::VectorXd q_range, q_noise;  ///< per joint: range of the filtered position, RMS of what its filter took out
+  Eigen::MatrixXd q;                          ///< filtered at the position cut-off
+  Eigen::MatrixXd measured_dq, measured_ddq;  ///< likewise; empty: differentiated from q
+  Eigen::MatrixXd qlink;                      ///< likewise; empty: no joint has a link encoder
+  std::vector<bool> has_link;                 ///< per joint; columns of qlink without an encoder hold q
+  Eigen::MatrixXd tau;                        ///< raw; empty without torque
+  std::optional<Load> load;                   ///< what the gripper carried
+  Eigen::VectorXd q_range, q_noise;           ///< per joint: range of q, RMS of what its filter took out
+  Eigen::VectorXd torque_noise;               ///< per joint: noise that stays in the filtered torque, see noise_floor()
+  /// Per joint, [from, to) of samples that `identify` must not use: the drive was at its limit.
+  std::vector<std::vector<std::array<Eigen::Index, 2>>> saturated;
   Eigen::Index first = 0, last = 0;  ///< [first, last) is free of filter transients
   Eigen::Index decimation = 1;       ///< rows for fitting: first, first + decimation, ...
   FilterFit filter;
 
+  Eigen::Index samples() const { return q.rows(); }
+  Eigen::Index rows() const { return first < last ? (last - first - 1) / decimation + 1 : 0; }
+  /// The motors' motion, samples [from, from + count).
+  MotionRows motion(Eigen::Index from, Eigen::Index count) const;
+  MotionRows motion() const { return motion(0, samples()); }
+  /// The links' motion: measured where there is a link encoder, else the motor's.
+  MotionRows link_motion(Eigen::Index from, Eigen::Index count) const;
+  /// One joint's motion, all samples.
+  MotionRows joint_motion(Eigen::Index joint) const;
+  /// Whether decimated row `row` of the joint is next to a saturated sample.
+  bool is_saturated(Eigen::Index joint, Eigen::Index row) const;
+
   Eigen::MatrixXd filter_columns(const Eigen::Ref<const Eigen::MatrixXd>& full_rate) const;
   /// The rows that fits use, of a full-rate, filtered matrix.
   Eigen::MatrixXd decimate(const Eigen::Ref<const Eigen::MatrixXd>& filtered) const;
-  Eigen::Index rows() const { return first < last ? (last - first - 1) / decimation + 1 : 0; }
 };
 
-/// Cut-offs: the project's, else chosen from the logs: ten times the frequency below which 99.9 % of the power of the
-/// velocity lies (five times for torque: friction reverses faster than the motion), at most 0.4 of the sampling rate.
-/// Motion without noise (simulated, exact) is not filtered.
+/// A piece of a log in which columns of all joints are made, filtered and decimated, so that memory does not grow with
+/// the log's length. The pieces overlap by what the filter remembers to 1e-13.
+struct RowBlock {
+  Eigen::Index begin = 0, samples = 0;  ///< to make the columns for
+  Eigen::Index row = 0, rows = 0;       ///< decimated rows that come out
+  /// `full`: columns of the samples above -> rows x columns.
+  Eigen::MatrixXd filter_and_keep(const ProcessedLog& log, const Eigen::MatrixXd& full) const;
+};
+std::vector<RowBlock> row_blocks(const ProcessedLog& log);
+
+/// Cut-offs: the project's, else chosen from the logs.
+///
+/// Position: where the motion sinks into the noise. The error of ddq is the sum of the motion's power above the cut-off
+/// and the noise's below it, weighted alike, so it is smallest where the two densities cross; the spectrum of q there
+/// is twice the noise's (Welch; the noise's level is that of the highest octave). Twice that frequency, as the filter
+/// is not a wall; at least 10 Hz, at most 0.4 of the sampling rate. Motion without noise (simulated, exact) is not
+/// filtered.
+///
+/// Torque and every column: five times the frequency that holds 99.9 % of the velocity's power (friction reverses
+/// faster than the motion), at least 10 Hz, at most 0.4 of the sampling rate.
 FilterFit choose_filter(const std::vector<Log>& logs, const SignalSettings& settings);
 
-/// @throws DataError where the log is shorter than the edges that the filter needs.
-ProcessedLog process(const Log& log, const FilterFit& filter);
+/// What fits need to know beside the filter.
+struct ProcessSettings {
+  std::vector<double> torque_limits;  ///< the project's, may be empty: torque that stays there is saturated
+  Eigen::Index most_rows = 1 << 30;   ///< for fitting; longer logs are decimated more
+};
 
-/// RMS of the noise that stays in the filtered torque, estimated from what lies above the cut-off (white noise
-/// assumed).
-Eigen::VectorXd noise_floor(const ProcessedLog& log);
+/// @throws DataError where the log is shorter than the edges that the filter needs.
+ProcessedLog process(Log log, const FilterFit& filter, const ProcessSettings& settings = {});
+
+/// Torques of the model over a log, block by block, with the log's known load: samples x joints [N*m | N].
+Eigen::MatrixXd predict(const IdentifiedModel& model, const ProcessedLog& log);
 
 }  // namespace fxdyn

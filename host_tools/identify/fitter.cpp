@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "host_tools/error.hpp"
+#include "host_tools/identify/solver.hpp"
+#include "host_tools/parallel.hpp"
 #include "model/broad_learning.hpp"
 
 namespace fxdyn {
@@ -56,19 +58,42 @@ Eigen::MatrixXd design_columns(const JointFit& design, const JointSeries& series
   return columns;
 }
 
-Fitter::Fitter(const Robot& robot, std::vector<ProcessedLog> logs, std::vector<JointFit> design)
-    : robot_(robot), logs_(std::move(logs)), design_(std::move(design)) {
-  const DhChain chain = to_dh(robot_);
-  base_ = find_base(chain);
-  Regressor regressor(chain);
-  const auto n = static_cast<Eigen::Index>(robot_.size());
-  const auto nb = static_cast<Eigen::Index>(base_.columns.size());
+JointSeries joint_series(const ProcessedLog& log, std::size_t joint, const std::vector<JointFit>& designs) {
+  const auto j = static_cast<Eigen::Index>(joint);
+  MotionRows motion = log.joint_motion(j);
+  JointSeries series{motion.q, motion.dq, motion.ddq, {}, log.step_s};
+  const auto& effects = designs[joint].effects;
+  const bool peers = std::any_of(effects.begin(), effects.end(),
+                                 [](const EffectFit& fit) { return find_effect(fit.effect)->needs_peers; });
+  if (peers) {
+    MotionRows all = log.motion();
+    series.peers_sign.resize(all.dq.rows(), all.dq.cols());
+    for (std::size_t k = 0; k < designs.size(); ++k) {
+      const auto peer = static_cast<Eigen::Index>(k);
+      series.peers_sign.col(peer) = (all.dq.col(peer) / designs[k].sign_width).array().tanh();
+    }
+    series.peers_dq = std::move(all.dq);
+    series.peers_ddq = std::move(all.ddq);
+  }
+  return series;
+}
 
-  Eigen::Index train_rows = 0;
+Fitter::Fitter(const Robot& robot, const std::vector<ProcessedLog>& logs, std::vector<JointFit> design)
+    : design_(std::move(design)) {
+  const auto data = std::make_shared<Data>();
+  data->robot = robot;
+  data->logs = &logs;
+  const DhChain chain = to_dh(robot);
+  data->base = find_base(chain);
+  const auto n = static_cast<Eigen::Index>(robot.size());
+  const auto& columns = data->base.columns;
+  const auto nb = static_cast<Eigen::Index>(columns.size());
+  const auto per_link = static_cast<Eigen::Index>(parameters_per_link);
+
   for (Eigen::Index j = 0; j < n; ++j) {
     double range = 0;
     bool moves = false;
-    for (const ProcessedLog& log : logs_) {
+    for (const ProcessedLog& log : logs) {
       if (log.role != Role::train) continue;
       range = std::max(range, log.q_range[j]);
       // Noise alone looks like motion of a few times what the filter took out.
@@ -77,87 +102,182 @@ Fitter::Fitter(const Robot& robot, std::vector<ProcessedLog> logs, std::vector<J
     if (!moves) {
       throw DataError(
           fmt::format("joint {} ({}) never moves in the train logs (range {:.1e} {}): record a log in which it does",
-                      j + 1, robot_.joints[static_cast<std::size_t>(j)].name, range,
-                      robot_.joints[static_cast<std::size_t>(j)].position_unit()));
+                      j + 1, robot.joints[static_cast<std::size_t>(j)].name, range,
+                      robot.joints[static_cast<std::size_t>(j)].position_unit()));
     }
+    // Links before a joint do not load it.
+    const auto first = std::lower_bound(columns.begin(), columns.end(), j * per_link);
+    data->first_base.push_back(first - columns.begin());
   }
-  for (const ProcessedLog& log : logs_) {
+
+  Eigen::Index rows = 0, train_rows = 0, parameters = nb;
+  for (const ProcessedLog& log : logs) {
+    data->first_row.push_back(rows);
+    rows += log.rows();
     if (log.role == Role::train) train_rows += log.rows();
-    std::vector<Eigen::MatrixXd> rows;
-    std::vector<Eigen::VectorXd> torque;
-    std::vector<Eigen::MatrixXd> full(static_cast<std::size_t>(n), Eigen::MatrixXd(log.q.rows(), nb));
-    for (Eigen::Index k = 0; k < log.q.rows(); ++k) {
-      const Eigen::MatrixXd& y = regressor(log.q.row(k), log.dq.row(k), log.ddq.row(k));
-      for (Eigen::Index j = 0; j < n; ++j) {
-        for (Eigen::Index c = 0; c < nb; ++c)
-          full[static_cast<std::size_t>(j)](k, c) = y(j, base_.columns[static_cast<std::size_t>(c)]);
-      }
-    }
-    const Eigen::MatrixXd tau = log.decimate(log.tau);
-    for (Eigen::Index j = 0; j < n; ++j) {
-      rows.push_back(log.decimate(log.filter_columns(full[static_cast<std::size_t>(j)])));
-      full[static_cast<std::size_t>(j)].resize(0, 0);
-      torque.emplace_back(tau.col(j));
-    }
-    base_rows_.push_back(std::move(rows));
-    torque_rows_.push_back(std::move(torque));
   }
-
-  for (const ProcessedLog& log : logs_) split_.has_validation |= log.role == Role::validate;
-  const bool by_log = !split_.has_validation && logs_.size() > 1;
-  split_.kind = split_.has_validation ? "validate logs"
-                : by_log              ? "each train log judged by a fit of the others (no log has the role validate)"
-                         : "blocks of the train log (no log has the role validate, and there is one trajectory only)";
-  const int parts = split_.has_validation || by_log ? 1 : blocks_of_one_log;
-  for (std::size_t l = 0; l < logs_.size(); ++l) {
-    const Eigen::Index rows = logs_[l].rows();
-    for (int part = 0; part < parts; ++part) {
-      blocks_.push_back({l, rows * part / parts, rows * (part + 1) / parts, logs_[l].role == Role::train});
-    }
-  }
-  const std::size_t folds = split_.has_validation ? 1 : blocks_.size();
-  split_.fit.resize(folds);
-  split_.judge.resize(folds);
-  for (std::size_t b = 0; b < blocks_.size(); ++b) {
-    for (std::size_t fold = 0; fold < folds; ++fold) {
-      const bool judges = split_.has_validation ? !blocks_[b].train : b == fold;
-      (judges ? split_.judge : split_.fit)[fold].push_back(b);
-    }
-  }
-
-  Eigen::Index parameters = nb;
   for (const JointFit& joint : design_) parameters += own_count(joint);
   if (train_rows * n < 2 * parameters) {
     throw DataError(
         fmt::format("{} rows (after filtering) for {} parameters: record a longer log", train_rows * n, parameters));
   }
+
+  // All columns of all joints side by side; joint j's are columns starts[j] .. starts[j + 1] - 1, torque the last.
+  std::vector<Eigen::Index> starts{0};
+  for (Eigen::Index j = 0; j < n; ++j)
+    starts.push_back(starts.back() + nb - data->first_base[static_cast<std::size_t>(j)] + 1);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    data->base_rows.emplace_back(rows, nb - data->first_base[static_cast<std::size_t>(j)]);
+    data->torque_rows.emplace_back(rows);
+    data->usable.emplace_back(Eigen::VectorXd::Ones(rows));
+  }
+  struct Piece {
+    const ProcessedLog* log;
+    Eigen::Index row;
+    RowBlock block;
+  };
+  std::vector<Piece> pieces;
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    for (const RowBlock& block : row_blocks(logs[l])) pieces.push_back({&logs[l], data->first_row[l], block});
+  }
+  parallel_for(pieces.size(), [&](std::size_t p) {
+    const auto& [log, first_row, block] = pieces[p];
+    Regressor regressor(chain);
+    const MotionRows motion = log->link_motion(block.begin, block.samples);
+    Eigen::MatrixXd full(block.samples, starts.back());
+    Eigen::VectorXd load = Eigen::VectorXd::Zero(per_link);
+    if (log->load) {
+      const auto values = to_array(with_load({}, log->load->mass, log->load->com, chain));
+      load = Eigen::Map<const Eigen::VectorXd>(values.data(), per_link);
+    }
+    for (Eigen::Index k = 0; k < block.samples; ++k) {
+      const Eigen::MatrixXd& y = regressor(motion.q.row(k), motion.dq.row(k), motion.ddq.row(k));
+      for (Eigen::Index j = 0; j < n; ++j) {
+        Eigen::Index at = starts[static_cast<std::size_t>(j)];
+        for (Eigen::Index c = data->first_base[static_cast<std::size_t>(j)]; c < nb; ++c)
+          full(k, at++) = y(j, columns[static_cast<std::size_t>(c)]);
+        // a load that is known is not looked for
+        full(k, at) = log->tau(block.begin + k, j) - y.row(j).tail(per_link).dot(load);
+      }
+    }
+    const Eigen::MatrixXd kept = block.filter_and_keep(*log, full);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const auto k = static_cast<std::size_t>(j);
+      const Eigen::Index count = starts[k + 1] - starts[k] - 1;
+      data->base_rows[k].middleRows(first_row + block.row, kept.rows()) = kept.middleCols(starts[k], count);
+      data->torque_rows[k].segment(first_row + block.row, kept.rows()) = kept.col(starts[k] + count);
+    }
+  });
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      if (logs[l].saturated[static_cast<std::size_t>(j)].empty()) continue;
+      for (Eigen::Index r = 0; r < logs[l].rows(); ++r) {
+        if (logs[l].is_saturated(j, r)) data->usable[static_cast<std::size_t>(j)][data->first_row[l] + r] = 0;
+      }
+    }
+  }
+
+  Split& split = data->split;
+  for (const ProcessedLog& log : logs) split.has_validation |= log.role == Role::validate;
+  const bool by_log = !split.has_validation && logs.size() > 1;
+  split.kind = split.has_validation ? "validate logs"
+               : by_log             ? "each train log judged by a fit of the others (no log has the role validate)"
+                        : "blocks of the train log (no log has the role validate, and there is one trajectory only)";
+  const int parts = split.has_validation || by_log ? 1 : blocks_of_one_log;
+  auto& blocks = data->blocks;
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    const Eigen::Index count = logs[l].rows(), first = data->first_row[l];
+    for (int part = 0; part < parts; ++part)
+      blocks.push_back({l, first + count * part / parts, first + count * (part + 1) / parts, logs[l].role == Role::train});
+  }
+  const std::size_t folds = split.has_validation ? 1 : blocks.size();
+  split.fit.resize(folds);
+  split.judge.resize(folds);
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    for (std::size_t fold = 0; fold < folds; ++fold) {
+      const bool judges = split.has_validation ? !blocks[b].train : b == fold;
+      (judges ? split.judge : split.fit)[fold].push_back(b);
+    }
+  }
+  data_ = data;
+
+  row_weights_ = data->usable;
   weights_ = Eigen::VectorXd::Ones(n);
-  moments_.resize(joints());
-  for (std::size_t j = 0; j < joints(); ++j) moments_[j] = moments(j, design_[j]);
+  base_moments_.resize(joints());
+  own_rows_.resize(joints());
+  own_moments_.resize(joints());
+  parallel_for(joints(), [&](std::size_t j) { make_base_moments(j); });
+  for (std::size_t j = 0; j < joints(); ++j) set_design(j, design_[j]);
 }
 
-Eigen::MatrixXd Fitter::own_columns(std::size_t log, std::size_t joint, const JointFit& design) const {
-  const ProcessedLog& l = logs_[log];
-  const auto j = static_cast<Eigen::Index>(joint);
-  const JointSeries series{l.q.col(j), l.dq.col(j), l.ddq.col(j), {}, l.step_s};
-  return l.decimate(l.filter_columns(design_columns(design, series)));
+Eigen::MatrixXd Fitter::own_rows(std::size_t joint, const JointFit& design) const {
+  std::vector<JointFit> designs = design_;
+  designs[joint] = design;
+  // Columns of effects that are as in the current design need not be made again.
+  std::vector<Eigen::Index> kept(design.effects.size(), -1);
+  const JointFit& now = design_[joint];
+  if (own_rows_[joint].size() > 0 && now.sign_width == design.sign_width) {
+    for (std::size_t e = 0; e < design.effects.size(); ++e) {
+      Eigen::Index at = 0;
+      for (const EffectFit& fit : now.effects) {
+        if (fit.effect == design.effects[e].effect && fit.shape == design.effects[e].shape) kept[e] = at;
+        at += static_cast<Eigen::Index>(find_effect(fit.effect)->linear.size());
+      }
+    }
+  }
+  Eigen::MatrixXd out(data_->torque_rows[joint].size(), own_count(design));
+  for (std::size_t l = 0; l < logs().size(); ++l) {
+    const ProcessedLog& log = logs()[l];
+    const JointSeries series = joint_series(log, joint, designs);
+    Eigen::Index at = 0;
+    const auto fill = [&](Eigen::Index count, auto&& rows) {
+      out.block(data_->first_row[l], at, log.rows(), count) = rows();
+      at += count;
+    };
+    for (std::size_t e = 0; e < design.effects.size(); ++e) {
+      const EffectFit& fit = design.effects[e];
+      const auto count = static_cast<Eigen::Index>(find_effect(fit.effect)->linear.size());
+      if (kept[e] >= 0) {
+        fill(count, [&] { return own_rows_[joint].block(data_->first_row[l], kept[e], log.rows(), count); });
+      } else {
+        fill(count, [&] {
+          return log.decimate(log.filter_columns(effect_columns(fit.effect, fit.shape, design.sign_width, series)));
+        });
+      }
+    }
+    if (design.bls) {
+      fill(out.cols() - at,
+           [&] { return log.decimate(log.filter_columns(bls_columns(*design.bls, design.sign_width, series))); });
+    }
+  }
+  return out;
 }
 
-std::vector<Moments> Fitter::moments(std::size_t joint, const JointFit& design) const {
-  const auto nb = static_cast<Eigen::Index>(base_.columns.size());
-  std::vector<Eigen::MatrixXd> own;
-  for (std::size_t l = 0; l < logs_.size(); ++l) own.push_back(own_columns(l, joint, design));
-  std::vector<Moments> out;
-  for (const Block& block : blocks_) {
-    const Eigen::Index rows = block.to - block.from, count = own[block.log].cols();
-    Eigen::MatrixXd x(rows, nb + count);
-    x.leftCols(nb) = base_rows_[block.log][joint].middleRows(block.from, rows);
-    x.rightCols(count) = own[block.log].middleRows(block.from, rows);
-    const Eigen::VectorXd y = torque_rows_[block.log][joint].segment(block.from, rows);
-    Moments m{Eigen::MatrixXd::Zero(nb + count, nb + count), x.transpose() * y, y.squaredNorm(), rows};
-    m.gram.selfadjointView<Eigen::Lower>().rankUpdate(x.transpose());
+void Fitter::make_base_moments(std::size_t joint) {
+  auto& moments = base_moments_[joint];
+  moments.clear();
+  for (const Block& block : data_->blocks) {
+    const Eigen::Index count = block.to - block.from;
+    const auto x = data_->base_rows[joint].middleRows(block.from, count);
+    const auto y = data_->torque_rows[joint].segment(block.from, count);
+    const auto w = row_weights_[joint].segment(block.from, count);
+    const Eigen::MatrixXd wx = w.asDiagonal() * x;
+    BaseMoments m{Eigen::MatrixXd::Zero(x.cols(), x.cols()), wx.transpose() * y, (w.array() * y.array().square()).sum(),
+                  w.sum()};
+    m.gram.triangularView<Eigen::Lower>() += wx.transpose() * x;
     m.gram.triangularView<Eigen::StrictlyUpper>() = m.gram.transpose();
-    out.push_back(std::move(m));
+    moments.push_back(std::move(m));
+  }
+}
+
+Fitter::Own Fitter::own_moments(std::size_t joint, const Eigen::MatrixXd& own) const {
+  Own out;
+  for (const Block& block : data_->blocks) {
+    const Eigen::Index count = block.to - block.from;
+    const auto x = own.middleRows(block.from, count);
+    const Eigen::MatrixXd wx = row_weights_[joint].segment(block.from, count).asDiagonal() * x;
+    out.push_back({data_->base_rows[joint].middleRows(block.from, count).transpose() * wx, wx.transpose() * x,
+                   wx.transpose() * data_->torque_rows[joint].segment(block.from, count)});
   }
   return out;
 }
@@ -165,16 +285,23 @@ std::vector<Moments> Fitter::moments(std::size_t joint, const JointFit& design) 
 std::vector<Fitter::Dependent> Fitter::dependent_effects() const {
   // Cholesky of the normalised gram in the order base, joint 1, joint 2, ..: a column whose pivot vanishes is a sum of
   // those before it.
-  const auto nb = static_cast<Eigen::Index>(base_.columns.size());
+  const auto nb = static_cast<Eigen::Index>(base().columns.size());
   std::vector<Dependent> found;
-  Eigen::MatrixXd base = Eigen::MatrixXd::Zero(nb, nb);
+  Eigen::MatrixXd common = Eigen::MatrixXd::Zero(nb, nb);
   for (std::size_t j = 0; j < joints(); ++j) {
-    for (const std::size_t b : train_blocks()) base += moments_[j][b].gram.topLeftCorner(nb, nb);
+    const Eigen::Index acting = nb - data_->first_base[j];
+    for (const std::size_t b : train_blocks()) common.bottomRightCorner(acting, acting) += base_moments_[j][b].gram;
   }
   for (std::size_t j = 0; j < joints(); ++j) {
-    Eigen::MatrixXd gram = moments_[j][0].gram * 0;
-    for (const std::size_t b : train_blocks()) gram += moments_[j][b].gram;
-    gram.topLeftCorner(nb, nb) = base;  // base columns show up in all joints' rows, the effects in their own only
+    const Eigen::Index own = own_count(design_[j]), acting = nb - data_->first_base[j];
+    Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(nb + own, nb + own);
+    for (const std::size_t b : train_blocks()) {
+      const OwnMoments& m = own_moments_[j][b];
+      gram.block(nb - acting, nb, acting, own) += m.cross;
+      gram.bottomRightCorner(own, own) += m.gram;
+    }
+    gram.bottomLeftCorner(own, nb) = gram.topRightCorner(nb, own).transpose();
+    gram.topLeftCorner(nb, nb) = common;  // base columns show up in all joints' rows, the effects in their own only
     const Eigen::VectorXd scale = gram.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
     gram = scale.asDiagonal() * gram * scale.asDiagonal();
     const Eigen::Index p = gram.rows();
@@ -185,9 +312,9 @@ std::vector<Fitter::Dependent> Fitter::dependent_effects() const {
     for (Eigen::Index k = 0; k < p; ++k) {
       const double pivot = gram(k, k);
       const bool dependent = pivot < 1e-10;
-      const auto own = static_cast<std::size_t>(k - nb);
-      if (k >= nb && dependent && own < effect_of.size()) {
-        const Dependent it{j, effect_of[own]};
+      const auto mine = static_cast<std::size_t>(k - nb);
+      if (k >= nb && dependent && mine < effect_of.size()) {
+        const Dependent it{j, effect_of[mine]};
         const bool named = !found.empty() && found.back().joint == j && found.back().effect == it.effect;
         if (!named) found.push_back(it);
       }
@@ -200,8 +327,9 @@ std::vector<Fitter::Dependent> Fitter::dependent_effects() const {
 }
 
 void Fitter::set_design(std::size_t joint, JointFit design) {
+  own_rows_[joint] = own_rows(joint, design);
   design_[joint] = std::move(design);
-  moments_[joint] = moments(joint, design_[joint]);
+  own_moments_[joint] = own_moments(joint, own_rows_[joint]);
 }
 
 Eigen::VectorXd Fitter::ridge_of(const JointFit& design, double ridge, Eigen::Index count) {
@@ -232,91 +360,66 @@ bool last_is_physical(const JointFit& design, const Eigen::VectorXd& theta) {
   return true;
 }
 
-double square_error(const Moments& m, const Eigen::VectorXd& beta, const Eigen::VectorXd& theta) {
-  Eigen::VectorXd x(beta.size() + theta.size());
-  x << beta, theta;
-  return std::max(0.0, m.square - 2 * x.dot(m.projection) + x.dot(m.gram * x));
-}
-
 }  // namespace
 
-Solution Fitter::solve(const std::vector<std::size_t>& blocks, const std::vector<const std::vector<Moments>*>& all,
-                       const std::vector<const JointFit*>& design, bool with_std) const {
-  const auto nb = static_cast<Eigen::Index>(base_.columns.size());
-  std::vector<Eigen::Index> offset{nb};
-  for (std::size_t j = 0; j < joints(); ++j) offset.push_back(offset.back() + (*all[j])[0].gram.rows() - nb);
-  const Eigen::Index p = offset.back();
-  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(p, p);
-  Eigen::VectorXd projection = Eigen::VectorXd::Zero(p), ridge = Eigen::VectorXd::Zero(p);
+double Fitter::square_error(std::size_t joint, std::size_t block, const OwnMoments& own,
+                            const Solution& solution) const {
+  const BaseMoments& m = base_moments_[joint][block];
+  const Eigen::VectorXd beta = solution.beta.tail(m.projection.size());
+  const Eigen::VectorXd& theta = solution.theta[joint];
+  return std::max(0.0, m.square - 2 * (beta.dot(m.projection) + theta.dot(own.projection)) + beta.dot(m.gram * beta) +
+                           2 * beta.dot(own.cross * theta) + theta.dot(own.gram * theta));
+}
+
+NormalEquations Fitter::assemble(const std::vector<std::size_t>& blocks, const std::vector<const Own*>& all,
+                                 const std::vector<const JointFit*>& design) const {
+  const auto nb = static_cast<Eigen::Index>(base().columns.size());
+  NormalEquations out;
+  out.offset = {nb};
+  for (std::size_t j = 0; j < joints(); ++j) out.offset.push_back(out.offset.back() + (*all[j])[0].gram.rows());
+  const Eigen::Index p = out.offset.back();
+  out.information = Eigen::MatrixXd::Zero(p, p);
+  out.projection = Eigen::VectorXd::Zero(p);
   for (std::size_t j = 0; j < joints(); ++j) {
     const double w = weights_[static_cast<Eigen::Index>(j)];
-    const Eigen::Index at = offset[j], own = offset[j + 1] - at;
-    Eigen::Index rows = 0;
+    const Eigen::Index first = data_->first_base[j], acting = nb - first;
+    const Eigen::Index at = out.offset[j], own = out.offset[j + 1] - at;
+    double rows = 0;
     for (const std::size_t b : blocks) {
-      const Moments& m = (*all[j])[b];
-      gram.topLeftCorner(nb, nb) += w * m.gram.topLeftCorner(nb, nb);
-      gram.block(0, at, nb, own) += w * m.gram.topRightCorner(nb, own);
-      gram.block(at, at, own, own) += w * m.gram.bottomRightCorner(own, own);
-      projection.head(nb) += w * m.projection.head(nb);
-      projection.segment(at, own) += w * m.projection.tail(own);
+      const BaseMoments& m = base_moments_[j][b];
+      const OwnMoments& o = (*all[j])[b];
+      out.information.block(first, first, acting, acting) += w * m.gram;
+      out.information.block(first, at, acting, own) += w * o.cross;
+      out.information.block(at, at, own, own) += w * o.gram;
+      out.projection.segment(first, acting) += w * m.projection;
+      out.projection.segment(at, own) += w * o.projection;
       rows += m.count;
     }
     // Paper Eq. 30: mean square error + ridge |W|^2
-    ridge.segment(at, own) =
-        w * static_cast<double>(rows) * ridge_of(*design[j], design[j]->bls ? design[j]->bls->ridge : 0, own);
+    out.information.diagonal().segment(at, own) +=
+        w * rows * ridge_of(*design[j], design[j]->bls ? design[j]->bls->ridge : 0, own);
   }
-  gram.triangularView<Eigen::StrictlyLower>() = gram.transpose();
-  gram.diagonal() += ridge;
+  out.information.triangularView<Eigen::StrictlyLower>() = out.information.transpose();
+  return out;
+}
 
-  // Equal scales; the small diagonal keeps directions that the data does not excite finite, and the refinement takes
-  // its effect out of all others.
-  Eigen::VectorXd scale = gram.diagonal().cwiseSqrt();
-  for (Eigen::Index i = 0; i < p; ++i) scale[i] = scale[i] > 0 ? 1 / scale[i] : 0;
-  const Eigen::MatrixXd scaled = scale.asDiagonal() * gram * scale.asDiagonal();
-  const Eigen::LDLT<Eigen::MatrixXd> ldlt(scaled + 1e-12 * Eigen::MatrixXd::Identity(p, p));
-  const auto solve_scaled = [&](const Eigen::VectorXd& rhs) { return Eigen::VectorXd(ldlt.solve(rhs)); };
-  const Eigen::VectorXd rhs = scale.cwiseProduct(projection);
-  Eigen::VectorXd x = solve_scaled(rhs);
-  for (int round = 0; round < 2; ++round) x += solve_scaled(rhs - scaled * x);
-  x = scale.cwiseProduct(x);
+Solution Fitter::solve(const NormalEquations& equations) const {
+  const SymmetricSolver solver(equations.information);
+  return split(equations, solver.solve(equations.projection));
+}
 
+Solution Fitter::split(const NormalEquations& equations, const Eigen::VectorXd& x) const {
   Solution solution;
-  solution.beta = x.head(nb);
+  const auto& offset = equations.offset;
+  solution.beta = x.head(offset[0]);
   for (std::size_t j = 0; j < joints(); ++j)
     solution.theta.emplace_back(x.segment(offset[j], offset[j + 1] - offset[j]));
-  if (with_std) {
-    // Sandwich: the residual's variance of each joint, whatever the weights were. Filtered samples are correlated: only
-    // two in a period of the cut-off are independent.
-    const Eigen::MatrixXd inverse =
-        scale.asDiagonal() * ldlt.solve(Eigen::MatrixXd::Identity(p, p)) * scale.asDiagonal();
-    Eigen::MatrixXd middle = Eigen::MatrixXd::Zero(p, p);
-    for (std::size_t j = 0; j < joints(); ++j) {
-      const double w = weights_[static_cast<Eigen::Index>(j)];
-      const Eigen::Index at = offset[j], own = offset[j + 1] - at;
-      double square = 0;
-      Eigen::Index rows = 0;
-      for (const std::size_t b : blocks) {
-        square += square_error((*all[j])[b], solution.beta, solution.theta[j]);
-        rows += (*all[j])[b].count;
-      }
-      const double factor = w * w * square / static_cast<double>(rows);
-      for (const std::size_t b : blocks) {
-        const Moments& m = (*all[j])[b];
-        middle.topLeftCorner(nb, nb) += factor * m.gram.topLeftCorner(nb, nb);
-        middle.block(0, at, nb, own) += factor * m.gram.topRightCorner(nb, own);
-        middle.block(at, 0, own, nb) += factor * m.gram.bottomLeftCorner(own, nb);
-        middle.block(at, at, own, own) += factor * m.gram.bottomRightCorner(own, own);
-      }
-    }
-    const ProcessedLog& log = logs_.front();
-    const double row_rate = 1 / (log.step_s * static_cast<double>(log.decimation));
-    const double correlated = std::max(1.0, row_rate / (2 * log.filter.torque_cutoff_hz));
-    const Eigen::VectorXd std = (correlated * (inverse * middle * inverse).diagonal().cwiseMax(0)).cwiseSqrt();
-    solution.beta_std = std.head(nb);
-    for (std::size_t j = 0; j < joints(); ++j)
-      solution.theta_std.emplace_back(std.segment(offset[j], offset[j + 1] - offset[j]));
-  }
   return solution;
+}
+
+Eigen::VectorXd Fitter::residual(std::size_t joint, const Solution& solution) const {
+  const Eigen::MatrixXd& x = data_->base_rows[joint];
+  return data_->torque_rows[joint] - x * solution.beta.tail(x.cols()) - own_rows_[joint] * solution.theta[joint];
 }
 
 bool Judgement::beats(const Judgement& other, double worth) const {
@@ -326,21 +429,19 @@ bool Judgement::beats(const Judgement& other, double worth) const {
   return blocks_of_one_log ? better == blocks.size() : 4 * better >= 3 * blocks.size();
 }
 
-std::vector<Judgement> Fitter::judged(std::size_t first, std::size_t last,
-                                      const std::vector<const std::vector<Moments>*>& all,
+std::vector<Judgement> Fitter::judged(std::size_t first, std::size_t last, const std::vector<const Own*>& all,
                                       const std::vector<const JointFit*>& design) const {
   std::vector<Judgement> out(last - first);
   std::vector<double> sum(out.size(), 0), count(out.size(), 0);
-  for (std::size_t fold = 0; fold < split_.fit.size(); ++fold) {
-    const Solution solution = solve(split_.fit[fold], all, design, false);
+  for (std::size_t fold = 0; fold < data_->split.fit.size(); ++fold) {
+    const Solution solution = solve(assemble(data_->split.fit[fold], all, design));
     for (std::size_t j = first; j < last; ++j) {
       Judgement& judgement = out[j - first];
-      for (const std::size_t b : split_.judge[fold]) {
-        const Moments& m = (*all[j])[b];
-        const double square = square_error(m, solution.beta, solution.theta[j]);
-        judgement.blocks.push_back(std::sqrt(square / static_cast<double>(m.count)));
+      for (const std::size_t b : data_->split.judge[fold]) {
+        const double square = square_error(j, b, (*all[j])[b], solution), rows = base_moments_[j][b].count;
+        judgement.blocks.push_back(std::sqrt(square / std::max(rows, 1.0)));
         sum[j - first] += square;
-        count[j - first] += static_cast<double>(m.count);
+        count[j - first] += rows;
       }
       judgement.physical &= last_is_physical(*design[j], solution.theta[j]);
       if (design[j]->bls) {
@@ -350,73 +451,79 @@ std::vector<Judgement> Fitter::judged(std::size_t first, std::size_t last,
     }
   }
   for (std::size_t i = 0; i < out.size(); ++i) {
-    out[i].rmse = std::sqrt(sum[i] / count[i]);
-    out[i].blocks_of_one_log = logs_.size() == 1;
+    out[i].rmse = std::sqrt(sum[i] / std::max(count[i], 1.0));
+    out[i].blocks_of_one_log = logs().size() == 1;
   }
   return out;
 }
 
-std::vector<Judgement> Fitter::held_out() const {
-  std::vector<const std::vector<Moments>*> all;
-  std::vector<const JointFit*> design;
-  for (std::size_t j = 0; j < joints(); ++j) {
-    all.push_back(&moments_[j]);
-    design.push_back(&design_[j]);
-  }
-  return judged(0, joints(), all, design);
+std::vector<const Fitter::Own*> Fitter::current() const {
+  std::vector<const Own*> all;
+  for (const Own& own : own_moments_) all.push_back(&own);
+  return all;
 }
+
+std::vector<const JointFit*> Fitter::designs() const {
+  std::vector<const JointFit*> all;
+  for (const JointFit& joint : design_) all.push_back(&joint);
+  return all;
+}
+
+std::vector<Judgement> Fitter::held_out() const { return judged(0, joints(), current(), designs()); }
 
 std::vector<Judgement> Fitter::held_out_with(std::size_t joint, const JointFit& candidate,
                                              const std::vector<double>& ridges) const {
-  const std::vector<Moments> own = moments(joint, candidate);
+  const Own own = own_moments(joint, own_rows(joint, candidate));
   JointFit design = candidate;
-  std::vector<const std::vector<Moments>*> all;
-  std::vector<const JointFit*> designs;
-  for (std::size_t j = 0; j < joints(); ++j) {
-    all.push_back(j == joint ? &own : &moments_[j]);
-    designs.push_back(j == joint ? &design : &design_[j]);
-  }
+  std::vector<const Own*> all = current();
+  std::vector<const JointFit*> used = designs();
+  all[joint] = &own;
+  used[joint] = &design;
   std::vector<Judgement> out;
   for (const double ridge : ridges) {
     if (design.bls) design.bls->ridge = ridge;
-    out.push_back(judged(joint, joint + 1, all, designs)[0]);
+    out.push_back(judged(joint, joint + 1, all, used)[0]);
   }
   return out;
 }
 
 std::vector<std::size_t> Fitter::train_blocks() const {
   std::vector<std::size_t> blocks;
-  for (std::size_t b = 0; b < blocks_.size(); ++b) {
-    if (blocks_[b].train) blocks.push_back(b);
+  for (std::size_t b = 0; b < data_->blocks.size(); ++b) {
+    if (data_->blocks[b].train) blocks.push_back(b);
   }
   return blocks;
 }
 
+NormalEquations Fitter::normal_equations() const { return assemble(train_blocks(), current(), designs()); }
+
 Solution Fitter::fit() const {
-  std::vector<const std::vector<Moments>*> all;
-  std::vector<const JointFit*> design;
-  for (std::size_t j = 0; j < joints(); ++j) {
-    all.push_back(&moments_[j]);
-    design.push_back(&design_[j]);
-  }
-  return solve(train_blocks(), all, design, true);
+  const NormalEquations equations = normal_equations();
+  Solution solution = solve(equations);
+  add_standard_deviations(solution);
+  return solution;
 }
 
 void Fitter::reweight() {
   for (int round = 0; round < 2; ++round) {
-    const Solution solution = fit();
+    const Solution solution = solve(normal_equations());
     for (std::size_t j = 0; j < joints(); ++j) {
-      double sum = 0, square = 0;
-      Eigen::Index count = 0;
+      double sum = 0, square = 0, count = 0;
       for (const std::size_t b : train_blocks()) {
-        sum += square_error(moments_[j][b], solution.beta, solution.theta[j]);
-        square += moments_[j][b].square;
-        count += moments_[j][b].count;
+        sum += square_error(j, b, own_moments_[j][b], solution);
+        square += base_moments_[j][b].square;
+        count += base_moments_[j][b].count;
       }
       // Noise-free data: no more than 1e-9 of the signal, so that weights stay finite and of one size.
-      weights_[static_cast<Eigen::Index>(j)] = static_cast<double>(count) / std::max(sum, 1e-18 * square + 1e-300);
+      weights_[static_cast<Eigen::Index>(j)] = count / std::max(sum, 1e-18 * square + 1e-300);
     }
   }
+}
+
+std::vector<Eigen::Index> Fitter::saturated_rows() const {
+  std::vector<Eigen::Index> out;
+  for (const Eigen::VectorXd& usable : data_->usable) out.push_back((usable.array() == 0).count());
+  return out;
 }
 
 namespace {
@@ -438,23 +545,26 @@ std::string expression(const BaseSet& base, Eigen::Index row) {
 
 IdentifiedModel Fitter::to_model(const Solution& solution) const {
   IdentifiedModel model;
-  model.robot = robot_;
+  model.robot = data_->robot;
   std::vector<std::array<double, parameters_per_link>> links(joints());
-  for (std::size_t i = 0; i < base_.columns.size(); ++i) {
-    const auto column = static_cast<std::size_t>(base_.columns[i]);
+  for (std::size_t i = 0; i < base().columns.size(); ++i) {
+    const auto column = static_cast<std::size_t>(base().columns[i]);
     const auto k = static_cast<Eigen::Index>(i);
     links[column / parameters_per_link][column % parameters_per_link] = solution.beta[k];
-    model.base.push_back({column, parameter_name(base_.columns[i]), solution.beta[k],
-                          solution.beta_std.size() > 0 ? solution.beta_std[k] : 0.0, expression(base_, k)});
+    model.base.push_back({column, parameter_name(base().columns[i]), solution.beta[k],
+                          solution.beta_std.size() > 0 ? solution.beta_std[k] : 0.0, expression(base(), k)});
   }
   for (const auto& link : links) model.inertia.push_back(to_inertia(link));
   for (std::size_t j = 0; j < joints(); ++j) {
     JointFit joint = design_[j];
+    if (j < solution.sign_width_std.size()) joint.sign_width_std = solution.sign_width_std[j];
     Eigen::Index at = 0;
     for (EffectFit& fit : joint.effects) {
       const std::size_t count = find_effect(fit.effect)->linear.size();
       fit.linear.clear();
       fit.linear_std.clear();
+      if (j < solution.shape_std.size())
+        fit.shape_std = solution.shape_std[j][static_cast<std::size_t>(&fit - joint.effects.data())];
       for (std::size_t i = 0; i < count; ++i, ++at) {
         fit.linear.push_back(solution.theta[j][at]);
         fit.linear_std.push_back(j < solution.theta_std.size() ? solution.theta_std[j][at] : 0.0);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <memory>
 #include <vector>
 
 #include "host_tools/identify/dataset.hpp"
@@ -9,12 +10,17 @@
 
 namespace fxdyn {
 
-/// Sums of products over the rows of one block for one joint: base columns, then the joint's own columns, and torque.
-struct Moments {
+/// Sums of products over the rows of one block for one joint: base columns that act on the joint, its own columns, and
+/// torque. The base part does not change with the joint's design.
+struct BaseMoments {
   Eigen::MatrixXd gram;
   Eigen::VectorXd projection;
   double square = 0;  ///< of the torque
-  Eigen::Index count = 0;
+  double count = 0;   ///< rows, by their weights
+};
+struct OwnMoments {
+  Eigen::MatrixXd cross, gram;  ///< base x own, own x own
+  Eigen::VectorXd projection;
 };
 
 /// Linear parameters of one fit.
@@ -23,6 +29,16 @@ struct Solution {
   std::vector<Eigen::VectorXd> theta;  ///< per joint, the joint's own columns
   Eigen::VectorXd beta_std;
   std::vector<Eigen::VectorXd> theta_std;
+  std::vector<double> sign_width_std;
+  std::vector<std::vector<std::vector<double>>> shape_std;  ///< [joint][effect][shape], 0: not estimated
+  Eigen::MatrixXd covariance;                               ///< of x (NormalEquations)
+};
+
+/// The normal equations X^T W X x = X^T W y of a fit, x = [beta; theta of joint 1; theta of joint 2; ..].
+struct NormalEquations {
+  Eigen::MatrixXd information;
+  Eigen::VectorXd projection;
+  std::vector<Eigen::Index> offset;  ///< of each joint's theta in x; one more element: the number of unknowns
 };
 
 /// Which blocks fit and which judge. With `validate` logs: train fits, validate judges. Without: every train log is
@@ -49,17 +65,19 @@ struct Judgement {
 
 /// Structure and effects of all joints fitted together by weighted least squares, with moments kept by block so that a
 /// fold costs one small solve. The design of a joint (its effects' shapes, its BLS) can be replaced at any time.
+/// Copies share the regressor.
 class Fitter {
  public:
+  /// `logs` must outlive the fitter and its copies.
   /// @throws DataError: a joint that never moves, fewer rows than parameters.
-  Fitter(const Robot& robot, std::vector<ProcessedLog> logs, std::vector<JointFit> design);
+  Fitter(const Robot& robot, const std::vector<ProcessedLog>& logs, std::vector<JointFit> design);
 
   std::size_t joints() const { return design_.size(); }
-  const BaseSet& base() const { return base_; }
-  const std::vector<ProcessedLog>& logs() const { return logs_; }
+  const BaseSet& base() const { return data_->base; }
+  const std::vector<ProcessedLog>& logs() const { return *data_->logs; }
   const JointFit& design(std::size_t joint) const { return design_[joint]; }
   /// What judges, in words.
-  const std::string& gate() const { return split_.kind; }
+  const std::string& gate() const { return data_->split.kind; }
 
   void set_design(std::size_t joint, JointFit design);
 
@@ -73,6 +91,9 @@ class Fitter {
   void set_weights(const Eigen::VectorXd& weights) { weights_ = weights; }
   /// Two rounds of reweighting from the residuals of the train logs.
   void reweight();
+  /// Iteratively reweighted least squares (Huber's weights, 95 % efficient on normal noise; scale from the median of
+  /// the residual's magnitude), eight rounds: rows that stick out count less. Weights of joints as in reweight().
+  void reweight_rows();
 
   /// Each joint on the judging blocks.
   std::vector<Judgement> held_out() const;
@@ -80,40 +101,88 @@ class Fitter {
   std::vector<Judgement> held_out_with(std::size_t joint, const JointFit& design,
                                        const std::vector<double>& ridges) const;
 
-  /// The fit on all train rows.
+  /// Rows of the train logs count `forgetting` per second of their age, as recursive() forgets them.
+  void forget(double forgetting);
+  /// Widths and distances of all joints to the least squares of the train rows, from where they are (Gauss and Newton
+  /// over shapes and coefficients together, steps that do not help are halved).
+  void polish();
+
+  /// The fit on all train rows, with standard deviations: a sandwich of the residual's autocorrelation, so that
+  /// filtered (correlated) noise counts as what it is; shapes are unknowns there like the coefficients.
   Solution fit() const;
+  /// The same without standard deviations by recursive least squares (square-root information form: every row is
+  /// rotated into [R | z], R x = z) over the train rows in their order. What was known a second ago counts `forgetting`
+  /// (1: nothing is forgotten, and the last estimate is fit()'s). `trace`: x at `points` moments.
+  struct Recursion {
+    Solution solution;
+    Eigen::VectorXd t;      ///< seconds of training data taken in
+    Eigen::MatrixXd trace;  ///< moments x unknowns
+  };
+  Recursion recursive(double forgetting, Eigen::Index points) const;
+  /// Of the train rows with the current weights.
+  NormalEquations normal_equations() const;
   IdentifiedModel to_model(const Solution& solution) const;
+  /// Rows that are left out since the drive was at its limit, of each joint.
+  std::vector<Eigen::Index> saturated_rows() const;
 
  private:
   struct Block {
     std::size_t log;
-    Eigen::Index from, to;  ///< of the log's decimated rows
+    Eigen::Index from, to;  ///< of all rows
     bool train;
   };
-  Eigen::MatrixXd own_columns(std::size_t log, std::size_t joint, const JointFit& design) const;
-  std::vector<Moments> moments(std::size_t joint, const JointFit& design) const;
+  /// What all copies and all designs have in common. Rows of all logs are stacked.
+  struct Data {
+    Robot robot;
+    const std::vector<ProcessedLog>* logs;
+    BaseSet base;
+    std::vector<Eigen::Index> first_base;      ///< per joint: base columns from here on act on it
+    std::vector<Eigen::Index> first_row;       ///< per log
+    std::vector<Eigen::MatrixXd> base_rows;    ///< per joint: rows x base columns that act on it
+    std::vector<Eigen::VectorXd> torque_rows;  ///< per joint
+    std::vector<Eigen::VectorXd> usable;       ///< per joint and row: 0 where saturated, else 1
+    std::vector<Block> blocks;
+    Split split;
+  };
+  using Own = std::vector<OwnMoments>;  ///< by block
+
+  Eigen::MatrixXd own_rows(std::size_t joint, const JointFit& design) const;
+  void make_base_moments(std::size_t joint);
+  Own own_moments(std::size_t joint, const Eigen::MatrixXd& own) const;
+  Eigen::VectorXd residual(std::size_t joint, const Solution& solution) const;
   static Eigen::VectorXd ridge_of(const JointFit& design, double ridge, Eigen::Index count);
-  Solution solve(const std::vector<std::size_t>& blocks, const std::vector<const std::vector<Moments>*>& moments,
-                 const std::vector<const JointFit*>& design, bool with_std) const;
+  double square_error(std::size_t joint, std::size_t block, const OwnMoments& own, const Solution& solution) const;
+  NormalEquations assemble(const std::vector<std::size_t>& blocks, const std::vector<const Own*>& own,
+                           const std::vector<const JointFit*>& design) const;
+  Solution solve(const NormalEquations& equations) const;
+  /// x as beta and theta.
+  Solution split(const NormalEquations& equations, const Eigen::VectorXd& x) const;
+  /// d(torque) / d(log shape) of the joint's sign width and of its effects' widths and distances, rows x shapes.
+  Eigen::MatrixXd shape_rows(std::size_t joint, const Eigen::VectorXd& theta) const;
+  /// The normal equations of coefficients and shapes together at a solution; projection is X^T W residual.
+  NormalEquations with_shapes(const Solution& solution, std::vector<Eigen::MatrixXd>& shape_rows) const;
+  void add_standard_deviations(Solution& solution) const;
+  double weighted_square(const Solution& solution) const;
   /// Joints `first` .. `last` - 1.
-  std::vector<Judgement> judged(std::size_t first, std::size_t last,
-                                const std::vector<const std::vector<Moments>*>& moments,
+  std::vector<Judgement> judged(std::size_t first, std::size_t last, const std::vector<const Own*>& own,
                                 const std::vector<const JointFit*>& design) const;
   std::vector<std::size_t> train_blocks() const;
+  std::vector<const Own*> current() const;
+  std::vector<const JointFit*> designs() const;
 
-  Robot robot_;
-  std::vector<ProcessedLog> logs_;
+  std::shared_ptr<const Data> data_;
   std::vector<JointFit> design_;
-  BaseSet base_;
-  std::vector<std::vector<Eigen::MatrixXd>> base_rows_;    ///< [log][joint]: rows x base
-  std::vector<std::vector<Eigen::VectorXd>> torque_rows_;  ///< [log][joint]
-  std::vector<Block> blocks_;
-  Split split_;
-  std::vector<std::vector<Moments>> moments_;  ///< [joint][block]
+  std::vector<Eigen::VectorXd> row_weights_;             ///< per joint and row
+  std::vector<std::vector<BaseMoments>> base_moments_;   ///< [joint][block]
+  std::vector<Eigen::MatrixXd> own_rows_;                ///< per joint: rows x own columns
+  std::vector<Own> own_moments_;                         ///< [joint][block]
   Eigen::VectorXd weights_;
 };
 
 /// phi of all a joint's columns at full rate: its effects in order, then the BLS.
 Eigen::MatrixXd design_columns(const JointFit& design, const JointSeries& series);
+
+/// One joint's inputs over a log, with its peers' motion where an effect of the design needs it.
+JointSeries joint_series(const ProcessedLog& log, std::size_t joint, const std::vector<JointFit>& designs);
 
 }  // namespace fxdyn

@@ -13,6 +13,8 @@ namespace {
 
 /// An effect must lower the joint's held-out error by this share to be kept.
 constexpr double worth_keeping = 0.02;
+/// Of all logs together.
+constexpr Eigen::Index most_rows = 120'000;
 
 std::vector<double> geometric(double from, double to, int count) {
   std::vector<double> values;
@@ -54,6 +56,29 @@ struct Scales {
   double velocity, range;
 };
 
+/// The joint's design with the motor that it shares with a neighbour, at the best of neighbours, directions and widths.
+Candidate search_coupling(const Fitter& fitter, std::size_t joint, std::string_view effect, const Scales& scales) {
+  const bool motor = effect == MotorCoupling::name;
+  Candidate best{fitter.design(joint), {}};
+  for (const std::size_t k : {joint - 1, joint + 1}) {
+    if (k >= fitter.joints()) continue;
+    for (const double ratio : motor ? std::vector<double>{1, -1} : std::vector<double>{1}) {
+      JointFit design = fitter.design(joint);
+      EffectFit fit;
+      fit.effect = effect;
+      fit.shape = {static_cast<double>(k + 1)};
+      if (motor) fit.shape.insert(fit.shape.end(), {ratio, design.sign_width});
+      design.effects.push_back(fit);
+      const Judgement judgement = fitter.held_out_with(joint, design, {0.0})[0];
+      if (judgement.rmse < best.judgement.rmse) best = {design, judgement};
+    }
+  }
+  if (!motor || best.design.effects.empty() || best.design.effects.back().effect != effect) return best;
+  Candidate refined = search(fitter, joint, best.design, 1e-4 * scales.velocity, 0.3 * scales.velocity,
+                             [](JointFit& d, double value) { d.effects.back().shape[2] = value; });
+  return refined.judgement.rmse < best.judgement.rmse ? refined : best;
+}
+
 Candidate search_width(const Fitter& fitter, std::size_t joint, const Scales& scales) {
   return search(fitter, joint, fitter.design(joint), 1e-4 * scales.velocity, 0.3 * scales.velocity,
                 [](JointFit& design, double value) { design.sign_width = value; });
@@ -63,6 +88,7 @@ Candidate search_width(const Fitter& fitter, std::size_t joint, const Scales& sc
 Candidate search_effect(const Fitter& fitter, std::size_t joint, std::string_view effect, const Scales& scales) {
   JointFit design = fitter.design(joint);
   const EffectInfo& info = *find_effect(effect);
+  if (info.needs_peers) return search_coupling(fitter, joint, effect, scales);
   EffectFit fit;
   fit.effect = effect;
   fit.shape.resize(info.shape.size());
@@ -96,7 +122,11 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
   }
   if (project.rated_torque.empty())
     data.notes.push_back("robot.rated_torque not in the project: the largest measured torque stands for it");
-  for (const Log& log : logs) {
+  ProcessSettings settings;
+  settings.torque_limits = project.limits.torque;
+  // Enough rows for any fit of a few hundred unknowns; a long log is decimated more.
+  settings.most_rows = most_rows / static_cast<Eigen::Index>(logs.size());
+  for (Log& log : logs) {
     if (log.resampled) {
       data.notes.push_back(
           fmt::format("{}: irregular time stamps, resampled to {:.6g} s", log.file.filename().string(), log.step_s));
@@ -106,18 +136,29 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
       throw DataError(fmt::format("{}: torque of joint {} ({}) never changes: check the column and its gain",
                                   log.file.string(), j + 1, project.robot.joints[static_cast<std::size_t>(j)].name));
     }
-    ProcessedLog processed = process(log, data.filter);
-    data.largest_torque = data.largest_torque.cwiseMax(log.tau.cwiseAbs().colwise().maxCoeff().transpose());
-    const auto inside = [&](const Eigen::MatrixXd& m) {
-      return m.middleRows(processed.first, processed.last - processed.first);
-    };
-    data.q_lower = data.q_lower.cwiseMin(inside(processed.q).colwise().minCoeff().transpose());
-    data.q_upper = data.q_upper.cwiseMax(inside(processed.q).colwise().maxCoeff().transpose());
-    data.dq = data.dq.cwiseMax(inside(processed.dq).cwiseAbs().colwise().maxCoeff().transpose());
-    data.ddq = data.ddq.cwiseMax(inside(processed.ddq).cwiseAbs().colwise().maxCoeff().transpose());
     data.references.push_back(
-        {log.file.filename().string(), to_string(log.role), hash_of(read_file(log.file)), log.from_s, log.to_s});
-    data.logs.push_back(std::move(processed));
+        {log.file.filename().string(), to_string(log.role), hash_of_file(log.file), log.from_s, log.to_s});
+    data.logs.push_back(process(std::move(log), data.filter, settings));
+    const ProcessedLog& processed = data.logs.back();
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const MotionRows motion = processed.joint_motion(j);
+      const auto inside = [&](const Eigen::MatrixXd& m) {
+        return m.col(0).segment(processed.first, processed.last - processed.first);
+      };
+      data.q_lower[j] = std::min(data.q_lower[j], inside(motion.q).minCoeff());
+      data.q_upper[j] = std::max(data.q_upper[j], inside(motion.q).maxCoeff());
+      data.dq[j] = std::max(data.dq[j], inside(motion.dq).cwiseAbs().maxCoeff());
+      data.ddq[j] = std::max(data.ddq[j], inside(motion.ddq).cwiseAbs().maxCoeff());
+      data.largest_torque[j] = std::max(data.largest_torque[j], processed.tau.col(j).cwiseAbs().maxCoeff());
+      const auto& runs = processed.saturated[static_cast<std::size_t>(j)];
+      Eigen::Index saturated = 0;
+      for (const auto& [from, to] : runs) saturated += to - from;
+      if (saturated > 0) {
+        data.notes.push_back(fmt::format(
+            "{}: torque of joint {} ({}) stays at its limit for {} samples: left out of the fit", processed.name, j + 1,
+            project.robot.joints[static_cast<std::size_t>(j)].name, saturated));
+      }
+    }
   }
   return data;
 }
@@ -157,16 +198,22 @@ std::vector<JointFit> initial_joints(const Project& project, const GateData& dat
   return joints;
 }
 
-std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progress& progress) {
-  if (project.identify.method == "irls" || project.identify.method == "rls") {
-    throw InputError(fmt::format("{}: identify.method = \"{}\" is not built yet; use \"wls\" or \"ls\"",
-                                 project.file.string(), project.identify.method));
+void weigh(Fitter& fitter, const IdentifySettings& settings) {
+  if (settings.method == "ls") return;
+  if (settings.method == "irls") {
+    fitter.reweight_rows();
+  } else {
+    fitter.reweight();
   }
+  if (settings.method == "rls" && settings.forgetting < 1) fitter.forget(settings.forgetting);
+}
+
+std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progress& progress) {
   const std::vector<std::string> nominal =
       project.identify.effects.value_or(std::vector<std::string>{"viscous", "coulomb", "offset", "rotor_inertia"});
   const std::vector<std::string_view> optional = project.identify.effects
                                                      ? std::vector<std::string_view>{}
-                                                     : std::vector<std::string_view>{"presliding", "stribeck"};
+                                                     : std::vector<std::string_view>{"motor_coupling", "presliding", "stribeck"};
 
   for (const std::string& effect : nominal) {
     if (const std::string reason = why_not_identified(*find_effect(effect)); !reason.empty())
@@ -229,6 +276,10 @@ std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progres
   }
   if (!optional.empty())
     improve("width of the Coulomb sign", true, [&](std::size_t j) { return search_width(*fitter, j, scales[j]); });
+  progress.stage("widths and distances", 1);
+  fitter->polish();
+  weigh(*fitter, project.identify);
+  progress.step();
   progress.done();
   return fitter;
 }
@@ -236,7 +287,13 @@ std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progres
 std::string project_hash(const Project& project) { return hash_of(read_file(project.file) + read_file(project.urdf)); }
 
 IdentifiedModel finish_model(const Fitter& fitter, const Project& project, const GateData& data) {
-  IdentifiedModel model = fitter.to_model(fitter.fit());
+  Solution solution = fitter.fit();
+  if (project.identify.method == "rls") {
+    const Solution last = fitter.recursive(project.identify.forgetting, 1).solution;
+    solution.beta = last.beta;
+    solution.theta = last.theta;
+  }
+  IdentifiedModel model = fitter.to_model(solution);
   model.filter = data.filter;
   // "": what a log that the project does not name is read with, if its own logs agree.
   bool agree = true;

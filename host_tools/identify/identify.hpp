@@ -22,6 +22,9 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
 /// come within a factor of ten of them.
 std::vector<JointFit> initial_joints(const Project& project, const GateData& data);
 
+/// Weights of joints and rows by the project's method.
+void weigh(Fitter& fitter, const IdentifySettings& settings);
+
 /// Structure and friction: widths and shapes searched on the gate data, coefficients by (weighted) least squares.
 /// Returns the fitter with the chosen designs. What it leaves out for want of data goes into data.notes.
 std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progress& progress);

@@ -42,10 +42,18 @@ class MappedFile {
   MappedFile(const MappedFile&) = delete;
   MappedFile& operator=(const MappedFile&) = delete;
   std::string_view text() const { return {static_cast<const char*>(data_), size_}; }
+  /// What is before `at` is not needed any more: a long log does not stay in memory beside its numbers.
+  void release(const char* at) {
+    const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+    const std::size_t end = static_cast<std::size_t>(at - static_cast<const char*>(data_)) / page * page;
+    if (end < released_ + (std::size_t{16} << 20)) return;
+    ::madvise(static_cast<char*>(data_) + released_, end - released_, MADV_DONTNEED);
+    released_ = end;
+  }
 
  private:
   void* data_ = nullptr;
-  std::size_t size_ = 0;
+  std::size_t size_ = 0, released_ = 0;
 };
 
 std::string_view trim(std::string_view text) {
@@ -73,6 +81,7 @@ class LineReader {
     return false;
   }
   int number() const { return number_; }
+  std::string_view rest() const { return rest_; }
 
  private:
   std::string_view rest_;
@@ -98,6 +107,12 @@ struct Layout {
   std::vector<int> target;                             ///< field -> column of the table of values, -1: not needed
   std::vector<std::string> names;                      ///< of the columns of that table
   std::array<std::vector<int>, signal_count> columns;  ///< signal, joint -> column of that table, -1: none
+  /// Whether two signals are read from the column.
+  bool is_shared(int column) const {
+    std::ptrdiff_t uses = 0;
+    for (const auto& signal : columns) uses += std::count(signal.begin(), signal.end(), column);
+    return uses > 1;
+  }
 };
 
 class Header {
@@ -190,9 +205,13 @@ class Rows {
  public:
   Rows(const std::string& file, const Layout& layout) : file_(file), layout_(layout), values_(layout.names.size()) {}
 
-  Table read(LineReader& lines, double from, double to) {
+  Table read(MappedFile& file, LineReader& lines, double from, double to) {
     Table table;
     table.columns.resize(layout_.names.size());
+    // Columns that grow are held twice for a moment: room for as many rows as the first one says, and some more.
+    const std::string_view rest = lines.rest();
+    const std::size_t row = std::max<std::size_t>(1, std::min(rest.find('\n'), rest.size()));
+    for (auto& column : table.columns) column.reserve(rest.size() / row * 21 / 20 + 16);
     double previous = -std::numeric_limits<double>::infinity();
     std::string_view line;
     std::size_t count = 0;
@@ -207,6 +226,7 @@ class Rows {
       previous = table.last_t = t;
       if (t < from || t >= to) continue;
       for (std::size_t c = 0; c < values_.size(); ++c) table.columns[c].push_back(values_[c]);
+      file.release(line.data());
     }
     if (count < 2) throw InputError(fmt::format("{}:{}: fewer than 2 rows of data", file_, lines.number()));
     return table;
@@ -390,7 +410,7 @@ void check_ranges(const Log& log, const std::vector<bool>& revolute, const std::
                                where, turning, count));
 }
 
-Log to_log(const Table& table, const Layout& layout, std::size_t joints, const LogFormat& format) {
+Log to_log(Table table, const Layout& layout, std::size_t joints, const LogFormat& format) {
   Log log;
   const auto rows = static_cast<Index>(table.rows());
   log.t = Eigen::Map<const Eigen::VectorXd>(table.columns[0].data(), rows);
@@ -401,8 +421,9 @@ Log to_log(const Table& table, const Layout& layout, std::size_t joints, const L
     for (std::size_t joint = 0; joint < joints; ++joint) {
       const int column = layout.columns[s][joint];
       if (column < 0) continue;
-      signals[s]->col(static_cast<Index>(joint)) =
-          Eigen::Map<const Eigen::VectorXd>(table.columns[static_cast<std::size_t>(column)].data(), rows);
+      std::vector<double>& values = table.columns[static_cast<std::size_t>(column)];
+      signals[s]->col(static_cast<Index>(joint)) = Eigen::Map<const Eigen::VectorXd>(values.data(), rows);
+      if (!layout.is_shared(column)) std::vector<double>().swap(values);
     }
   }
   if (log.tau.size() > 0) {
@@ -442,7 +463,7 @@ Log read_log(const std::filesystem::path& file, std::size_t joints, const std::v
     throw InputError(
         fmt::format("{}: torque_gain has {} values for {} joints", where, format.torque_gain.size(), joints));
   }
-  const MappedFile mapped(where);
+  MappedFile mapped(where);
   LineReader lines(mapped.text());
   std::string_view first;
   if (!lines.next(first))
@@ -450,13 +471,13 @@ Log read_log(const std::filesystem::path& file, std::size_t joints, const std::v
   const Layout layout = Header(where, lines.number(), first).layout(joints, format, torque_required);
   constexpr double infinity = std::numeric_limits<double>::infinity();
   const double from = from_s.value_or(-infinity), to = to_s.value_or(infinity);
-  const Table table = Rows(where, layout).read(lines, from, to);
+  Table table = Rows(where, layout).read(mapped, lines, from, to);
   if (table.rows() < 2) {
     throw InputError(fmt::format("{}: the window [{:.9g}, {:.9g}) s holds {} rows; the file has {:.9g} to {:.9g} s",
                                  where, from, to, table.rows(), table.first_t, table.last_t));
   }
 
-  Log log = to_log(table, layout, joints, format);
+  Log log = to_log(std::move(table), layout, joints, format);
   log.file = file;
   log.step_s = check_stamps(log, where);
   log.from_s = from_s.value_or(log.t[0]);
@@ -469,8 +490,10 @@ Log read_log(const std::filesystem::path& file, std::size_t joints, const std::v
     if (turns) check_range(log, joint, where);
   }
   check_ranges(log, revolute, where);
-  log.stamps = log.t;
-  if (log.resampled) resample(log, log.step_s);
+  if (log.resampled) {
+    log.stamps = log.t;
+    resample(log, log.step_s);
+  }
   return log;
 }
 

@@ -14,6 +14,12 @@ namespace fxdyn {
 enum class Role { baseline, train, validate, test };
 std::string to_string(Role role);
 
+/// A load on the flange: a point mass at `com` in the last link's URDF frame.
+struct Load {
+  double mass = 0;                                 ///< [kg]
+  Eigen::Vector3d com = Eigen::Vector3d::Zero();  ///< [m]
+};
+
 /// A measured or simulated log on a uniform time grid, SI units, joint side of the gearbox. Matrices are samples x
 /// joints. Signals that the file does not have are empty (0 x 0).
 struct Log {
@@ -23,8 +29,9 @@ struct Log {
   double step_s = 0;            ///< sampling interval
   bool resampled = false;       ///< the file's time stamps were irregular
   Eigen::VectorXd t;            ///< [s]
-  Eigen::VectorXd stamps;       ///< the file's own time stamps in the window [s]
+  Eigen::VectorXd stamps;       ///< the file's own time stamps in the window [s]; empty: t
   Eigen::MatrixXd q, dq, ddq, tau, qlink;
+  std::optional<Load> load;  ///< known from the project
   Eigen::Index samples() const { return t.size(); }
   Eigen::Index joints() const { return q.cols(); }
 };

@@ -169,7 +169,12 @@ class ProjectReader {
 
   void read_identify(Table& table) {
     set(project_.identify.method, table.find("method"), [](const Value& v) { return v.name(method_names, "method"); });
-    if (const auto physical = table.find("physical")) physical->boolean();
+    set(project_.identify.physical, table.find("physical"), as_boolean);
+    set(project_.identify.essential, table.find("essential"), as_boolean);
+    if (const auto forgetting = table.find("forgetting")) {
+      project_.identify.forgetting = forgetting->positive();
+      if (project_.identify.forgetting > 1) forgetting->place().fail("expected more than 0, at most 1");
+    }
     if (const auto effects = table.find("effects")) {
       Names names;
       for (const Value& item : effects->items()) {
@@ -262,8 +267,16 @@ class ProjectReader {
     if (entry.from_s && entry.to_s && !(*entry.from_s < *entry.to_s)) table.place().fail("from_s is not below to_s");
     entry.format = read_format(table, default_format_);
     if (auto payload = table.table("payload")) {
-      if (const auto mass = payload->find("mass"); mass && mass->number() < 0) mass->place().fail("expected 0 or more");
-      if (const auto com = payload->find("com")) com->numbers(3, "x, y, z");
+      Load load;
+      if (const auto mass = payload->find("mass")) {
+        if (mass->number() < 0) mass->place().fail("expected 0 or more");
+        load.mass = mass->number();
+      }
+      if (const auto com = payload->find("com")) {
+        const std::vector<double> r = com->numbers(3, "x, y, z");
+        load.com = Eigen::Vector3d(r[0], r[1], r[2]);
+      }
+      if (load.mass > 0) entry.load = load;
       payload->finish();
     }
     table.finish();
@@ -348,6 +361,7 @@ std::vector<Log> read_logs(const Project& project, Role role, const fs::path& di
     const fs::path file = entry.scenario ? simulated(entry, project, directory) : entry.file;
     logs.push_back(read_log(file, project.robot.size(), revolute, entry.format, entry.from_s, entry.to_s));
     logs.back().role = role;
+    logs.back().load = entry.load;
     check_turns(logs.back(), project.robot);
   }
   return logs;

@@ -20,6 +20,7 @@ struct LogEntry {
   Role role = Role::train;
   std::optional<double> from_s, to_s;
   LogFormat format;
+  std::optional<Load> load;  ///< a known load of this run
   int line = 0;  ///< of the [[log]] in the project file
 };
 
@@ -29,8 +30,11 @@ struct SignalSettings {
 };
 
 struct IdentifySettings {
-  std::string method = "wls";  ///< ls | wls
+  std::string method = "wls";  ///< ls | wls | irls | rls
   std::optional<std::vector<std::string>> effects;
+  bool physical = true;    ///< pseudo-inertias positive definite, friction and rotor inertia not negative
+  bool essential = false;  ///< base parameters that do not matter are left out
+  double forgetting = 1;   ///< rls: what a second-old row counts
 };
 
 struct TrainSettings {

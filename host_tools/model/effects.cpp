@@ -94,8 +94,8 @@ std::string why_not_identified(const EffectInfo& info) {
   if (info.acts_on == ActsOn::body) return reason("acts on the rigid body");
   if (info.acts_on == ActsOn::position) return reason("acts on the joint's position");
   if (info.needs_total) return reason("needs the torque of the effects before it");
-  if (info.needs_peers) return reason("needs the motion of the other joints");
   if (info.needs_structural) return reason("needs the rigid-body torque");
+  if (info.needs_peers) return {};  // the neighbours are tried
   // The search of shapes knows the scales of velocities and distances.
   for (const ParameterInfo& shape : info.shape) {
     if (shape.quantity == Quantity::inverse_velocity || shape.quantity == Quantity::inverse_path) continue;

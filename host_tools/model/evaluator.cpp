@@ -56,15 +56,18 @@ std::size_t stored_nodes(const BroadLearningFit& fit) { return static_cast<std::
 template <class N>
 Evaluator<N>::Evaluator(const IdentifiedModel& model, double tick_s) {
   const std::size_t n = model.robot.size();
-  DhChain chain = to_dh(model.robot);
+  Robot robot = model.robot;
+  for (const EffectFit& fit : model.body) {
+    if (fit.effect != GravityTilt::name) continue;
+    const Eigen::Vector3d& g = robot.gravity;
+    const auto up = GravityTilt::turn({-g.x(), -g.y(), -g.z()}, fit.linear[0], fit.linear[1]);
+    robot.gravity = {-up.x, -up.y, -up.z};
+  }
+  const DhChain chain = to_dh(robot);
   std::vector<LinkInertia<Real>> bodies = model.inertia;
   for (const EffectFit& fit : model.body) {
-    if (fit.effect == Payload::name) {
-      bodies.back() = Payload::add_to(bodies.back(), fit.linear[0], {fit.linear[1], fit.linear[2], fit.linear[3]});
-    } else {
-      const auto turned = GravityTilt::turn({chain.up.x(), chain.up.y(), chain.up.z()}, fit.linear[0], fit.linear[1]);
-      chain.up = {turned.x, turned.y, turned.z};
-    }
+    if (fit.effect != Payload::name) continue;
+    bodies.back() = with_load(bodies.back(), fit.linear[0], {fit.linear[1], fit.linear[2], fit.linear[3]}, chain);
   }
   const auto up = [](double x) { return from_si<N, Quantity::linear_acceleration>(x); };
   up_ = {up(chain.up.x()), up(chain.up.y()), up(chain.up.z())};
@@ -266,23 +269,36 @@ template class Evaluator<Real>;
 template class Evaluator<BoundedNumbers>;
 template class Evaluator<RunTimeNumbers>;
 
-Eigen::MatrixXd predict(const IdentifiedModel& model, const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,
-                        const Eigen::MatrixXd& ddq, double step_s) {
-  IdentifiedModel unlimited = model;
-  for (JointFit& joint : unlimited.joints) {
+namespace {
+
+/// Limits are the drive's, not the model's.
+IdentifiedModel unlimited(IdentifiedModel model) {
+  for (JointFit& joint : model.joints) {
     joint.q_upper = joint.dq_limit = joint.ddq_limit = joint.tau_limit = unbounded;
     joint.q_lower = -unbounded;
   }
-  Evaluator<Real> evaluator(unlimited, step_s);
-  const Eigen::Index n = q.cols();
-  Eigen::MatrixXd tau(q.rows(), n);
-  std::vector<JointState<Real>> state(static_cast<std::size_t>(n));
+  return model;
+}
+
+}  // namespace
+
+Predictor::Predictor(const IdentifiedModel& model, double step_s)
+    : evaluator_(unlimited(model), step_s), state_(model.joints.size()) {}
+
+void Predictor::operator()(const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq, const Eigen::MatrixXd& ddq,
+                           Eigen::Ref<Eigen::MatrixXd> tau) {
   Saturations saturations;
   for (Eigen::Index k = 0; k < q.rows(); ++k) {
-    for (Eigen::Index i = 0; i < n; ++i) state[static_cast<std::size_t>(i)] = {q(k, i), dq(k, i), ddq(k, i)};
-    const auto out = evaluator.tick(state, saturations);
-    for (Eigen::Index i = 0; i < n; ++i) tau(k, i) = out[static_cast<std::size_t>(i)];
+    for (Eigen::Index i = 0; i < q.cols(); ++i) state_[static_cast<std::size_t>(i)] = {q(k, i), dq(k, i), ddq(k, i)};
+    const auto out = evaluator_.tick(state_, saturations);
+    for (Eigen::Index i = 0; i < q.cols(); ++i) tau(k, i) = out[static_cast<std::size_t>(i)];
   }
+}
+
+Eigen::MatrixXd predict(const IdentifiedModel& model, const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,
+                        const Eigen::MatrixXd& ddq, double step_s) {
+  Eigen::MatrixXd tau(q.rows(), q.cols());
+  Predictor(model, step_s)(q, dq, ddq, tau);
   return tau;
 }
 

@@ -152,8 +152,21 @@ extern template class Evaluator<Real>;
 extern template class Evaluator<BoundedNumbers>;
 extern template class Evaluator<RunTimeNumbers>;
 
-/// Torques of the model in double precision over a log's states, samples x joints [N*m | N]. Limits do not apply: this
-/// is the model, not the feedforward that a drive may put out.
+/// Torques of the model in double precision over a motion that comes in pieces. Limits do not apply: this is the model,
+/// not the feedforward that a drive may put out.
+class Predictor {
+ public:
+  Predictor(const IdentifiedModel& model, double step_s);
+  /// The next samples of the motion, samples x joints; writes their torques [N*m | N].
+  void operator()(const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq, const Eigen::MatrixXd& ddq,
+                  Eigen::Ref<Eigen::MatrixXd> tau);
+
+ private:
+  Evaluator<Real> evaluator_;
+  std::vector<JointState<Real>> state_;
+};
+
+/// Over a whole motion at once.
 Eigen::MatrixXd predict(const IdentifiedModel& model, const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,
                         const Eigen::MatrixXd& ddq, double step_s);
 

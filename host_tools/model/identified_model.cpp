@@ -78,13 +78,14 @@ json parameters_json(std::span<const ParameterInfo> infos, const std::vector<dou
   return list;
 }
 
-json effect_json(const EffectFit& fit, double sign_width, bool prismatic) {
+json effect_json(const EffectFit& fit, const JointFit& joint, bool prismatic) {
   const EffectInfo* info = find_effect(fit.effect);
   json parameters = parameters_json(info->shape, fit.shape, fit.shape_std, prismatic);
   for (const json& entry : parameters_json(info->linear, fit.linear, fit.linear_std, prismatic))
     parameters.push_back(entry);
   if (fit.effect == "coulomb") {
-    parameters.push_back({{"name", "width"}, {"value", sign_width}, {"unit", prismatic ? "m/s" : "rad/s"}});
+    parameters.push_back({{"name", "width"}, {"value", joint.sign_width}, {"unit", prismatic ? "m/s" : "rad/s"}});
+    if (joint.sign_width_std > 0) parameters.back()["std"] = joint.sign_width_std;
   }
   return {{"effect", fit.effect},
           {"origin", fit.named ? "named" : "nominal"},
@@ -103,6 +104,7 @@ EffectFit to_effect(const json& j) {
   for (const json& p : j.at("parameters")) {
     if (i < info->shape.size()) {
       fit.shape.push_back(p.at("value"));
+      fit.shape_std.push_back(p.value("std", 0.0));
     } else if (i < info->shape.size() + info->linear.size()) {
       fit.linear.push_back(p.at("value"));
       fit.linear_std.push_back(p.value("std", 0.0));
@@ -129,12 +131,13 @@ json joint_json(const Robot& robot, std::size_t index, const JointFit& fit) {
   const Joint& joint = robot.joints[index];
   const bool prismatic = joint.type == JointType::prismatic;
   json effects = json::array();
-  for (const EffectFit& effect : fit.effects) effects.push_back(effect_json(effect, fit.sign_width, prismatic));
+  for (const EffectFit& effect : fit.effects) effects.push_back(effect_json(effect, fit, prismatic));
   json out = {{"joint", joint.name},
               {"index", index + 1},
               {"unit", joint.torque_unit()},
               {"rated_torque", fit.rated_torque},
               {"sign_width", fit.sign_width},
+              {"sign_width_std", fit.sign_width_std},
               {"limits",
                {{"position", {fit.q_lower, fit.q_upper}},
                 {"velocity", fit.dq_limit},
@@ -158,6 +161,7 @@ JointFit to_joint(const json& j) {
   JointFit fit;
   fit.rated_torque = j.at("rated_torque");
   fit.sign_width = j.at("sign_width");
+  fit.sign_width_std = j.value("sign_width_std", 0.0);
   const json& limits = j.at("limits");
   fit.q_lower = limits.at("position").at(0);
   fit.q_upper = limits.at("position").at(1);
@@ -215,7 +219,7 @@ json to_json(const IdentifiedModel& model) {
   json joints = json::array();
   for (std::size_t i = 0; i < model.joints.size(); ++i) joints.push_back(joint_json(model.robot, i, model.joints[i]));
   json body = json::array();
-  for (const EffectFit& fit : model.body) body.push_back(effect_json(fit, 0, false));
+  for (const EffectFit& fit : model.body) body.push_back(effect_json(fit, {}, false));
   json logs = json::array();
   for (const LogReference& log : model.logs) {
     logs.push_back(
@@ -240,7 +244,11 @@ json to_json(const IdentifiedModel& model) {
               {"filter",
                {{"position_cutoff_hz", model.filter.position_cutoff_hz},
                 {"torque_cutoff_hz", model.filter.torque_cutoff_hz},
-                {"edge_s", model.filter.edge_s}}},
+                {"edge_s", model.filter.edge_s},
+                {"excited_hz", model.filter.excited_hz},
+                {"motion_ends_hz", model.filter.crossing_hz},
+                {"encoder_step", model.filter.encoder_step},
+                {"position_noise", model.filter.position_noise}}},
               {"log_formats", log_formats},
               {"logs", logs}};
   if (model.formats) {
@@ -273,8 +281,14 @@ IdentifiedModel read_model(const std::filesystem::path& file) {
     for (const json& p : j.at("base_parameters")) {
       model.base.push_back({p.at("column"), p.at("name"), p.at("value"), p.at("std"), p.at("expression")});
     }
-    model.filter = {j.at("filter").at("position_cutoff_hz"), j.at("filter").at("torque_cutoff_hz"),
-                    j.at("filter").at("edge_s")};
+    const json& filter = j.at("filter");
+    model.filter = {filter.at("position_cutoff_hz"),
+                    filter.at("torque_cutoff_hz"),
+                    filter.at("edge_s"),
+                    filter.value("excited_hz", 0.0),
+                    filter.value("motion_ends_hz", 0.0),
+                    filter.value("encoder_step", std::vector<double>{}),
+                    filter.value("position_noise", std::vector<double>{})};
     for (const auto& [name, format] : j.at("log_formats").items()) {
       model.log_formats[name] = {format.at("columns").get<std::map<std::string, std::string>>(),
                                  format.at("torque_gain").get<std::vector<double>>()};

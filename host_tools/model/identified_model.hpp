@@ -34,7 +34,8 @@ struct BroadLearningFit {
 };
 
 struct JointFit {
-  double sign_width = 0.01;  ///< s = tanh(dq / width) [rad/s | m/s]
+  double sign_width = 0.01;   ///< s = tanh(dq / width) [rad/s | m/s]
+  double sign_width_std = 0;  ///< 0: not estimated
   std::vector<EffectFit> effects;
   std::optional<BroadLearningFit> bls;
   double rated_torque = 0;  ///< [N*m | N]
@@ -52,6 +53,10 @@ struct BaseParameter {
 
 struct FilterFit {
   double position_cutoff_hz = 0, torque_cutoff_hz = 0, edge_s = 0;
+  // Why: see choose_filter().
+  double excited_hz = 0;                             ///< holds 99.9 % of the velocity's power on every joint
+  double crossing_hz = 0;                            ///< where the last joint's motion sinks into its noise
+  std::vector<double> encoder_step, position_noise;  ///< per joint; no step found: 0; RMS of white noise [rad | m]
 };
 
 struct LogReference {

@@ -61,17 +61,17 @@ bool Pipeline::is_current(const IdentifiedModel& model) {
 
 std::vector<ProcessedLog> Pipeline::logs(Role role) {
   std::vector<ProcessedLog> out;
-  for (const Log& log : read_logs(project_, role, directory_)) out.push_back(process(log, data().filter));
+  for (Log& log : read_logs(project_, role, directory_)) out.push_back(process(std::move(log), data().filter));
   return out;
 }
 
 json Pipeline::stage_metrics(const IdentifiedModel& model, const std::string& stage) {
   json list = json::array();
-  for (const Role role : {Role::train, Role::validate, Role::test}) {
-    for (const ProcessedLog& log : logs(role)) {
-      list.push_back(metrics_json(log, model.robot, judge(log, predict(model, log.q, log.dq, log.ddq, log.step_s))));
-    }
-  }
+  const auto add = [&](const ProcessedLog& log) {
+    list.push_back(metrics_json(log, model.robot, judge(log, predict(model, log))));
+  };
+  for (const ProcessedLog& log : data().logs) add(log);
+  for (const ProcessedLog& log : logs(Role::test)) add(log);
   return {{"stage", stage}, {"logs", list}};
 }
 
@@ -87,7 +87,7 @@ void Pipeline::finish(const Fitter& fitter, Stage stage, const json& training) {
       if (!friction) design.effects.clear();
       less.set_design(j, design);
     }
-    if (project_.identify.method != "ls") less.reweight();
+    weigh(less, project_.identify);
     return finish_model(less, project_, data());
   };
   json stages = json::array({stage_metrics(reduced(false), "rigid"), stage_metrics(reduced(true), "friction")});
@@ -105,7 +105,7 @@ void Pipeline::finish(const Fitter& fitter, Stage stage, const json& training) {
 
 std::unique_ptr<Fitter> Pipeline::fitter_from(const IdentifiedModel& model) {
   auto fitter = std::make_unique<Fitter>(project_.robot, data().logs, model.joints);
-  if (project_.identify.method != "ls") fitter->reweight();
+  weigh(*fitter, project_.identify);
   return fitter;
 }
 
@@ -138,7 +138,7 @@ void Pipeline::train() {
                           {"held_out_with", outcomes[j].error_with},
                           {"kept", outcomes[j].kept}});
     }
-    if (project_.identify.method != "ls") fitter->reweight();
+    weigh(*fitter, project_.identify);
   }
   finish(*fitter, Stage::trained, training);
 }
@@ -270,7 +270,9 @@ void predict_log(const fs::path& model_file, const fs::path& log_file, bool fixe
   }
   Log log = read_log(log_file, robot.size(), revolute, format_of(model, log_file), {}, {}, false);
   log.role = Role::test;
-  const ProcessedLog processed = process(log, model.filter);
+  const bool resampled = log.resampled;
+  const Eigen::VectorXd stamps = std::move(log.stamps);
+  const ProcessedLog processed = process(std::move(log), model.filter);
 
   Eigen::MatrixXd torque;
   if (fixed) {
@@ -280,7 +282,7 @@ void predict_log(const fs::path& model_file, const fs::path& log_file, bool fixe
     const TickStates ticks = at_ticks(processed, model.tick_s, true);
     torque = interpolate(predict_fixed(model, *model.formats, ticks), ticks.t, processed.t);
   } else {
-    torque = predict(model, processed.q, processed.dq, processed.ddq, processed.step_s);
+    torque = predict(model, processed);
   }
   const fs::path out = directory / log_file.filename();
   std::error_code ignored;
@@ -288,8 +290,8 @@ void predict_log(const fs::path& model_file, const fs::path& log_file, bool fixe
     throw InputError(fmt::format("{}: would be overwritten by its prediction; choose another --out", out.string()));
   }
   Log result;
-  result.t = log.stamps;
-  result.tau = log.resampled ? interpolate(torque, processed.t, log.stamps) : torque;
+  result.t = resampled ? stamps : processed.t;
+  result.tau = resampled ? interpolate(torque, processed.t, stamps) : torque;
   write_log(out, result);
   json logs = json::array();
   if (processed.tau.size() > 0) logs.push_back(metrics_json(processed, robot, judge(processed, torque)));

@@ -365,12 +365,13 @@ std::string plot_section(const IdentifiedModel& model, const std::vector<Process
   std::vector<TorquePlot> plots;
   std::vector<std::string> titles;
   for (const ProcessedLog& log : logs) {
-    const Eigen::MatrixXd predicted = log.filter_columns(predict(model, log.q, log.dq, log.ddq, log.step_s));
+    const Eigen::MatrixXd predicted = log.filter_columns(predict(model, log));
+    const Eigen::MatrixXd measured = log.filter_columns(log.tau);
     const Eigen::Index count = log.last - log.first;
     for (std::size_t j = 0; j < model.robot.size(); ++j) {
       const auto k = static_cast<Eigen::Index>(j);
       const Joint& joint = model.robot.joints[j];
-      TorquePlot plot{log.t.segment(log.first, count), log.tau.col(k).segment(log.first, count),
+      TorquePlot plot{log.t.segment(log.first, count), measured.col(k).segment(log.first, count),
                       predicted.col(k).segment(log.first, count), joint.torque_unit()};
       const double rmse = (plot.measured - plot.predicted).norm() / std::sqrt(static_cast<double>(count));
       titles.push_back(fmt::format("{} in {}: RMSE {:.3g} {}", joint.name, log.name, rmse, joint.torque_unit()));

@@ -5,21 +5,18 @@
 namespace fxdyn {
 
 std::vector<JointMetrics> judge(const ProcessedLog& log, const Eigen::MatrixXd& torque) {
-  const auto inside = [&](const Eigen::MatrixXd& m) {
-    return Eigen::MatrixXd(m.middleRows(log.first, log.last - log.first));
-  };
-  const Eigen::MatrixXd measured = inside(log.tau), raw = inside(log.tau_raw);
-  const Eigen::MatrixXd predicted = inside(log.filter_columns(torque)), predicted_raw = inside(torque);
-  const Eigen::VectorXd floor = noise_floor(log);
-  const double root = std::sqrt(static_cast<double>(measured.rows()));
+  const Eigen::Index count = log.last - log.first;
+  const double root = std::sqrt(static_cast<double>(count));
   std::vector<JointMetrics> out;
-  for (Eigen::Index j = 0; j < measured.cols(); ++j) {
-    const Eigen::VectorXd error = measured.col(j) - predicted.col(j);
+  for (Eigen::Index j = 0; j < log.tau.cols(); ++j) {
+    const auto inside = [&](const auto& column) { return Eigen::VectorXd(column.segment(log.first, count)); };
+    const Eigen::VectorXd measured = inside(log.filter_columns(log.tau.col(j)).col(0));
+    const Eigen::VectorXd error = measured - inside(log.filter_columns(torque.col(j)).col(0));
     JointMetrics m;
     m.rmse = error.norm() / root;
-    m.relative = error.norm() / std::max(measured.col(j).norm(), 1e-300);
-    m.rmse_raw = (raw.col(j) - predicted_raw.col(j)).norm() / root;
-    m.noise_floor = floor[j];
+    m.relative = error.norm() / std::max(measured.norm(), 1e-300);
+    m.rmse_raw = inside(log.tau.col(j) - torque.col(j)).norm() / root;
+    m.noise_floor = log.torque_noise[j];
     m.bias = error.mean();
     out.push_back(m);
   }

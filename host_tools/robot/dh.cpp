@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "host_tools/robot/robot.hpp"
+#include "model/effects/payload.hpp"
 
 namespace fxdyn {
 namespace {
@@ -150,6 +151,11 @@ LinkInertia<Real> to_link_inertia(const Inertial& inertial, const Isometry3d& po
   link.xz = j(0, 2);
   link.yz = j(1, 2);
   return link;
+}
+
+LinkInertia<Real> with_load(const LinkInertia<Real>& last, double mass, const Vector3d& com, const DhChain& chain) {
+  const Vector3d r = chain.urdf_in_dh.back() * com;
+  return Payload::add_to(last, mass, {r.x(), r.y(), r.z()});
 }
 
 }  // namespace fxdyn

@@ -48,7 +48,7 @@ double span(const Fitter& fitter, std::size_t joint) {
 double top_speed(const Fitter& fitter, std::size_t joint) {
   double top = 0;
   for (const ProcessedLog& log : fitter.logs())
-    top = std::max(top, log.dq.col(static_cast<Eigen::Index>(joint)).cwiseAbs().maxCoeff());
+    top = std::max(top, log.joint_motion(static_cast<Eigen::Index>(joint)).dq.cwiseAbs().maxCoeff());
   return top;
 }
 

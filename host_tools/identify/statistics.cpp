@@ -1,0 +1,335 @@
+// Standard deviations, robust weights, shapes as unknowns, recursive least squares: what Fitter does with rows rather
+// than with moments.
+
+#include <algorithm>
+#include <cmath>
+
+#include "host_tools/identify/fitter.hpp"
+#include "host_tools/identify/solver.hpp"
+#include "host_tools/parallel.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Whether the shape can be an unknown of the fit: a width or a distance, not an index or a count.
+bool is_continuous(const ParameterInfo& shape) {
+  return shape.quantity == Quantity::inverse_velocity || shape.quantity == Quantity::inverse_path;
+}
+
+/// A joint's shapes that are unknowns, as pointers into a design: the sign's width first.
+std::vector<double*> unknown_shapes(JointFit& design) {
+  std::vector<double*> out{&design.sign_width};
+  for (EffectFit& fit : design.effects) {
+    const auto infos = find_effect(fit.effect)->shape;
+    for (std::size_t i = 0; i < infos.size(); ++i) {
+      if (is_continuous(infos[i])) out.push_back(&fit.shape[i]);
+    }
+  }
+  return out;
+}
+
+double median(VectorXd values) {
+  const Index middle = values.size() / 2;
+  std::nth_element(values.begin(), values.begin() + middle, values.end());
+  return values[middle];
+}
+
+/// Sum over lags of the residual's autocorrelation times the column's: X -> R X for one stretch of consecutive rows.
+MatrixXd correlated(const MatrixXd& x, const VectorXd& autocorrelation) {
+  MatrixXd out = autocorrelation[0] * x;
+  for (Index lag = 1; lag < std::min(autocorrelation.size(), x.rows()); ++lag) {
+    const Index rest = x.rows() - lag;
+    out.topRows(rest) += autocorrelation[lag] * x.bottomRows(rest);
+    out.bottomRows(rest) += autocorrelation[lag] * x.topRows(rest);
+  }
+  return out;
+}
+
+}  // namespace
+
+MatrixXd Fitter::shape_rows(std::size_t joint, const VectorXd& theta) const {
+  constexpr double step = 1e-3;
+  JointFit design = design_[joint];
+  if (design.bls) return MatrixXd(data_->torque_rows[joint].size(), 0);
+  const auto shapes = unknown_shapes(design);
+  MatrixXd out(data_->torque_rows[joint].size(), static_cast<Index>(shapes.size()));
+  for (std::size_t s = 0; s < shapes.size(); ++s) {
+    const double value = *shapes[s];
+    *shapes[s] = value * (1 + step);
+    const VectorXd more = own_rows(joint, design) * theta;
+    *shapes[s] = value * (1 - step);
+    out.col(static_cast<Index>(s)) = (more - own_rows(joint, design) * theta) / (2 * step);
+    *shapes[s] = value;
+  }
+  return out;
+}
+
+NormalEquations Fitter::with_shapes(const Solution& solution, std::vector<MatrixXd>& shapes) const {
+  shapes.resize(joints());
+  parallel_for(joints(), [&](std::size_t j) { shapes[j] = shape_rows(j, solution.theta[j]); });
+  NormalEquations linear = normal_equations(), out;
+  const Index p = linear.offset.back();
+  out.offset = {p};
+  for (const MatrixXd& rows : shapes) out.offset.push_back(out.offset.back() + rows.cols());
+  out.information = MatrixXd::Zero(out.offset.back(), out.offset.back());
+  out.information.topLeftCorner(p, p) = linear.information;
+  out.projection = VectorXd::Zero(out.offset.back());
+  for (std::size_t j = 0; j < joints(); ++j) {
+    const double w = weights_[static_cast<Index>(j)];
+    const VectorXd e = residual(j, solution);
+    const Index at = out.offset[j], count = shapes[j].cols(), first = data_->first_base[j];
+    const Index own = linear.offset[j], own_count = linear.offset[j + 1] - own;
+    for (const std::size_t b : train_blocks()) {
+      const Block& block = data_->blocks[b];
+      const auto cut = [&](const auto& m) { return m.middleRows(block.from, block.to - block.from); };
+      const MatrixXd ws = (w * cut(row_weights_[j])).asDiagonal() * cut(shapes[j]);
+      const auto x = cut(data_->base_rows[j]);
+      out.information.block(first, at, x.cols(), count) += x.transpose() * ws;
+      out.information.block(own, at, own_count, count) += cut(own_rows_[j]).transpose() * ws;
+      out.information.block(at, at, count, count) += cut(shapes[j]).transpose() * ws;
+      out.projection.segment(first, x.cols()) += w * x.transpose() * cut(row_weights_[j]).cwiseProduct(cut(e));
+      out.projection.segment(own, own_count) +=
+          w * cut(own_rows_[j]).transpose() * cut(row_weights_[j]).cwiseProduct(cut(e));
+      out.projection.segment(at, count) += ws.transpose() * cut(e);
+    }
+  }
+  out.information.triangularView<Eigen::StrictlyLower>() = out.information.transpose();
+  return out;
+}
+
+double Fitter::weighted_square(const Solution& solution) const {
+  double sum = 0;
+  for (std::size_t j = 0; j < joints(); ++j) {
+    const VectorXd e = residual(j, solution);
+    for (const std::size_t b : train_blocks()) {
+      const Block& block = data_->blocks[b];
+      const Index count = block.to - block.from;
+      sum += weights_[static_cast<Index>(j)] *
+             row_weights_[j].segment(block.from, count).dot(e.segment(block.from, count).cwiseAbs2());
+    }
+  }
+  return sum;
+}
+
+void Fitter::polish() {
+  constexpr int most_rounds = 8;
+  constexpr double longest = 0.4;  // in the logarithm of a shape
+  Solution solution = solve(normal_equations());
+  double square = weighted_square(solution);
+  for (int round = 0; round < most_rounds; ++round) {
+    std::vector<MatrixXd> rows;
+    const NormalEquations all = with_shapes(solution, rows);
+    if (all.offset.back() == all.offset.front()) return;
+    VectorXd step = SymmetricSolver(all.information).solve(all.projection).tail(all.offset.back() - all.offset.front());
+    for (double& s : step) s = std::isfinite(s) ? std::clamp(s, -longest, longest) : 0;
+    const std::vector<JointFit> before = design_;
+    const double old = square;
+    bool better = false;
+    for (int halving = 0; halving < 4 && !better; ++halving, step /= 4) {
+      std::vector<JointFit> designs = before;
+      for (std::size_t j = 0; j < joints(); ++j) {
+        if (designs[j].bls) continue;
+        const auto shapes = unknown_shapes(designs[j]);
+        for (std::size_t s = 0; s < shapes.size(); ++s)
+          *shapes[s] *= std::exp(step[all.offset[j] - all.offset[0] + static_cast<Index>(s)]);
+      }
+      parallel_for(joints(), [&](std::size_t j) { set_design(j, designs[j]); });
+      solution = solve(normal_equations());
+      square = weighted_square(solution);
+      better = square < old;
+    }
+    if (!better) {
+      parallel_for(joints(), [&](std::size_t j) { set_design(j, before[j]); });
+      return;
+    }
+    if (square > 0.999 * old) return;
+  }
+}
+
+void Fitter::add_standard_deviations(Solution& solution) const {
+  std::vector<MatrixXd> shapes;
+  const NormalEquations all = with_shapes(solution, shapes);
+  const NormalEquations linear = normal_equations();
+  const Index p = all.offset.back();
+  std::vector<MatrixXd> parts(joints());
+  parallel_for(joints(), [&](std::size_t j) {
+    const Index first = data_->first_base[j], nb = solution.beta.size(), own = own_rows_[j].cols();
+    const VectorXd e = residual(j, solution);
+    // Stretches of consecutive rows: the train logs.
+    struct Stretch {
+      Index from, count;
+      double rate;
+    };
+    std::vector<Stretch> stretches;
+    for (std::size_t l = 0; l < logs().size(); ++l) {
+      const ProcessedLog& log = logs()[l];
+      if (log.role == Role::train)
+        stretches.push_back({data_->first_row[l], log.rows(), 1 / (log.step_s * static_cast<double>(log.decimation))});
+    }
+    // The filter correlates noise over a few periods of its cut-off.
+    const ProcessedLog& log = logs().front();
+    const auto lags = static_cast<Index>(std::ceil(4 * stretches.front().rate / log.filter.torque_cutoff_hz)) + 1;
+    VectorXd autocorrelation = VectorXd::Zero(lags);
+    double rows = 0;
+    for (const Stretch& s : stretches) {
+      const VectorXd we = row_weights_[j].segment(s.from, s.count).cwiseProduct(e.segment(s.from, s.count));
+      for (Index lag = 0; lag < std::min(lags, s.count); ++lag)
+        autocorrelation[lag] += we.head(s.count - lag).dot(we.tail(s.count - lag));
+      rows += data_->usable[j].segment(s.from, s.count).sum();
+    }
+    autocorrelation /= std::max(rows, 1.0);
+    // flat to half of the lags, then down to zero
+    for (Index lag = 0; lag < lags; ++lag)
+      autocorrelation[lag] *= std::min(1.0, 2.0 * static_cast<double>(lags - lag) / static_cast<double>(lags));
+    // Independent rows, and what the fit takes of them.
+    const double spread = autocorrelation[0] > 0 ? 2 * autocorrelation.sum() / autocorrelation[0] - 1 : 1;
+    const double independent = rows / std::max(1.0, spread);
+    const double taken = static_cast<double>(p) / static_cast<double>(joints());
+    if (independent > 2 * taken) autocorrelation *= independent / (independent - taken);
+
+    MatrixXd part = MatrixXd::Zero(p, p);
+    std::vector<Index> columns;
+    for (Index c = first; c < nb; ++c) columns.push_back(c);
+    for (Index c = 0; c < own; ++c) columns.push_back(linear.offset[j] + c);
+    for (Index c = 0; c < shapes[j].cols(); ++c) columns.push_back(all.offset[j] + c);
+    for (const Stretch& s : stretches) {
+      MatrixXd x(s.count, static_cast<Index>(columns.size()));
+      x << data_->base_rows[j].middleRows(s.from, s.count), own_rows_[j].middleRows(s.from, s.count),
+          shapes[j].middleRows(s.from, s.count);
+      // rows that are not used have no noise; Huber's weights are in the residual already
+      x = data_->usable[j].segment(s.from, s.count).asDiagonal() * x;
+      part(columns, columns) += x.transpose() * correlated(x, autocorrelation);
+    }
+    const double w = weights_[static_cast<Index>(j)];
+    parts[j] = w * w * part;
+  });
+  MatrixXd middle = MatrixXd::Zero(p, p);
+  for (const MatrixXd& part : parts) middle += part;
+  const MatrixXd inverse = SymmetricSolver(all.information).inverse();
+  const MatrixXd covariance = inverse * middle * inverse;
+  const VectorXd std = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  solution.covariance = covariance.topLeftCorner(linear.offset.back(), linear.offset.back());
+  solution.beta_std = std.head(solution.beta.size());
+  solution.theta_std.clear();
+  solution.sign_width_std.assign(joints(), 0.0);
+  solution.shape_std.assign(joints(), {});
+  for (std::size_t j = 0; j < joints(); ++j) {
+    solution.theta_std.emplace_back(std.segment(linear.offset[j], linear.offset[j + 1] - linear.offset[j]));
+    Index at = all.offset[j];
+    if (shapes[j].cols() > 0) solution.sign_width_std[j] = std[at++] * design_[j].sign_width;
+    for (const EffectFit& fit : design_[j].effects) {
+      const auto infos = find_effect(fit.effect)->shape;
+      std::vector<double> stds(infos.size(), 0.0);
+      for (std::size_t i = 0; i < infos.size(); ++i) {
+        if (is_continuous(infos[i]) && shapes[j].cols() > 0) stds[i] = std[at++] * fit.shape[i];
+      }
+      solution.shape_std[j].push_back(stds);
+    }
+  }
+}
+
+void Fitter::reweight_rows() {
+  constexpr double efficient = 1.345;  // Huber 1964: 95 % efficiency
+  reweight();
+  for (int round = 0; round < 8; ++round) {
+    const Solution solution = solve(normal_equations());
+    parallel_for(joints(), [&](std::size_t j) {
+      const VectorXd magnitude = residual(j, solution).cwiseAbs();
+      const double scale = 1.4826 * median(magnitude);
+      if (!(scale > 0)) return;
+      row_weights_[j] = data_->usable[j].cwiseProduct(
+          (efficient * scale / magnitude.array().max(1e-300)).min(1.0).matrix());
+      make_base_moments(j);
+      own_moments_[j] = own_moments(j, own_rows_[j]);
+      weights_[static_cast<Index>(j)] = 1 / (scale * scale);
+    });
+  }
+}
+
+void Fitter::forget(double forgetting) {
+  double age = 0;
+  for (std::size_t l = logs().size(); l-- > 0;) {
+    const ProcessedLog& log = logs()[l];
+    if (log.role != Role::train) continue;
+    const double interval = log.step_s * static_cast<double>(log.decimation);
+    for (Index k = data_->first_row[l] + log.rows(); k-- > data_->first_row[l]; age += interval) {
+      for (std::size_t j = 0; j < joints(); ++j) row_weights_[j][k] = data_->usable[j][k] * std::pow(forgetting, age);
+    }
+  }
+  for (std::size_t j = 0; j < joints(); ++j) {
+    make_base_moments(j);
+    own_moments_[j] = own_moments(j, own_rows_[j]);
+  }
+}
+
+Fitter::Recursion Fitter::recursive(double forgetting, Index points) const {
+  const NormalEquations shape = normal_equations();
+  const Index p = shape.offset.back(), nb = shape.offset.front();
+  // [R | z]: R x = z, R upper triangular; each row is rotated in (Givens). Columns scaled to like sizes.
+  VectorXd scale = shape.information.diagonal().cwiseSqrt();
+  for (double& s : scale) s = s > 0 ? 1 / s : 0;
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  RowMajor r = RowMajor::Zero(p, p + 1);
+  const auto estimate = [&] {
+    // directions not seen yet stay zero
+    MatrixXd upper = r.leftCols(p);
+    VectorXd z = r.col(p);
+    VectorXd x = VectorXd::Zero(p);
+    for (Index i = p; i-- > 0;) {
+      if (std::fabs(upper(i, i)) < 1e-9 * std::max(1e-300, upper.cwiseAbs().maxCoeff())) continue;
+      x[i] = (z[i] - upper.row(i).tail(p - i - 1).dot(x.tail(p - i - 1))) / upper(i, i);
+    }
+    return VectorXd(scale.cwiseProduct(x));
+  };
+  Index total = 0;
+  for (const ProcessedLog& log : logs()) total += log.role == Role::train ? log.rows() : 0;
+  Recursion out;
+  points = std::min(points, total);
+  out.t.resize(points);
+  out.trace.resize(points, p);
+  double seconds = 0;
+  Index done = 0, point = 0;
+  VectorXd row(p + 1);
+  for (std::size_t l = 0; l < logs().size(); ++l) {
+    const ProcessedLog& log = logs()[l];
+    if (log.role != Role::train) continue;
+    const double interval = log.step_s * static_cast<double>(log.decimation);
+    const double keep = std::sqrt(std::pow(forgetting, interval));
+    for (Index k = data_->first_row[l]; k < data_->first_row[l] + log.rows(); ++k) {
+      if (forgetting < 1) r *= keep;
+      for (std::size_t j = 0; j < joints(); ++j) {
+        const double w = std::sqrt(weights_[static_cast<Index>(j)] * data_->usable[j][k]);
+        if (w == 0) continue;
+        const Index first = data_->first_base[j], own = shape.offset[j], count = own_rows_[j].cols();
+        row.setZero();
+        row.segment(first, nb - first) = data_->base_rows[j].row(k);
+        row.segment(own, count) = own_rows_[j].row(k);
+        row.head(p) = w * row.head(p).cwiseProduct(scale);
+        row[p] = w * data_->torque_rows[j][k];
+        for (Index i = first; i < p; ++i) {
+          if (row[i] == 0) continue;
+          const double length = std::hypot(r(i, i), row[i]), c = r(i, i) / length, s = row[i] / length;
+          for (Index m = i; m <= p; ++m) {
+            const double upper = r(i, m);
+            r(i, m) = c * upper + s * row[m];
+            row[m] = c * row[m] - s * upper;
+          }
+        }
+      }
+      seconds += interval;
+      ++done;
+      if (point < points && done * points >= (point + 1) * total) {
+        out.t[point] = seconds;
+        out.trace.row(point++) = estimate().transpose();
+      }
+    }
+  }
+  out.solution = split(shape, estimate());
+  return out;
+}
+
+}  // namespace fxdyn
