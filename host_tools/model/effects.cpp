@@ -14,7 +14,8 @@ void check(const EffectInfo& effect, const JointSeries& series) {
   };
   need(effect.needs_structural, series.structural, "the rigid-body torque");
   need(effect.needs_total, series.total, "the torque of the effects before it");
-  need(effect.needs_peers, series.peers_dq, "the motion of the other joints");
+  for (const Eigen::MatrixXd* peers : {&series.peers_dq, &series.peers_sign, &series.peers_ddq})
+    need(effect.needs_peers, *peers, "the motion of the other joints");
 }
 
 template <class E>
@@ -30,11 +31,13 @@ Eigen::MatrixXd columns_of(std::span<const double> shape, double sign_width, con
   typename E::template State<Real> state{};
   Saturations saturations;
   Eigen::MatrixXd columns(series.q.size(), static_cast<Eigen::Index>(E::linear.size()));
-  std::vector<JointInput<Real>> peers(static_cast<std::size_t>(series.peers_dq.cols()));
+  std::vector<JointInput<Real>> peers(needs_peers<E> ? static_cast<std::size_t>(series.peers_dq.cols()) : 0);
   for (Eigen::Index k = 0; k < series.q.size(); ++k) {
     for (std::size_t i = 0; i < peers.size(); ++i) {
-      peers[i].dq = series.peers_dq(k, static_cast<Eigen::Index>(i));
-      peers[i].sign = series.peers_sign(k, static_cast<Eigen::Index>(i));
+      const auto joint = static_cast<Eigen::Index>(i);
+      peers[i].dq = series.peers_dq(k, joint);
+      peers[i].sign = series.peers_sign(k, joint);
+      peers[i].ddq = series.peers_ddq(k, joint);
     }
     const JointInput<Real> u{series.q[k],
                              series.dq[k],

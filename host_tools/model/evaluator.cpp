@@ -129,12 +129,12 @@ void Evaluator<N>::add_effect(std::size_t joint, const EffectFit& fit, double ti
     constexpr bool position = acts_on<E> == ActsOn::position;
     deflects_ |= position;
     couples_ |= needs_peers<E>;
-    if constexpr (std::is_same_v<E, JointCoupling>) {
+    if constexpr (needs_peers<E>) {
       const double other = fit.shape[0];
       if (other != std::floor(other) || other < 1 || other > static_cast<double>(joints_of_robot) ||
           other == static_cast<double>(joint + 1)) {
-        throw InputError(fmt::format("joint {}: joint_coupling with joint {}: expected another one of 1 .. {}",
-                                     joint + 1, other, joints_of_robot));
+        throw InputError(fmt::format("joint {}: {} with joint {}: expected another one of 1 .. {}", joint + 1,
+                                     fit.effect, other, joints_of_robot));
       }
     }
     if constexpr (std::is_same_v<E, Delay>) {

@@ -56,11 +56,11 @@ constexpr double lsb(Quantity quantity) {
   return 1.0 / static_cast<double>(std::int64_t{1} << Fixed32::bits(quantity));
 }
 
-/// Range of each shape parameter for the test, and the largest error of each phi.
+/// Range of the shape parameter that the test varies, the first one, and the largest error of each phi.
 struct Case {
   std::string_view effect;
   std::array<double, 2> shape;
-  std::array<double, 2> tolerance;
+  std::array<double, 3> tolerance;
 };
 constexpr double exact = 0, torque = lsb(Quantity::torque);
 constexpr std::array cases{
@@ -85,6 +85,10 @@ constexpr std::array cases{
     Case{"elasticity", {0, 0.1}, {26 * torque}},  // half a unit for each tick that the low-pass remembers
     Case{"backlash", {1e-3, 100}, {1.6e-6}},
     Case{"eccentricity", {}, {8e-9, 8e-9}},
+    // the sign at a velocity that was rounded twice, of a width of 0.05 rad/s
+    Case{"motor_coupling",
+         {1, 4},
+         {1.6e-6 + 20 * lsb(Quantity::velocity), 0.51 * lsb(Quantity::velocity), 0.51 * lsb(Quantity::acceleration)}},
 };
 
 const Case& case_of(std::string_view effect) {
@@ -120,9 +124,10 @@ JointInput<N> input(const Tick& t) {
 
 /// phi of all ticks as doubles, one after the other.
 template <class E, class N>
-std::vector<double> run(const std::vector<Tick>& ticks, double shape) {
+std::vector<double> run(const std::vector<Tick>& ticks, double varied) {
   std::vector<typename N::Word> words;
   for (std::size_t i = 0; i < E::shape.size(); ++i) {
+    const double shape = i == 0 ? varied : (E::shape[i].name == "ratio" ? -0.7 : 0.05);
     const std::int32_t raw = to_raw(E::stored_shape(i, shape, step_s), Fixed32::bits(E::shape[i].quantity));
     if constexpr (std::is_same_v<N, Real>) {
       words.push_back(from_raw(raw, Fixed32::bits(E::shape[i].quantity)));
@@ -179,9 +184,10 @@ std::string compare(const std::vector<Tick>& ticks, double shape, Powers* powers
 
 /// A shape parameter at a share of its range, geometric where that spans decades.
 double shape_at(const Case& c, double share) {
-  if (c.shape[0] > 0 && c.effect != "joint_coupling") return c.shape[0] * std::pow(c.shape[1] / c.shape[0], share);
+  const bool index = c.effect == "joint_coupling" || c.effect == "motor_coupling";
+  if (c.shape[0] > 0 && !index) return c.shape[0] * std::pow(c.shape[1] / c.shape[0], share);
   const double value = c.shape[0] + share * (c.shape[1] - c.shape[0]);
-  return c.effect == "joint_coupling" ? std::round(value) : value;
+  return index ? std::round(value) : value;
 }
 
 RC_GTEST_PROP(EffectsFixed, EveryEffectFollowsDoubleOverItsLimits, ()) {

@@ -20,7 +20,7 @@ JointSeries random_series(std::uint64_t seed, int samples = 2000) {
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(samples);
   JointSeries s{zero, zero, zero, zero, step_s};
   s.total = zero;
-  s.peers_dq = s.peers_sign = Eigen::MatrixXd::Zero(samples, 3);
+  s.peers_dq = s.peers_sign = s.peers_ddq = Eigen::MatrixXd::Zero(samples, 3);
   const double a = random.uniform(0.2, 1.5), b = random.uniform(1, 9), c = random.uniform(0, 6);
   for (int k = 0; k < samples; ++k) {
     const double t = step_s * k;
@@ -32,6 +32,7 @@ JointSeries random_series(std::uint64_t seed, int samples = 2000) {
     for (int i = 0; i < 3; ++i) {
       s.peers_dq(k, i) = 2 * std::sin((i + 1) * t + c);
       s.peers_sign(k, i) = std::tanh(s.peers_dq(k, i) / 0.1);
+      s.peers_ddq(k, i) = 2 * (i + 1) * std::cos((i + 1) * t + c);
     }
   }
   return s;
@@ -80,6 +81,10 @@ std::vector<double> expected(std::string_view effect, const JointSeries& s, int 
   }
   if (effect == "backlash") return {1 - 2 / (1 + std::exp(2 * structural / 5))};
   if (effect == "eccentricity") return {std::polar(1.0, q).imag(), std::polar(1.0, q).real()};
+  if (effect == "motor_coupling") {
+    const double other = -0.8 * s.peers_dq(k, 1);
+    return {1 - 2 / (1 + std::exp(2 * (dq + other) / 0.05)), other, -0.8 * s.peers_ddq(k, 1)};
+  }
   ADD_FAILURE() << "no independent formula for " << effect << ": write one";
   return {};
 }
@@ -94,6 +99,7 @@ std::vector<double> shape_of(std::string_view effect) {
   if (effect == "delay") return {0.0071};
   if (effect == "elasticity") return {0.01};
   if (effect == "backlash") return {5};
+  if (effect == "motor_coupling") return {2, -0.8, 0.05};
   return {};
 }
 
@@ -121,7 +127,8 @@ TEST(Effects, EveryShapeParameterChangesTheColumns) {
     EXPECT_GT(before.colwise().norm().minCoeff(), 0) << effect;
     for (std::size_t i = 0; i < shape.size(); ++i) {
       std::vector<double> other = shape;
-      other[i] = effect == "joint_coupling" ? shape[i] + 1 : 1.1 * shape[i];
+      const bool index = find_effect(effect)->shape[i].name == "joint";
+      other[i] = index ? shape[i] + 1 : 1.1 * shape[i];
       EXPECT_GT((effect_columns(effect, other, sign_width, series) - before).norm(), 0) << effect;
     }
   }
@@ -166,6 +173,33 @@ TEST(Effects, JointCouplingIsTotal) {
   u.peers = peers;
   JointCoupling::basis<Real>(u, Words<Real>{words}, state, none, keep);
   EXPECT_EQ(viscous, 2);
+}
+
+TEST(Effects, AMotorOfTwoJointsDoesNoWorkOfItsOwn) {
+  // Friction and rotor of a motor at v = a dq_1 + b dq_2 take the power T v; the two joints' shares of it, each an
+  // instance and what viscous and rotor_inertia hold, add up to that.
+  const JointSeries one = random_series(15);
+  const double a = 0.9, b = -1.4, coulomb = 2, viscous = 0.3, inertia = 0.05, width = 0.04;
+  JointSeries two = one;
+  two.dq = one.peers_dq.col(1);
+  two.ddq = one.peers_ddq.col(1);
+  JointSeries first = one, second = two;
+  first.peers_dq.col(1) = two.dq;
+  first.peers_ddq.col(1) = two.ddq;
+  second.peers_dq.col(0) = one.dq;
+  second.peers_ddq.col(0) = one.ddq;
+  const auto torque = [&](const JointSeries& s, double own, double other, double joint) {
+    const std::vector<double> shape{joint, other / own, width / std::fabs(own)};
+    const Eigen::Vector3d theta(std::fabs(own) * coulomb, own * own * viscous, own * own * inertia);
+    return Eigen::VectorXd(effect_columns("motor_coupling", shape, sign_width, s) * theta +
+                           own * own * (viscous * s.dq + inertia * s.ddq));
+  };
+  const Eigen::VectorXd tau_1 = torque(first, a, b, 2), tau_2 = torque(second, b, a, 1);
+  for (Eigen::Index k = 0; k < one.q.size(); ++k) {
+    const double v = a * one.dq[k] + b * two.dq[k], dv = a * one.ddq[k] + b * two.ddq[k];
+    const double motor = coulomb * std::tanh(v / width) + viscous * v + inertia * dv;
+    ASSERT_NEAR(tau_1[k] * one.dq[k] + tau_2[k] * two.dq[k], motor * v, 1e-11);
+  }
 }
 
 TEST(Effects, DahlStepIsStableWhereEulerIsNot) {

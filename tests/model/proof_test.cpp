@@ -35,6 +35,7 @@ IdentifiedModel two_joints() {
 /// Value of a shape parameter between its bounds, where they have a magnitude that occurs.
 double shape_value(const ParameterInfo& shape, bool strong) {
   if (shape.name == "joint") return 1;
+  if (shape.name == "ratio") return strong ? -3 : 1;
   if (shape.name == "time_constant") return strong ? 1e4 : 20;
   if (shape.name == "wavenumber") return strong ? 100 : 6;
   if (shape.name == "limit" || shape.name == "torque_scale") return strong ? 1 : 10;

@@ -110,7 +110,9 @@ IdentifiedModel every_effect() {
         EffectFit fit;
         fit.effect = name;
         for (const ParameterInfo& shape : info.shape)
-          fit.shape.push_back(shape.name == "joint" ? 3 : std::clamp(0.011, shape.lower, shape.upper));
+          fit.shape.push_back(shape.name == "joint"   ? 3
+                              : shape.name == "ratio" ? -0.8
+                                                      : std::clamp(0.011, shape.lower, shape.upper));
         for (std::size_t i = 0; i < info.linear.size(); ++i)
           fit.linear.push_back(info.acts_on == ActsOn::position ? 1e-3 : random.uniform(0.1, 1));
         joint.effects.push_back(fit);
