@@ -267,7 +267,7 @@ template class Evaluator<BoundedNumbers>;
 template class Evaluator<RunTimeNumbers>;
 
 Eigen::MatrixXd predict(const IdentifiedModel& model, const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,
-                        const Eigen::MatrixXd& ddq, double step_s) {
+                        const Eigen::MatrixXd& ddq, double step_s, Eigen::MatrixXd* deflections) {
   IdentifiedModel unlimited = model;
   for (JointFit& joint : unlimited.joints) {
     joint.q_upper = joint.dq_limit = joint.ddq_limit = joint.tau_limit = unbounded;
@@ -276,12 +276,16 @@ Eigen::MatrixXd predict(const IdentifiedModel& model, const Eigen::MatrixXd& q, 
   Evaluator<Real> evaluator(unlimited, step_s);
   const Eigen::Index n = q.cols();
   Eigen::MatrixXd tau(q.rows(), n);
+  if (deflections != nullptr) deflections->resize(q.rows(), n);
   std::vector<JointState<Real>> state(static_cast<std::size_t>(n));
   Saturations saturations;
   for (Eigen::Index k = 0; k < q.rows(); ++k) {
     for (Eigen::Index i = 0; i < n; ++i) state[static_cast<std::size_t>(i)] = {q(k, i), dq(k, i), ddq(k, i)};
     const auto out = evaluator.tick(state, saturations);
     for (Eigen::Index i = 0; i < n; ++i) tau(k, i) = out[static_cast<std::size_t>(i)];
+    if (deflections == nullptr) continue;
+    for (Eigen::Index i = 0; i < n; ++i)
+      (*deflections)(k, i) = evaluator.deflections()[static_cast<std::size_t>(i)].delta;
   }
   return tau;
 }

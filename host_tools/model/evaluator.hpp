@@ -80,6 +80,8 @@ class Evaluator {
   std::span<const Torque<N>> tick(std::span<const JointState<N>> setpoints, Saturations& saturations);
   /// Rigid-body torque of the last tick.
   std::span<const Torque<N>> structural() const { return structural_; }
+  /// Between motor and link of each joint in the last tick; at rest where no effect acts on the position.
+  std::span<const Deflection<N>> deflections() const { return deflections_; }
   /// Sum of each joint's effects in the last tick.
   std::span<const typename N::TorqueSum> effects() const { return effects_; }
 
@@ -153,8 +155,9 @@ extern template class Evaluator<BoundedNumbers>;
 extern template class Evaluator<RunTimeNumbers>;
 
 /// Torques of the model in double precision over a log's states, samples x joints [N*m | N]. Limits do not apply: this
-/// is the model, not the feedforward that a drive may put out.
+/// is the model, not the feedforward that a drive may put out. `deflections`, where asked for: motor minus link of each
+/// joint [rad | m].
 Eigen::MatrixXd predict(const IdentifiedModel& model, const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,
-                        const Eigen::MatrixXd& ddq, double step_s);
+                        const Eigen::MatrixXd& ddq, double step_s, Eigen::MatrixXd* deflections = nullptr);
 
 }  // namespace fxdyn

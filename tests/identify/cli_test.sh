@@ -89,7 +89,7 @@ project rls.toml '[identify]' 'method = "rls"' '[[log]]' 'file = "good.csv"' 'ro
 run 2 "rls" rls.toml
 
 # Effects that a stage can't handle are refused by name; the list shows them all.
-for effect in ripple load_friction torque_gain joint_coupling motor_coupling elasticity payload; do
+for effect in ripple load_friction torque_gain joint_coupling elasticity payload; do
   project effect.toml '[identify]' "effects = [\"viscous\", \"$effect\"]" '[[log]]' 'file = "good.csv"' 'role = "train"'
   run 2 "$effect" effect.toml
 done
