@@ -23,12 +23,13 @@ constexpr double most_relaxation_s = 0.1;
 
 /// Least squares with the covariance of a residual that is correlated within blocks ("sandwich").
 struct LeastSquares {
+  Eigen::MatrixXd x;
   Eigen::VectorXd theta, residual;
   Eigen::MatrixXd covariance;
   double power = 0;  ///< of the residual, mean square
 };
 
-LeastSquares least_squares(const Eigen::MatrixXd& x, const Eigen::VectorXd& y, const std::vector<Eigen::Index>& ends) {
+LeastSquares least_squares(Eigen::MatrixXd x, const Eigen::VectorXd& y, const std::vector<Eigen::Index>& ends) {
   const Eigen::VectorXd scale = x.colwise().norm().cwiseMax(1e-300).cwiseInverse();
   const Eigen::MatrixXd unit = x * scale.asDiagonal();
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(unit);
@@ -48,6 +49,7 @@ LeastSquares least_squares(const Eigen::MatrixXd& x, const Eigen::VectorXd& y, c
   middle *= blocks / std::max(1.0, blocks - parameters);
   const Eigen::MatrixXd inverse = (unit.transpose() * unit).completeOrthogonalDecomposition().pseudoInverse();
   out.covariance = scale.asDiagonal() * (inverse * middle * inverse) * scale.asDiagonal();
+  out.x = std::move(x);
   return out;
 }
 
@@ -55,14 +57,16 @@ LeastSquares least_squares(const Eigen::MatrixXd& x, const Eigen::VectorXd& y, c
 /// filtered once; the gear's low-pass commutes with the filter.
 class JointData {
  public:
-  JointData(const FlexibleInput& input, const std::vector<Eigen::MatrixXd>& loads, Eigen::Index joint)
-      : sign_width_(input.model.joints[static_cast<std::size_t>(joint)].sign_width) {
+  JointData(const FlexibleInput& input, const std::vector<LinkSide>& motions, const std::vector<Eigen::MatrixXd>& loads,
+            Eigen::Index joint)
+      : joint_(joint), sign_width_(input.model.joints[static_cast<std::size_t>(joint)].sign_width) {
     std::vector<Eigen::VectorXd> deltas;
     for (std::size_t l = 0; l < input.logs.size(); ++l) {
       const LinkSide& link = input.links[l];
       if (link.q.cols() <= joint || std::isnan(link.q(0, joint))) continue;
       const ProcessedLog& log = input.logs[l];
       logs_.push_back(&log);
+      motions_.push_back(&motions[l]);
       series_.push_back({log.q.col(joint), log.dq.col(joint), log.ddq.col(joint), loads[l].col(joint), log.step_s});
       filtered_load_.emplace_back(log.filter_columns(loads[l].col(joint)));
       filtered_ddq_.emplace_back(log.filter_columns(link.ddq.col(joint)));
@@ -88,6 +92,32 @@ class JointData {
   Eigen::MatrixXd effect(std::string_view name, const std::vector<double>& shape) const {
     return stack(
         [&](std::size_t l) { return logs_[l]->filter_columns(effect_columns(name, shape, sign_width_, series_[l])); });
+  }
+  /// What the base parameters' standard deviations make of the coefficients, as a covariance: each of them moves the
+  /// load, and so the fit. Their correlations are not known here.
+  Eigen::MatrixXd from_load(const LeastSquares& fit, const IdentifiedModel& model, Regressor regressor) const {
+    const auto count = static_cast<Eigen::Index>(model.base.size());
+    Eigen::MatrixXd moved = Eigen::MatrixXd::Zero(fit.x.cols(), count);
+    Eigen::RowVectorXd load(count);
+    Eigen::Index row = 0;
+    for (std::size_t l = 0; l < logs_.size(); ++l) {
+      const ProcessedLog& log = *logs_[l];
+      const LinkSide& m = *motions_[l];
+      for (Eigen::Index i = 0; i < log.rows(); ++i, ++row) {
+        const Eigen::Index k = log.first + i * log.decimation;
+        const Eigen::MatrixXd& y = regressor(m.q.row(k), m.dq.row(k), m.ddq.row(k));
+        for (Eigen::Index b = 0; b < count; ++b) {
+          const BaseParameter& parameter = model.base[static_cast<std::size_t>(b)];
+          load[b] = parameter.std * y(joint_, static_cast<Eigen::Index>(parameter.column));
+        }
+        moved += fit.x.row(row).transpose() * load;
+      }
+    }
+    const Eigen::VectorXd scale = fit.x.colwise().norm().cwiseMax(1e-300).cwiseInverse();
+    const Eigen::MatrixXd gram = scale.asDiagonal() * (fit.x.transpose() * fit.x) * scale.asDiagonal();
+    const Eigen::MatrixXd change =
+        fit.theta[0] * (scale.asDiagonal() * gram.completeOrthogonalDecomposition().solve(scale.asDiagonal() * moved));
+    return change * change.transpose();
   }
   double largest_load() const {
     double most = 0;
@@ -116,8 +146,10 @@ class JointData {
     });
   }
 
+  Eigen::Index joint_;
   double sign_width_;
   std::vector<const ProcessedLog*> logs_;
+  std::vector<const LinkSide*> motions_;
   std::vector<JointSeries> series_;
   std::vector<Eigen::VectorXd> filtered_load_, filtered_ddq_;
   std::vector<Eigen::Index> block_ends_;
@@ -173,8 +205,8 @@ struct Cause {
 };
 
 /// Takes out of the deflection what other causes explain, the worst first, each at most once; says so in `note`.
-GearFit without_other_causes(const JointData& data, bool with_rotor, bool revolute, double all, std::string& note,
-                             Eigen::MatrixXd& others) {
+GearFit without_other_causes(const JointData& data, const IdentifiedModel& model, const Regressor& regressor,
+                             bool with_rotor, bool revolute, double all, std::string& note, Eigen::MatrixXd& others) {
   std::vector<Cause> list;
   if (revolute) list.push_back({Eccentricity::name, {}, "an eccentric gear or encoder disc"});
   for (const double share : {0.01, 0.03, 0.1})
@@ -197,6 +229,13 @@ GearFit without_other_causes(const JointData& data, bool with_rotor, bool revolu
       columns_of_best = columns;
     }
     if (best == nullptr) break;
+    // Wald's test, the load's own errors counted: they leave something that looks like another cause.
+    const Eigen::Index own = columns_of_best.cols();
+    const Eigen::MatrixXd covariance =
+        better.least_squares.covariance + data.from_load(better.least_squares, model, regressor);
+    const Eigen::VectorXd tail = better.least_squares.theta.tail(own);
+    const double wald = tail.dot(covariance.bottomRightCorner(own, own).ldlt().solve(tail));
+    if (wald < significant * significant * static_cast<double>(own)) break;
     fit = better;
     others.conservativeResize(columns_of_best.rows(), others.cols() + columns_of_best.cols());
     others.rightCols(columns_of_best.cols()) = columns_of_best;
@@ -207,7 +246,8 @@ GearFit without_other_causes(const JointData& data, bool with_rotor, bool revolu
   return fit;
 }
 
-FlexibleJoint identify_joint(const JointData& data, const IdentifiedModel& model, std::size_t j, bool rotor_in_load) {
+FlexibleJoint identify_joint(const JointData& data, const IdentifiedModel& model, const Regressor& regressor,
+                             std::size_t j, bool rotor_in_load) {
   const bool revolute = model.robot.joints[j].type == JointType::revolute;
   const std::string_view stiffness_unit = revolute ? "N*m/rad" : "N/m", length_unit = revolute ? "mrad" : "mm";
   const Eigen::VectorXd& delta = data.deflection();
@@ -216,9 +256,14 @@ FlexibleJoint identify_joint(const JointData& data, const IdentifiedModel& model
   const double all = (delta.array() - delta.mean()).square().mean();
   out.deflection_rms = std::sqrt(all);
 
+  if (!(all > 0)) {
+    out.note = "no elasticity to be seen: both encoders say the same";
+    return out;
+  }
   Eigen::MatrixXd others(delta.size(), 0);
-  const GearFit fit = without_other_causes(data, rotor_in_load, revolute, all, out.note, others);
-  const LeastSquares& ls = fit.least_squares;
+  GearFit fit = without_other_causes(data, model, regressor, rotor_in_load, revolute, all, out.note, others);
+  LeastSquares& ls = fit.least_squares;
+  ls.covariance += data.from_load(ls, model, regressor);
   out.explained = 1 - ls.power / all;
 
   const double c = fit.compliance, c_std = std::sqrt(ls.covariance(0, 0));
@@ -231,15 +276,18 @@ FlexibleJoint identify_joint(const JointData& data, const IdentifiedModel& model
   }
   if (!(c > significant * c_std) || share < least_share) {
     const GearFit whole = rotor_in_load ? fit_gear(data, false, others) : fit;
-    if (whole.compliance > significant * std::sqrt(whole.least_squares.covariance(0, 0)) &&
-        1 - whole.least_squares.power / all > 0.5) {
+    const double left = std::sqrt(whole.least_squares.power), k = 1 / (std::max(0.0, whole.compliance) + 3 * c_std);
+    if (share < 0.5) {
+      add(out.note, fmt::format("no elasticity to be seen: stiffer than {:.2g} {}, and {:.2g} {} remain unexplained", k,
+                                stiffness_unit, 1e3 * left, length_unit));
+    } else if (rotor_in_load && whole.least_squares.power < 0.5 * all) {
       add(out.note,
           "the gear bends, but its load can't be told from the rotor's inertia: move the joints behind it too, arm "
           "stretched and folded, or carry a load");
     } else {
-      add(out.note, fmt::format("no elasticity to be seen: stiffer than {:.2g} {}, and {:.2g} {} remain unexplained",
-                                1 / (std::max(0.0, whole.compliance) + 3 * c_std), stiffness_unit,
-                                1e3 * std::sqrt(whole.least_squares.power), length_unit));
+      add(out.note, fmt::format("the gear bends with its load, but that load is too small to be known: stiffer than "
+                                "{:.2g} {}; carry a load, or move faster",
+                                k, stiffness_unit));
     }
     return out;
   }
@@ -289,6 +337,7 @@ std::vector<FlexibleJoint> identify_flexible(const FlexibleInput& input) {
     joint.effects.clear();
     joint.bls.reset();
   }
+  std::vector<LinkSide> motions;
   std::vector<Eigen::MatrixXd> loads;
   for (std::size_t l = 0; l < input.logs.size(); ++l) {
     const ProcessedLog& log = input.logs[l];
@@ -301,17 +350,18 @@ std::vector<FlexibleJoint> identify_flexible(const FlexibleInput& input) {
       motion.ddq.col(j) = link.ddq.col(j);
     }
     loads.push_back(predict(rigid, motion.q, motion.dq, motion.ddq, log.step_s));
+    motions.push_back(std::move(motion));
   }
   const DhChain chain = to_dh(input.model.robot);
   const BaseSet base = find_base(chain);
   std::vector<std::optional<FlexibleJoint>> all(input.model.robot.size());
   parallel_for(all.size(), [&](std::size_t j) {
     const auto joint = static_cast<Eigen::Index>(j);
-    const JointData data(input, loads, joint);
+    const JointData data(input, motions, loads, joint);
     if (data.empty()) return;
     const bool rotor_in_load =
         input.model.joints[j].find(RotorInertia::name) == nullptr && rotor_inertia_is_absorbed(chain, base, joint);
-    all[j] = identify_joint(data, input.model, j, rotor_in_load);
+    all[j] = identify_joint(data, input.model, Regressor(chain), j, rotor_in_load);
   });
   std::vector<FlexibleJoint> found;
   for (std::optional<FlexibleJoint>& joint : all) {
