@@ -163,13 +163,13 @@ struct GearFit {
   LeastSquares least_squares;  ///< columns: load, d(model)/d(relaxation) / compliance, acceleration?, constant, others
 };
 
-/// Gauss and Newton in the relaxation, everything else linear.
-GearFit fit_gear(const JointData& data, bool with_rotor, const Eigen::MatrixXd& others) {
+/// Gauss and Newton in the relaxation, everything else linear; from a fit that is near, one round will do.
+GearFit fit_gear(const JointData& data, bool with_rotor, const Eigen::MatrixXd& others, GearFit fit = {},
+                 int rounds = 15) {
   // A load that lags by less than nothing is noise; a little of it is let through, so that the mean is right.
   const double step = data.step_s(), lowest = -0.4 * step, probe = 0.05 * step;
   const Eigen::Index rows = data.deflection().size();
-  GearFit fit;
-  for (int round = 0; round < 15; ++round) {
+  for (int round = 0; round < rounds; ++round) {
     const double r = fit.relaxation;
     Eigen::MatrixXd slope = (data.load(r + probe) - data.load(r - probe)) / (2 * probe);
     Eigen::MatrixXd x(rows, 2 + (with_rotor ? 1 : 0) + 1 + others.cols());
@@ -183,6 +183,7 @@ GearFit fit_gear(const JointData& data, bool with_rotor, const Eigen::MatrixXd& 
     fit.least_squares = least_squares(x, data.deflection(), data.block_ends());
     const Eigen::VectorXd& theta = fit.least_squares.theta;
     fit.compliance = theta[0];
+    if (fit.compliance == 0) break;  // no load at all
     if (with_rotor) fit.rotor = -theta[2] / theta[0];
     fit.relaxation = std::clamp(r + theta[1] / theta[0], lowest, most_relaxation_s);
     if (std::fabs(fit.relaxation - r) < 1e-6 * step) break;
@@ -220,7 +221,7 @@ GearFit without_other_causes(const JointData& data, const IdentifiedModel& model
       const Eigen::MatrixXd columns = data.effect(cause.effect, cause.shape);
       Eigen::MatrixXd both(columns.rows(), others.cols() + columns.cols());
       both << others, columns;
-      const GearFit candidate = fit_gear(data, with_rotor, both);
+      const GearFit candidate = fit_gear(data, with_rotor, both, fit, 1);
       const double gain = fit.least_squares.power - candidate.least_squares.power;
       if (candidate.least_squares.power >= better.least_squares.power) continue;
       if (gain < worth * fit.least_squares.power || gain < 1e-4 * all) continue;
@@ -229,6 +230,9 @@ GearFit without_other_causes(const JointData& data, const IdentifiedModel& model
       columns_of_best = columns;
     }
     if (best == nullptr) break;
+    Eigen::MatrixXd both(columns_of_best.rows(), others.cols() + columns_of_best.cols());
+    both << others, columns_of_best;
+    better = fit_gear(data, with_rotor, both, fit);
     // Wald's test, the load's own errors counted: they leave something that looks like another cause.
     const Eigen::Index own = columns_of_best.cols();
     const Eigen::MatrixXd covariance =
@@ -237,10 +241,8 @@ GearFit without_other_causes(const JointData& data, const IdentifiedModel& model
     const double wald = tail.dot(covariance.bottomRightCorner(own, own).ldlt().solve(tail));
     if (wald < significant * significant * static_cast<double>(own)) break;
     fit = better;
-    others.conservativeResize(columns_of_best.rows(), others.cols() + columns_of_best.cols());
-    others.rightCols(columns_of_best.cols()) = columns_of_best;
-    const double size = fit.least_squares.theta.tail(columns_of_best.cols()).norm();
-    add(note, fmt::format("{} of {:.2g} {} taken out", best->what, 1e3 * size, revolute ? "mrad" : "mm"));
+    others = both;
+    add(note, fmt::format("{} of {:.2g} {} taken out", best->what, 1e3 * tail.norm(), revolute ? "mrad" : "mm"));
     std::erase_if(list, [effect = best->effect](const Cause& cause) { return cause.effect == effect; });
   }
   return fit;

@@ -30,13 +30,13 @@ std::string effect(std::size_t joint, const std::string& name, const std::string
   return fmt::format("[[effect]]\nname = \"{}\"\njoint = {}\nparameters = {{ {} }}\n", name, joint, parameters);
 }
 
-/// The PUMA 560 with elastic gears: plays one log of 24 s with the given sensors.
+/// The PUMA 560 with elastic gears: plays one log of 40 s with the given sensors.
 fs::path play(const std::string& name, const std::string& sensors, const std::string& more = {}) {
   std::string text = "seed = 3\n[sensors]\n" + sensors +
                      "\n[robot]\nurdf = \"" FXDYN_SOURCE_DIR
                      "/host_tools/demo/puma560.urdf\"\nrated_torque = [97.6, 186.4, 89.4, 24.2, 20.1, 21.3]\n"
                      "acceleration = [8, 8, 10, 20, 20, 20]\n";
-  text += "[[log]]\nname = \"" + name + "\"\nduration_s = 24\nperiod_s = 8\nseed = 5\n" + more;
+  text += "[[log]]\nname = \"" + name + "\"\nduration_s = 40\nperiod_s = 8\nseed = 5\n" + more;
   for (std::size_t j = 0; j < gears.size(); ++j) {
     text += effect(j + 1, "elasticity",
                    fmt::format("compliance = {:.17g}, relaxation = {:.17g}", 1 / gears[j].stiffness,
@@ -106,7 +106,7 @@ Log noisy(const Log& exact, const IdentifiedModel& plant, int bits, std::uint64_
 constexpr const char* exact_sensors = "link_encoders = [1, 2, 3, 4, 5]";
 
 TEST(Flexible, StiffnessDampingAndRotorOfASimulatedRobotOverThirtySeeds) {
-  // 24 s, 20-bit encoders, torque noise of 1 %, everything identified from the log.
+  // 40 s, 20-bit encoders, torque noise of 1 %, everything identified from the log.
   const Log exact = read(play("seeds", exact_sensors));
   const IdentifiedModel plant = truth();
   constexpr std::size_t seeds = 30;
