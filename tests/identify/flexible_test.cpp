@@ -158,6 +158,21 @@ FlexibleJoint third_joint(const std::string& name, const std::string& more) {
   return identify_flexible({truth(), {process(log, filter)}, {link_side(log, filter)}})[2];
 }
 
+TEST(Flexible, SimulateWritesTheLinkEncodersAskedFor) {
+  const auto encoded = [](const Log& log, Eigen::Index joint) { return !std::isnan(log.qlink(0, joint)); };
+  const Log some = read(play("some", "link_encoders = [2, 3]\nlink_encoder_bits = 16"));
+  EXPECT_TRUE(!encoded(some, 0) && encoded(some, 1) && encoded(some, 2) && !encoded(some, 5));
+  const Eigen::ArrayXd steps = some.qlink.col(1).array() * 65536 / (2 * std::numbers::pi);
+  EXPECT_LT((steps - steps.round()).abs().maxCoeff(), 1e-9);
+  const Log all = read(play("all", "link_encoder_bits = 0"));
+  EXPECT_TRUE(encoded(all, 0) && encoded(all, 5));
+  EXPECT_EQ((all.q - all.qlink).col(5).cwiseAbs().maxCoeff(), 0);
+  EXPECT_GT((all.q - all.qlink).col(1).cwiseAbs().maxCoeff(), 1e-4);
+  EXPECT_EQ(read(play("none", "encoder_bits = 19")).qlink.size(), 0);
+  EXPECT_THROW(play("bad", "link_encoders = [7]"), InputError);
+  EXPECT_THROW(play("bad", "link_encoders = \"some\""), InputError);
+}
+
 TEST(Flexible, OtherDeflectionsAreTakenOutAndSaid) {
   const FlexibleJoint alone = third_joint("alone", "");
   EXPECT_EQ(alone.note, "");

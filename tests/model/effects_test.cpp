@@ -204,6 +204,39 @@ TEST(Effects, AMotorOfTwoJointsDoesNoWorkOfItsOwn) {
   }
 }
 
+TEST(Effects, CoupledJointsSeeEachOthersMotion) {
+  // Two joints without mass: their torques are those of the coupling.
+  const JointSeries one = random_series(16);
+  IdentifiedModel model;
+  model.robot.gravity.setZero();
+  model.robot.joints.resize(2);
+  model.inertia.resize(2);
+  model.joints.resize(2);
+  Eigen::MatrixXd q(one.q.size(), 2), dq = q, ddq = q;
+  q << one.q, one.peers_dq.col(1);
+  dq << one.dq, one.peers_dq.col(1);
+  ddq << one.ddq, one.peers_ddq.col(1);
+  const Eigen::Vector3d theta(2, 0.3, 0.05);
+  for (std::size_t j = 0; j < 2; ++j) {
+    EffectFit fit;
+    fit.effect = "motor_coupling";
+    fit.shape = {j == 0 ? 2.0 : 1.0, -1, 0.05};
+    fit.linear = {theta[0], theta[1], theta[2]};
+    model.joints[j].effects.push_back(fit);
+  }
+  const Eigen::MatrixXd torque = predict(model, q, dq, ddq, step_s);
+  for (Eigen::Index j = 0; j < 2; ++j) {
+    JointSeries series{q.col(j), dq.col(j), ddq.col(j), {}, step_s};
+    series.peers_dq = series.peers_sign = dq;
+    series.peers_ddq = ddq;
+    const auto& shape = model.joints[static_cast<std::size_t>(j)].effects[0].shape;
+    const Eigen::VectorXd expected = effect_columns("motor_coupling", shape, sign_width, series) * theta;
+    EXPECT_LT((torque.col(j) - expected).cwiseAbs().maxCoeff(), 1e-12) << j;
+  }
+  model.joints[1].effects[0].shape[0] = 2;  // with itself
+  EXPECT_THROW(predict(model, q, dq, ddq, step_s), InputError);
+}
+
 TEST(Effects, ElasticityLagsByItsRelaxationAtAnyTick) {
   // Against the closed form of a steady oscillation: amplitude 1 / sqrt(1 + (w r)^2), lag atan(w r).
   const double relaxation = 0.004, w = 2 * std::numbers::pi * 3;
