@@ -219,6 +219,7 @@ FilterFit choose_filter(const std::vector<Log>& logs, const SignalSettings& sett
       settings.position_cutoff_hz.value_or(noisy ? position : rate / 2);  // half the rate: no filter
   filter.torque_cutoff_hz =
       settings.torque_cutoff_hz.value_or(std::min(0.4 * rate, std::max(5 * filter.excited_hz, 10.0)));
+  filter.torque_lead_s = settings.torque_lead_s.value_or(0);
   filter.edge_s = settings.edge_s.value_or(3 / std::min(filter.torque_cutoff_hz, filter.position_cutoff_hz));
   return filter;
 }
@@ -282,16 +283,18 @@ ProcessedLog process(Log log, const FilterFit& filter, const ProcessSettings& se
   return out;
 }
 
+IdentifiedModel with_load_of(const ProcessedLog& log, IdentifiedModel model) {
+  if (!log.load) return model;
+  const Eigen::Vector3d& com = log.load->com;
+  EffectFit payload;
+  payload.effect = Payload::name;
+  payload.linear = {log.load->mass, com.x(), com.y(), com.z()};
+  model.body.push_back(payload);
+  return model;
+}
+
 MatrixXd predict(const IdentifiedModel& model, const ProcessedLog& log) {
-  IdentifiedModel loaded = model;
-  if (log.load) {
-    const Eigen::Vector3d& com = log.load->com;
-    EffectFit payload;
-    payload.effect = Payload::name;
-    payload.linear = {log.load->mass, com.x(), com.y(), com.z()};
-    loaded.body.push_back(payload);
-  }
-  Predictor predictor(loaded, log.step_s);
+  Predictor predictor(with_load_of(log, model), log.step_s);
   constexpr Index block = 8192;
   MatrixXd tau(log.samples(), log.q.cols());
   for (Index from = 0; from < log.samples(); from += block) {
@@ -299,7 +302,7 @@ MatrixXd predict(const IdentifiedModel& model, const ProcessedLog& log) {
     const MotionRows motion = log.motion(from, count);
     predictor(motion.q, motion.dq, motion.ddq, tau.middleRows(from, count));
   }
-  return tau;
+  return at_other_times(tau, model.filter.torque_lead_s / log.step_s);
 }
 
 }  // namespace fxdyn

@@ -122,13 +122,14 @@ Fitter::Fitter(const Robot& robot, const std::vector<ProcessedLog>& logs, std::v
         fmt::format("{} rows (after filtering) for {} parameters: record a longer log", train_rows * n, parameters));
   }
 
-  // All columns of all joints side by side; joint j's are columns starts[j] .. starts[j + 1] - 1, torque the last.
+  // All columns of all joints side by side; joint j's are columns starts[j] .. starts[j + 1] - 1, the torque of a known
+  // load the last.
   std::vector<Eigen::Index> starts{0};
   for (Eigen::Index j = 0; j < n; ++j)
     starts.push_back(starts.back() + nb - data->first_base[static_cast<std::size_t>(j)] + 1);
   for (Eigen::Index j = 0; j < n; ++j) {
     data->base_rows.emplace_back(rows, nb - data->first_base[static_cast<std::size_t>(j)]);
-    data->torque_rows.emplace_back(rows);
+    data->load_rows.emplace_back(rows);
     data->usable.emplace_back(Eigen::VectorXd::Ones(rows));
   }
   struct Piece {
@@ -156,8 +157,7 @@ Fitter::Fitter(const Robot& robot, const std::vector<ProcessedLog>& logs, std::v
         Eigen::Index at = starts[static_cast<std::size_t>(j)];
         for (Eigen::Index c = data->first_base[static_cast<std::size_t>(j)]; c < nb; ++c)
           full(k, at++) = y(j, columns[static_cast<std::size_t>(c)]);
-        // a load that is known is not looked for
-        full(k, at) = log->tau(block.begin + k, j) - y.row(j).tail(per_link).dot(load);
+        full(k, at) = y.row(j).tail(per_link).dot(load);
       }
     }
     const Eigen::MatrixXd kept = block.filter_and_keep(*log, full);
@@ -165,7 +165,7 @@ Fitter::Fitter(const Robot& robot, const std::vector<ProcessedLog>& logs, std::v
       const auto k = static_cast<std::size_t>(j);
       const Eigen::Index count = starts[k + 1] - starts[k] - 1;
       data->base_rows[k].middleRows(first_row + block.row, kept.rows()) = kept.middleCols(starts[k], count);
-      data->torque_rows[k].segment(first_row + block.row, kept.rows()) = kept.col(starts[k] + count);
+      data->load_rows[k].segment(first_row + block.row, kept.rows()) = kept.col(starts[k] + count);
     }
   });
   for (std::size_t l = 0; l < logs.size(); ++l) {
@@ -206,8 +206,24 @@ Fitter::Fitter(const Robot& robot, const std::vector<ProcessedLog>& logs, std::v
   base_moments_.resize(joints());
   own_rows_.resize(joints());
   own_moments_.resize(joints());
-  parallel_for(joints(), [&](std::size_t j) { make_base_moments(j); });
+  torque_rows_.resize(joints());
+  set_torque_lead(logs.front().filter.torque_lead_s);
   for (std::size_t j = 0; j < joints(); ++j) set_design(j, design_[j]);
+}
+
+void Fitter::set_torque_lead(double seconds) {
+  torque_lead_s_ = seconds;
+  parallel_for(joints(), [&](std::size_t j) {
+    torque_rows_[j].resize(data_->load_rows[j].size());
+    for (std::size_t l = 0; l < logs().size(); ++l) {
+      const ProcessedLog& log = logs()[l];
+      const Eigen::MatrixXd tau = at_other_times(log.tau.col(static_cast<Eigen::Index>(j)), -seconds / log.step_s);
+      torque_rows_[j].segment(data_->first_row[l], log.rows()) = log.decimate(log.filter_columns(tau));
+    }
+    torque_rows_[j] -= data_->load_rows[j];  // a load that is known is not looked for
+    make_base_moments(j);
+    if (own_rows_[j].size() > 0 || own_moments_[j].size() > 0) own_moments_[j] = own_moments(j, own_rows_[j]);
+  });
 }
 
 Eigen::MatrixXd Fitter::own_rows(std::size_t joint, const JointFit& design) const {
@@ -225,7 +241,7 @@ Eigen::MatrixXd Fitter::own_rows(std::size_t joint, const JointFit& design) cons
       }
     }
   }
-  Eigen::MatrixXd out(data_->torque_rows[joint].size(), own_count(design));
+  Eigen::MatrixXd out(data_->load_rows[joint].size(), own_count(design));
   for (std::size_t l = 0; l < logs().size(); ++l) {
     const ProcessedLog& log = logs()[l];
     const JointSeries series = joint_series(log, joint, designs);
@@ -259,7 +275,7 @@ void Fitter::make_base_moments(std::size_t joint) {
   for (const Block& block : data_->blocks) {
     const Eigen::Index count = block.to - block.from;
     const auto x = data_->base_rows[joint].middleRows(block.from, count);
-    const auto y = data_->torque_rows[joint].segment(block.from, count);
+    const auto y = torque_rows_[joint].segment(block.from, count);
     const auto w = row_weights_[joint].segment(block.from, count);
     const Eigen::MatrixXd wx = w.asDiagonal() * x;
     BaseMoments m{Eigen::MatrixXd::Zero(x.cols(), x.cols()), wx.transpose() * y, (w.array() * y.array().square()).sum(),
@@ -277,7 +293,7 @@ Fitter::Own Fitter::own_moments(std::size_t joint, const Eigen::MatrixXd& own) c
     const auto x = own.middleRows(block.from, count);
     const Eigen::MatrixXd wx = row_weights_[joint].segment(block.from, count).asDiagonal() * x;
     out.push_back({data_->base_rows[joint].middleRows(block.from, count).transpose() * wx, wx.transpose() * x,
-                   wx.transpose() * data_->torque_rows[joint].segment(block.from, count)});
+                   wx.transpose() * torque_rows_[joint].segment(block.from, count)});
   }
   return out;
 }
@@ -419,7 +435,7 @@ Solution Fitter::split(const NormalEquations& equations, const Eigen::VectorXd& 
 
 Eigen::VectorXd Fitter::residual(std::size_t joint, const Solution& solution) const {
   const Eigen::MatrixXd& x = data_->base_rows[joint];
-  return data_->torque_rows[joint] - x * solution.beta.tail(x.cols()) - own_rows_[joint] * solution.theta[joint];
+  return torque_rows_[joint] - x * solution.beta.tail(x.cols()) - own_rows_[joint] * solution.theta[joint];
 }
 
 bool Judgement::beats(const Judgement& other, double worth) const {

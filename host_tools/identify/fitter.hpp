@@ -80,6 +80,9 @@ class Fitter {
   const std::string& gate() const { return data_->split.kind; }
 
   void set_design(std::size_t joint, JointFit design);
+  /// The torque columns are this far ahead of the motion (FilterFit::torque_lead_s).
+  void set_torque_lead(double seconds);
+  double torque_lead_s() const { return torque_lead_s_; }
 
   /// Effects whose columns are, on the train rows, sums of base columns and of the effects before them (relative 1e-5):
   /// these logs can't tell them apart.
@@ -139,7 +142,7 @@ class Fitter {
     std::vector<Eigen::Index> first_base;      ///< per joint: base columns from here on act on it
     std::vector<Eigen::Index> first_row;       ///< per log
     std::vector<Eigen::MatrixXd> base_rows;    ///< per joint: rows x base columns that act on it
-    std::vector<Eigen::VectorXd> torque_rows;  ///< per joint
+    std::vector<Eigen::VectorXd> load_rows;    ///< per joint: torque of the logs' known loads
     std::vector<Eigen::VectorXd> usable;       ///< per joint and row: 0 where saturated, else 1
     std::vector<Block> blocks;
     Split split;
@@ -172,6 +175,8 @@ class Fitter {
 
   std::shared_ptr<const Data> data_;
   std::vector<JointFit> design_;
+  double torque_lead_s_ = 0;
+  std::vector<Eigen::VectorXd> torque_rows_;             ///< per joint, without known loads
   std::vector<Eigen::VectorXd> row_weights_;             ///< per joint and row
   std::vector<std::vector<BaseMoments>> base_moments_;   ///< [joint][block]
   std::vector<Eigen::MatrixXd> own_rows_;                ///< per joint: rows x own columns

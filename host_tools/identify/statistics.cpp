@@ -54,9 +54,9 @@ MatrixXd correlated(const MatrixXd& x, const VectorXd& autocorrelation) {
 MatrixXd Fitter::shape_rows(std::size_t joint, const VectorXd& theta) const {
   constexpr double step = 1e-3;
   JointFit design = design_[joint];
-  if (design.bls) return MatrixXd(data_->torque_rows[joint].size(), 0);
+  if (design.bls) return MatrixXd(torque_rows_[joint].size(), 0);
   const auto shapes = unknown_shapes(design);
-  MatrixXd out(data_->torque_rows[joint].size(), static_cast<Index>(shapes.size()));
+  MatrixXd out(torque_rows_[joint].size(), static_cast<Index>(shapes.size()));
   for (std::size_t s = 0; s < shapes.size(); ++s) {
     const double value = *shapes[s];
     *shapes[s] = value * (1 + step);
@@ -309,7 +309,7 @@ Fitter::Recursion Fitter::recursive(double forgetting, Index points) const {
         row.segment(first, nb - first) = data_->base_rows[j].row(k);
         row.segment(own, count) = own_rows_[j].row(k);
         row.head(p) = w * row.head(p).cwiseProduct(scale);
-        row[p] = w * data_->torque_rows[j][k];
+        row[p] = w * torque_rows_[j][k];
         for (Index i = first; i < p; ++i) {
           if (row[i] == 0) continue;
           const double length = std::hypot(r(i, i), row[i]), c = r(i, i) / length, s = row[i] / length;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
 #include <numbers>
@@ -149,6 +150,23 @@ MatrixXd differentiate(const Eigen::Ref<const MatrixXd>& columns, double step_s)
 
 MatrixXd differentiate_twice(const Eigen::Ref<const MatrixXd>& columns, double step_s) {
   return derive(columns, step_s, 2, 8);
+}
+
+MatrixXd at_other_times(const Eigen::Ref<const MatrixXd>& columns, double steps) {
+  if (steps == 0) return columns;
+  const double whole = std::floor(steps), u = steps - whole;
+  // Lagrange's weights of the samples at -1, 0, 1, 2
+  const std::array<double, 4> weights{-u * (u - 1) * (u - 2) / 6, (u + 1) * (u - 1) * (u - 2) / 2,
+                                      -(u + 1) * u * (u - 2) / 2, (u + 1) * u * (u - 1) / 6};
+  const Index n = columns.rows();
+  MatrixXd out = MatrixXd::Zero(n, columns.cols());
+  for (Index k = 0; k < n; ++k) {
+    for (Index i = 0; i < 4; ++i) {
+      const Index at = std::clamp<Index>(k + static_cast<Index>(whole) + i - 1, 0, n - 1);
+      out.row(k) += weights[static_cast<std::size_t>(i)] * columns.row(at);
+    }
+  }
+  return out;
 }
 
 }  // namespace fxdyn

@@ -59,6 +59,9 @@ void write_log(const std::filesystem::path& file, const Log& log);
 /// Columns sampled at t, linearly interpolated at other instants (ascending).
 Eigen::MatrixXd interpolate(const Eigen::MatrixXd& columns, const Eigen::VectorXd& t, const Eigen::VectorXd& at);
 
+/// Columns at `steps` (any number, a fraction too) samples later, by cubic interpolation; the ends stand still.
+Eigen::MatrixXd at_other_times(const Eigen::Ref<const Eigen::MatrixXd>& columns, double steps);
+
 /// Zero-phase low-pass Butterworth filter: forward and backward over each column, with odd reflection at both ends and
 /// steady-state initial conditions. `order` is the order of one pass (the baseline of shared data: 4).
 class ZeroPhaseFilter {

@@ -159,6 +159,10 @@ class ProjectReader {
   void read_signals(Table& table) {
     set(project_.signals.position_cutoff_hz, table.find("position_cutoff_hz"), as_positive);
     set(project_.signals.torque_cutoff_hz, table.find("torque_cutoff_hz"), as_positive);
+    if (const auto lead = table.find("torque_lead_s")) {
+      if (std::fabs(lead->number()) > 0.1) lead->place().fail("expected seconds, at most 0.1 either way");
+      project_.signals.torque_lead_s = lead->number();
+    }
     if (const auto edge = table.find("edge_s")) {
       if (edge->number() < 0) edge->place().fail("expected 0 or more");
       project_.signals.edge_s = edge->number();

@@ -26,6 +26,7 @@ struct LogEntry {
 
 struct SignalSettings {
   std::optional<double> position_cutoff_hz, torque_cutoff_hz;
+  std::optional<double> torque_lead_s;  ///< see FilterFit
   std::optional<double> edge_s;  ///< dropped at both ends after filtering
 };
 

@@ -286,19 +286,23 @@ Predictor::Predictor(const IdentifiedModel& model, double step_s)
     : evaluator_(unlimited(model), step_s), state_(model.joints.size()) {}
 
 void Predictor::operator()(const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq, const Eigen::MatrixXd& ddq,
-                           Eigen::Ref<Eigen::MatrixXd> tau) {
+                           Eigen::Ref<Eigen::MatrixXd> tau, Eigen::MatrixXd* deflections) {
   Saturations saturations;
+  if (deflections != nullptr) deflections->resize(q.rows(), q.cols());
   for (Eigen::Index k = 0; k < q.rows(); ++k) {
     for (Eigen::Index i = 0; i < q.cols(); ++i) state_[static_cast<std::size_t>(i)] = {q(k, i), dq(k, i), ddq(k, i)};
     const auto out = evaluator_.tick(state_, saturations);
     for (Eigen::Index i = 0; i < q.cols(); ++i) tau(k, i) = out[static_cast<std::size_t>(i)];
+    if (deflections == nullptr) continue;
+    for (Eigen::Index i = 0; i < q.cols(); ++i)
+      (*deflections)(k, i) = evaluator_.deflections()[static_cast<std::size_t>(i)].delta;
   }
 }
 
 Eigen::MatrixXd predict(const IdentifiedModel& model, const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,
-                        const Eigen::MatrixXd& ddq, double step_s) {
+                        const Eigen::MatrixXd& ddq, double step_s, Eigen::MatrixXd* deflections) {
   Eigen::MatrixXd tau(q.rows(), q.cols());
-  Predictor(model, step_s)(q, dq, ddq, tau);
+  Predictor(model, step_s)(q, dq, ddq, tau, deflections);
   return tau;
 }
 

@@ -80,6 +80,8 @@ class Evaluator {
   std::span<const Torque<N>> tick(std::span<const JointState<N>> setpoints, Saturations& saturations);
   /// Rigid-body torque of the last tick.
   std::span<const Torque<N>> structural() const { return structural_; }
+  /// Between motor and link of each joint in the last tick; at rest where no effect acts on the position.
+  std::span<const Deflection<N>> deflections() const { return deflections_; }
   /// Sum of each joint's effects in the last tick.
   std::span<const typename N::TorqueSum> effects() const { return effects_; }
 
@@ -157,9 +159,10 @@ extern template class Evaluator<RunTimeNumbers>;
 class Predictor {
  public:
   Predictor(const IdentifiedModel& model, double step_s);
-  /// The next samples of the motion, samples x joints; writes their torques [N*m | N].
+  /// The next samples of the motion, samples x joints; writes their torques [N*m | N] and, where asked for, motor minus
+  /// link of each joint [rad | m].
   void operator()(const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq, const Eigen::MatrixXd& ddq,
-                  Eigen::Ref<Eigen::MatrixXd> tau);
+                  Eigen::Ref<Eigen::MatrixXd> tau, Eigen::MatrixXd* deflections = nullptr);
 
  private:
   Evaluator<Real> evaluator_;
@@ -168,6 +171,6 @@ class Predictor {
 
 /// Over a whole motion at once.
 Eigen::MatrixXd predict(const IdentifiedModel& model, const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,
-                        const Eigen::MatrixXd& ddq, double step_s);
+                        const Eigen::MatrixXd& ddq, double step_s, Eigen::MatrixXd* deflections = nullptr);
 
 }  // namespace fxdyn

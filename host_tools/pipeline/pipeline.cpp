@@ -105,6 +105,7 @@ void Pipeline::finish(const Fitter& fitter, Stage stage, const json& training) {
 
 std::unique_ptr<Fitter> Pipeline::fitter_from(const IdentifiedModel& model) {
   auto fitter = std::make_unique<Fitter>(project_.robot, data().logs, model.joints);
+  fitter->set_torque_lead(model.filter.torque_lead_s);
   weigh(*fitter, project_.identify);
   return fitter;
 }
@@ -280,7 +281,8 @@ void predict_log(const fs::path& model_file, const fs::path& log_file, bool fixe
       throw InputError(fmt::format("{}: has no fixed-point formats; run `fxdyn export` first", model_file.string()));
     // At the drive's ticks, as the firmware computes; then back to the log's samples.
     const TickStates ticks = at_ticks(processed, model.tick_s, true);
-    torque = interpolate(predict_fixed(model, *model.formats, ticks), ticks.t, processed.t);
+    torque = at_other_times(interpolate(predict_fixed(model, *model.formats, ticks), ticks.t, processed.t),
+                            model.filter.torque_lead_s / processed.step_s);
   } else {
     torque = predict(model, processed);
   }

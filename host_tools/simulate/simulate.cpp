@@ -34,9 +34,11 @@ struct Scenario {
   IdentifiedModel plant;
   std::vector<FourierBounds> bounds;
   double sample_s = 0.002;
-  int encoder_bits = 0;       ///< per turn of the joint, or per metre; 0: exact
-  double torque_noise = 0;    ///< white, share of rated torque
-  bool exact_motion = false;  ///< logs carry exact q, dq, ddq
+  int encoder_bits = 0;  ///< per turn of the joint, or per metre; 0: exact
+  int link_encoder_bits = 0;
+  std::vector<bool> link_encoder;  ///< which joints have one; empty: none
+  double torque_noise = 0;         ///< white, share of rated torque
+  bool exact_motion = false;       ///< logs carry exact q, dq, ddq
   std::uint64_t seed = 1;
   std::vector<ScenarioLog> logs;
 };
@@ -95,6 +97,27 @@ ScenarioLog read_scenario_log(Table table) {
   return log;
 }
 
+void read_link_encoders(Table& sensors, Scenario& scenario) {
+  const std::size_t n = scenario.plant.robot.size();
+  scenario.link_encoder_bits = scenario.encoder_bits;
+  if (const auto bits = sensors.find("link_encoder_bits")) {
+    scenario.link_encoder_bits = bits->count(0);
+    scenario.link_encoder.assign(n, true);
+  }
+  const auto which = sensors.find("link_encoders");
+  if (!which) return;
+  scenario.link_encoder.assign(n, which->is_string());
+  if (which->is_string()) {
+    which->name({"all"}, "choice of joints");
+    return;
+  }
+  for (const Value& item : which->items()) {
+    const auto joint = static_cast<std::size_t>(item.integer(1));
+    if (joint > n) item.place().fail(fmt::format("the robot has {} joints", n));
+    scenario.link_encoder[joint - 1] = true;
+  }
+}
+
 Scenario read_scenario(const fs::path& file) {
   const toml::table root_table = toml_input::parse(file);
   Table root({file.string(), "", 1}, root_table);
@@ -132,6 +155,7 @@ Scenario read_scenario(const fs::path& file) {
     if (const auto bits = table->find("encoder_bits")) scenario.encoder_bits = bits->count(0);
     toml_input::set(scenario.torque_noise, table->find("torque_noise"), toml_input::as_number);
     toml_input::set(scenario.exact_motion, table->find("exact_motion"), toml_input::as_boolean);
+    read_link_encoders(*table, scenario);
     table->finish();
   }
   if (const auto plant_kind = root.find("plant")) plant_kind->name({"internal"}, "plant");
@@ -176,7 +200,9 @@ fs::path simulate_log(const Scenario& scenario, std::size_t index, const fs::pat
   const auto samples = static_cast<Eigen::Index>(std::llround(spec.duration_s / scenario.sample_s));
   const double fine = scenario.sample_s / substeps;
   const Motion motion = play(scenario, spec, fine, samples * substeps);
-  const Eigen::MatrixXd truth = every(predict(scenario.plant, motion.q, motion.dq, motion.ddq, fine), substeps);
+  Eigen::MatrixXd deflections;
+  const Eigen::MatrixXd truth =
+      every(predict(scenario.plant, motion.q, motion.dq, motion.ddq, fine, &deflections), substeps);
 
   Log log;
   log.t = Eigen::VectorXd::LinSpaced(samples, 0, scenario.sample_s * static_cast<double>(samples - 1));
@@ -186,13 +212,20 @@ fs::path simulate_log(const Scenario& scenario, std::size_t index, const fs::pat
     log.ddq = every(motion.ddq, substeps);
   }
   log.tau = truth;
+  if (!scenario.link_encoder.empty()) log.qlink = log.q - every(deflections, substeps);
   Random noise(scenario.seed * 7919 + spec.seed);
   for (Eigen::Index j = 0; j < truth.cols(); ++j) {
     const auto& joint = scenario.plant.robot.joints[static_cast<std::size_t>(j)];
-    if (scenario.encoder_bits > 0) {
+    const auto encode = [&](auto&& column, int bits) {
+      if (bits == 0) return;
       const double unit = joint.type == JointType::revolute ? 2 * std::numbers::pi : 1.0;
-      const double step = unit / std::ldexp(1.0, scenario.encoder_bits);
-      log.q.col(j) = (log.q.col(j) / step).array().round() * step;
+      const double step = unit / std::ldexp(1.0, bits);
+      column = ((column / step).array().round() * step).matrix().eval();
+    };
+    encode(log.q.col(j), scenario.encoder_bits);
+    if (!scenario.link_encoder.empty()) {
+      encode(log.qlink.col(j), scenario.link_encoder_bits);
+      if (!scenario.link_encoder[static_cast<std::size_t>(j)]) log.qlink.col(j).setConstant(std::nan(""));
     }
     const double sigma = scenario.torque_noise * scenario.plant.joints[static_cast<std::size_t>(j)].rated_torque;
     for (Eigen::Index k = 0; k < samples; ++k) log.tau(k, j) += sigma * noise.normal();

@@ -1,14 +1,13 @@
 #pragma once
 
-#include <cmath>
-
 #include "model/effect.hpp"
 
 namespace fxdyn {
 
 /// Elastic gear, delta = compliance * load, load the structural torque behind a damper in parallel with the spring:
-/// K delta + B d(delta)/dt = structural, compliance = 1 / K, relaxation = B / K. Stepped exactly for a torque that is
-/// constant over the tick; starts in equilibrium. Paper Eq. 12 (its J_eff is the rotor_inertia effect). Acts on the
+/// K delta + B d(delta)/dt = structural, compliance = 1 / K, relaxation = B / K. Stepped by the implicit Euler rule:
+/// the load lags a slowly changing torque by the relaxation, whatever the tick, so that a relaxation found at one tick
+/// serves at another. Starts in equilibrium. Paper Eq. 12 (its J_eff is the rotor_inertia effect). Acts on the
 /// position: the link is at q - delta. Link side of the gearbox, in its angle.
 struct Elasticity {
   static constexpr std::string_view name = "elasticity";
@@ -24,8 +23,8 @@ struct Elasticity {
     Torque<N> load{};
     std::uint32_t ticks = 0;  ///< 0 or 1: stepped before
   };
-  static double stored_shape(std::size_t, double relaxation, double tick_s) {
-    return relaxation > 0 ? -std::expm1(-tick_s / relaxation) : 1;
+  static constexpr double stored_shape(std::size_t, double relaxation, double tick_s) {
+    return tick_s / (tick_s + relaxation);
   }
 
   template <class N, class Emit>

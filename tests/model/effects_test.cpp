@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <complex>
+#include <numbers>
 
 #include "host_tools/error.hpp"
 #include "host_tools/export/export.hpp"
@@ -74,7 +75,8 @@ std::vector<double> expected(std::string_view effect, const JointSeries& s, int 
     return {s.total[before] + (place - before) * slope - total};
   }
   if (effect == "elasticity") {  // impulse response of the low-pass, summed over the last forty time constants
-    const double decay = std::exp(-step_s / 0.01);
+    // (implicit Euler: a tick divides what is left by 1 + step / relaxation)
+    const double decay = 1 / (1 + step_s / 0.01);
     double load = s.structural[0] * std::pow(decay, k);
     for (int i = std::max(1, k - 200); i <= k; ++i) load += (1 - decay) * std::pow(decay, k - i) * s.structural[i];
     return {load};
@@ -199,6 +201,58 @@ TEST(Effects, AMotorOfTwoJointsDoesNoWorkOfItsOwn) {
     const double v = a * one.dq[k] + b * two.dq[k], dv = a * one.ddq[k] + b * two.ddq[k];
     const double motor = coulomb * std::tanh(v / width) + viscous * v + inertia * dv;
     ASSERT_NEAR(tau_1[k] * one.dq[k] + tau_2[k] * two.dq[k], motor * v, 1e-11);
+  }
+}
+
+TEST(Effects, CoupledJointsSeeEachOthersMotion) {
+  // Two joints without mass: their torques are those of the coupling.
+  const JointSeries one = random_series(16);
+  IdentifiedModel model;
+  model.robot.gravity.setZero();
+  model.robot.joints.resize(2);
+  model.inertia.resize(2);
+  model.joints.resize(2);
+  Eigen::MatrixXd q(one.q.size(), 2), dq = q, ddq = q;
+  q << one.q, one.peers_dq.col(1);
+  dq << one.dq, one.peers_dq.col(1);
+  ddq << one.ddq, one.peers_ddq.col(1);
+  const Eigen::Vector3d theta(2, 0.3, 0.05);
+  for (std::size_t j = 0; j < 2; ++j) {
+    EffectFit fit;
+    fit.effect = "motor_coupling";
+    fit.shape = {j == 0 ? 2.0 : 1.0, -1, 0.05};
+    fit.linear = {theta[0], theta[1], theta[2]};
+    model.joints[j].effects.push_back(fit);
+  }
+  const Eigen::MatrixXd torque = predict(model, q, dq, ddq, step_s);
+  for (Eigen::Index j = 0; j < 2; ++j) {
+    JointSeries series{q.col(j), dq.col(j), ddq.col(j), {}, step_s};
+    series.peers_dq = series.peers_sign = dq;
+    series.peers_ddq = ddq;
+    const auto& shape = model.joints[static_cast<std::size_t>(j)].effects[0].shape;
+    const Eigen::VectorXd expected = effect_columns("motor_coupling", shape, sign_width, series) * theta;
+    EXPECT_LT((torque.col(j) - expected).cwiseAbs().maxCoeff(), 1e-12) << j;
+  }
+  model.joints[1].effects[0].shape[0] = 2;  // with itself
+  EXPECT_THROW(predict(model, q, dq, ddq, step_s), InputError);
+}
+
+TEST(Effects, ElasticityLagsByItsRelaxationAtAnyTick) {
+  // Against the closed form of a steady oscillation: amplitude 1 / sqrt(1 + (w r)^2), lag atan(w r).
+  const double relaxation = 0.004, w = 2 * std::numbers::pi * 3;
+  for (const double step : {0.0005, 0.002}) {
+    const auto samples = static_cast<Eigen::Index>(2 / step);
+    const Eigen::VectorXd zero = Eigen::VectorXd::Zero(samples);
+    JointSeries series{zero, zero, zero, zero, step};
+    for (Eigen::Index k = 0; k < samples; ++k) series.structural[k] = std::sin(w * step * static_cast<double>(k));
+    const std::vector<double> shape{relaxation};
+    const Eigen::VectorXd load = effect_columns("elasticity", shape, sign_width, series);
+    const double lag = std::atan(w * relaxation), amplitude = std::cos(lag);
+    double most = 0;
+    for (Eigen::Index k = samples / 2; k < samples; ++k) {
+      most = std::max(most, std::fabs(load[k] - amplitude * std::sin(w * step * static_cast<double>(k) - lag)));
+    }
+    EXPECT_LT(most, 0.6 * w * w * relaxation * step) << step;  // second order; the lag itself is 0.075
   }
 }
 
