@@ -85,11 +85,11 @@ project key.toml '[trian]' 'enabled = true'
 run 2 "trian" key.toml
 project state.toml '[train]' 'inputs = "state"' '[[log]]' 'file = "good.csv"' 'role = "train"'
 expect 2 "not built yet" train "$work/state.toml" --out "$work/out"
-project rls.toml '[identify]' 'method = "rls"' '[[log]]' 'file = "good.csv"' 'role = "train"'
-run 2 "rls" rls.toml
+project forgetting.toml '[identify]' 'method = "rls"' 'forgetting = 1.5' '[[log]]' 'file = "good.csv"' 'role = "train"'
+run 2 "at most 1" forgetting.toml
 
 # Effects that a stage can't handle are refused by name; the list shows them all.
-for effect in ripple load_friction torque_gain joint_coupling motor_coupling elasticity payload; do
+for effect in ripple load_friction torque_gain elasticity payload; do
   project effect.toml '[identify]' "effects = [\"viscous\", \"$effect\"]" '[[log]]' 'file = "good.csv"' 'role = "train"'
   run 2 "$effect" effect.toml
 done

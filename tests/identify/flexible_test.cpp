@@ -51,7 +51,13 @@ fs::path play(const std::string& name, const std::string& sensors, const std::st
 
 Log read(const fs::path& file) { return read_log(file, 6, std::vector<bool>(6, true), {}, {}, {}); }
 
-const FilterFit filter{25, 15, 0.3};
+const FilterFit filter = [] {
+  FilterFit fit;
+  fit.position_cutoff_hz = 25;
+  fit.torque_cutoff_hz = 15;
+  fit.edge_s = 0.3;
+  return fit;
+}();
 
 /// The plant's own model: rigid body of the URDF, effects but for those on the position.
 IdentifiedModel truth() {
@@ -220,7 +226,8 @@ TEST(Flexible, TheModelGetsTheGearAsAnEffect) {
     if (joint.found) model.joints[joint.joint].effects.push_back(elasticity_effect(joint));
   }
   Eigen::MatrixXd deflections;
-  predict(model, processed.q, processed.dq, processed.ddq, processed.step_s, &deflections);
+  const MotionRows motion = processed.motion();
+  predict(model, motion.q, motion.dq, motion.ddq, processed.step_s, &deflections);
   for (Eigen::Index j = 0; j < 3; ++j) {
     const Eigen::VectorXd measured = (log.q - log.qlink).col(j);
     const auto inside = [&](const Eigen::VectorXd& x) {
