@@ -240,8 +240,9 @@ double square_error(const Moments& m, const Eigen::VectorXd& beta, const Eigen::
 
 }  // namespace
 
-Solution Fitter::solve(const std::vector<std::size_t>& blocks, const std::vector<const std::vector<Moments>*>& all,
-                       const std::vector<const JointFit*>& design, bool with_std) const {
+NormalEquations Fitter::assemble(const std::vector<std::size_t>& blocks,
+                                 const std::vector<const std::vector<Moments>*>& all,
+                                 const std::vector<const JointFit*>& design) const {
   const auto nb = static_cast<Eigen::Index>(base_.columns.size());
   std::vector<Eigen::Index> offset{nb};
   for (std::size_t j = 0; j < joints(); ++j) offset.push_back(offset.back() + (*all[j])[0].gram.rows() - nb);
@@ -267,6 +268,16 @@ Solution Fitter::solve(const std::vector<std::size_t>& blocks, const std::vector
   }
   gram.triangularView<Eigen::StrictlyLower>() = gram.transpose();
   gram.diagonal() += ridge;
+  return {gram, projection};
+}
+
+Solution Fitter::solve(const std::vector<std::size_t>& blocks, const std::vector<const std::vector<Moments>*>& all,
+                       const std::vector<const JointFit*>& design, bool with_std) const {
+  const auto nb = static_cast<Eigen::Index>(base_.columns.size());
+  std::vector<Eigen::Index> offset{nb};
+  for (std::size_t j = 0; j < joints(); ++j) offset.push_back(offset.back() + (*all[j])[0].gram.rows() - nb);
+  const auto [gram, projection] = assemble(blocks, all, design);
+  const Eigen::Index p = offset.back();
 
   // Equal scales; the small diagonal keeps directions that the data does not excite finite, and the refinement takes
   // its effect out of all others.
@@ -400,6 +411,16 @@ Solution Fitter::fit() const {
     design.push_back(&design_[j]);
   }
   return solve(train_blocks(), all, design, true);
+}
+
+NormalEquations Fitter::normal_equations() const {
+  std::vector<const std::vector<Moments>*> all;
+  std::vector<const JointFit*> design;
+  for (std::size_t j = 0; j < joints(); ++j) {
+    all.push_back(&moments_[j]);
+    design.push_back(&design_[j]);
+  }
+  return assemble(train_blocks(), all, design);
 }
 
 void Fitter::reweight() {

@@ -25,6 +25,12 @@ struct Solution {
   std::vector<Eigen::VectorXd> theta_std;
 };
 
+/// X^T W X and X^T W tau over [beta; all joints' own coefficients in chain order], the ridge of BLS included.
+struct NormalEquations {
+  Eigen::MatrixXd information;
+  Eigen::VectorXd projection;
+};
+
 /// Which blocks fit and which judge. With `validate` logs: train fits, validate judges. Without: every train log is
 /// judged by a fit of the others; a single one is cut into five contiguous blocks.
 struct Split {
@@ -82,6 +88,8 @@ class Fitter {
 
   /// The fit on all train rows.
   Solution fit() const;
+  /// What fit() solves.
+  NormalEquations normal_equations() const;
   IdentifiedModel to_model(const Solution& solution) const;
 
  private:
@@ -93,6 +101,9 @@ class Fitter {
   Eigen::MatrixXd own_columns(std::size_t log, std::size_t joint, const JointFit& design) const;
   std::vector<Moments> moments(std::size_t joint, const JointFit& design) const;
   static Eigen::VectorXd ridge_of(const JointFit& design, double ridge, Eigen::Index count);
+  NormalEquations assemble(const std::vector<std::size_t>& blocks,
+                           const std::vector<const std::vector<Moments>*>& moments,
+                           const std::vector<const JointFit*>& design) const;
   Solution solve(const std::vector<std::size_t>& blocks, const std::vector<const std::vector<Moments>*>& moments,
                  const std::vector<const JointFit*>& design, bool with_std) const;
   /// Joints `first` .. `last` - 1.
