@@ -6,7 +6,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "host_tools/model/effects.hpp"
 #include "host_tools/model/identified_model.hpp"
+#include "model/broad_learning.hpp"
 
 namespace fxdyn {
 namespace {
@@ -24,6 +26,11 @@ constexpr double final_weight = 1e-2;
 /// Distance that a body keeps from the impossible, of the prior: far below what any data tells, far above rounding.
 constexpr double margin = 1e-11;
 constexpr double unbounded_theta = 1e29;
+/// The prior's bodies are as good as unlimited in size until the end: a path from a small prior to a large body would
+/// creep along the edge of what is possible.
+constexpr double pull_on_the_way = 1e-3;
+/// Share of the way to the edge of what is possible that a step may go.
+constexpr double share_of_way = 0.5;
 
 /// The position of each parameter in the upper triangle of P.
 constexpr std::array<std::array<int, 2>, 10> places{
@@ -117,10 +124,12 @@ class Path {
   ConsistentFit run() {
     const double start = excess(y_) / (4.0 * static_cast<double>(p_.prior.size()));
     const double end = final_weight * p_.variance;
-    for (double weight = std::max(start, end);; weight = std::max(end, weight * 0.1)) {
-      centre(weight, weight <= end);
+    for (double weight = std::max(start, end);; weight = std::max(end, weight * 0.2)) {
+      centre(weight, 50, 1e-2);
       if (weight <= end) break;
     }
+    pull_ = 1;
+    centre(end, 200, 1e-12);
     ConsistentFit fit;
     fit.constrained = !reach_target();
     fit.beta = fit.constrained ? y_.head(base_) : target_.head(base_);
@@ -156,7 +165,7 @@ class Path {
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       const Eigen::LLT<Matrix4d> llt(bodies[i] - margin * p_.prior[i]);
       if (llt.info() != Eigen::Success) return INFINITY;
-      sum += (prior_inverse_[i] * bodies[i]).trace();
+      sum += pull_ * (prior_inverse_[i] * bodies[i]).trace();
       for (int k = 0; k < 4; ++k) sum -= 2 * std::log(llt.matrixLLT()(k, k));
     }
     for (Index i = 0; i < thetas_; ++i) {
@@ -175,7 +184,7 @@ class Path {
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       const Index at = static_cast<Index>(i) * ten;
       const Matrix4d inverse = (bodies[i] - margin * p_.prior[i]).inverse();
-      of_pi.segment(at, ten) = inner(prior_inverse_[i] - inverse);
+      of_pi.segment(at, ten) = inner(pull_ * prior_inverse_[i] - inverse);
       map.middleRows(at, ten) = barrier_hessian(inverse) * map_.middleRows(at, ten);
     }
     gradient.setZero(y.size());
@@ -194,7 +203,7 @@ class Path {
 
   /// Largest step that stays inside, at most 1.
   double longest(const VectorXd& step) const {
-    double t = 1 / 0.9;
+    double t = 1 / share_of_way;
     const auto bodies = matrices(y_), moves = matrices(step);
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix4d> solver(moves[i], bodies[i] - margin * p_.prior[i],
@@ -207,13 +216,11 @@ class Path {
       if (has_lower(i) && d < 0) t = std::min(t, (p_.lower[i] - value) / d);
       if (has_upper(i) && d > 0) t = std::min(t, (p_.upper[i] - value) / d);
     }
-    return std::min(1.0, 0.9 * t);
+    return std::min(1.0, share_of_way * t);
   }
 
   /// Newton to the minimum of the error + weight * barrier.
-  void centre(double weight, bool last) {
-    const int rounds = last ? 200 : 50;
-    const double enough = last ? 1e-16 : 1e-2;
+  void centre(double weight, int rounds, double enough) {
     VectorXd gradient;
     MatrixXd hessian;
     for (int round = 0; round < rounds; ++round) {
@@ -259,7 +266,7 @@ class Path {
       if (free > 0) {
         const VectorXd slope = gradient.segment(base_, free) + hessian.block(base_, 0, free, base_) * step.head(base_);
         step.segment(base_, free) = -least_squares(hessian.block(base_, base_, free, free), slope);
-        if (there && -slope.dot(step.segment(base_, free)) < 1e-16) break;
+        if (there && -slope.dot(step.segment(base_, free)) < 1e-12) break;
       } else if (there) {
         break;
       }
@@ -291,6 +298,7 @@ class Path {
   }
 
   const ConsistentProblem& p_;
+  double pull_ = pull_on_the_way;  ///< factor of tr(P0^-1 P)
   Index base_ = 0, bodies_ = 0, thetas_ = 0;
   std::vector<Index> others_;
   MatrixXd map_;
@@ -469,6 +477,37 @@ PhysicalFit fit_physical(const PhysicalProblem& problem) {
   }
   fit.share = shares(problem, data, prior.bodies, fit.inertia);
   return fit;
+}
+
+PhysicalFit fit_physical(const Fitter& fitter, const Robot& robot, double variance) {
+  const DhChain chain = to_dh(robot);
+  NormalEquations equations = fitter.normal_equations();
+  const Index m = equations.information.rows() - static_cast<Index>(fitter.base().columns.size());
+  VectorXd lower = VectorXd::Constant(m, -unbounded), upper = -lower;
+  Index at = 0;
+  for (std::size_t j = 0; j < fitter.joints(); ++j) {
+    const JointFit& design = fitter.design(j);
+    for (const EffectFit& fit : design.effects) {
+      for (const ParameterInfo& parameter : find_effect(fit.effect)->linear) {
+        lower[at] = parameter.lower;
+        upper[at++] = parameter.upper;
+      }
+    }
+    if (design.bls) at += design.bls->nodes() + static_cast<Index>(BroadLearningLayout::inputs);
+  }
+  return fit_physical({robot, chain, fitter.base(), std::move(equations.information), std::move(equations.projection),
+                       lower, upper, variance});
+}
+
+Solution physical_solution(const Fitter& fitter, const PhysicalFit& fit) {
+  Solution solution = fitter.fit();
+  solution.beta = fit.beta;
+  Index at = 0;
+  for (VectorXd& theta : solution.theta) {
+    theta = fit.theta.segment(at, theta.size()).eval();
+    at += theta.size();
+  }
+  return solution;
 }
 
 MassCheck mass_check(const Robot& robot, const DhChain& chain, const PhysicalFit& fit) {

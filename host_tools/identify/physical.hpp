@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/identify/fitter.hpp"
 #include "host_tools/identify/regressor.hpp"
 #include "host_tools/robot/robot.hpp"
 
@@ -76,6 +77,12 @@ struct PhysicalFit {
 /// Prior: the URDF's inertias where it has them; for other links solid ellipsoids of one density around the segment to
 /// the next joint, the density that fits the data best.
 PhysicalFit fit_physical(const PhysicalProblem& problem);
+
+/// The same of a fitter whose weights are one over the residuals' variance; coefficients keep the bounds of the
+/// catalogue (those of a BLS have none).
+PhysicalFit fit_physical(const Fitter& fitter, const Robot& robot, double variance = 1);
+/// The fitter's solution with beta and theta of the physical fit in place of its own.
+Solution physical_solution(const Fitter& fitter, const PhysicalFit& fit);
 
 /// Masses and centres of the fit beside the URDF's, in the links' URDF frames.
 struct LinkMass {

@@ -111,7 +111,9 @@ TEST(Physical, DataThatPossibleBodiesExplainKeepsItsLeastSquaresSolution) {
       const VectorXd from_bodies = e.base.grouping * all_parameters(fit);
       EXPECT_LT((from_bodies - fit.beta).norm(), 1e-11 * all_parameters(fit).norm());
       // With the truth as prior, the null space is the truth's.
-      if (with_prior) EXPECT_LT((all_parameters(fit) - e.parameters).norm(), 1e-6 * e.parameters.norm());
+      if (with_prior) {
+        EXPECT_LT((all_parameters(fit) - e.parameters).norm(), 1e-6 * e.parameters.norm());
+      }
     }
   }
 }
