@@ -21,8 +21,9 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr auto ten = static_cast<Index>(parameters_per_link);
-/// Weight of the prior at the end, of one independent row.
-constexpr double final_weight = 1e-2;
+/// Weight of the prior at the end, of one row of the data: with it the prior's standard deviations are about as large
+/// as its values (see DataShare). Far less would let bodies that the data hardly sees grow to any mass.
+constexpr double final_weight = 1;
 /// Distance that a body keeps from the impossible, of the prior: far below what any data tells, far above rounding.
 constexpr double margin = 1e-11;
 constexpr double unbounded_theta = 1e29;
