@@ -155,12 +155,8 @@ TEST(Physical, NoisyDataGivesPossibleBodiesAtLittleCost) {
     expect_possible(fit);
     constrained += fit.constrained;
     EXPECT_GE(fit.theta.minCoeff(), 0);
-    const VectorXd z = least_squares(problem.information, problem.projection);
-    const double free = e.rms_error(z.head(e.beta.size()), z.tail(e.theta.size()));
-    EXPECT_LT(e.rms_error(fit.beta, fit.theta), 1.01 * free);
-    // Truth is possible: keeping to what is possible can't take the estimate away from it.
-    EXPECT_LT((e.x.leftCols(e.beta.size()) * (fit.beta - e.beta)).norm(),
-              1.02 * (e.x.leftCols(e.beta.size()) * (z.head(e.beta.size()) - e.beta)).norm());
+    // The truth is possible and is the prior, so the best possible bodies fit the data at least as well as it does.
+    EXPECT_LE(e.rms_error(fit.beta, fit.theta), (1 + 1e-9) * e.rms_error(e.beta, e.theta));
   }
   EXPECT_GE(constrained, 6);
 }
