@@ -6,8 +6,10 @@
 #include <chrono>
 
 #include "host_tools/identify/identify.hpp"
+#include "host_tools/identify/plausible.hpp"
 #include "host_tools/model/evaluator.hpp"
 #include "host_tools/report/metrics.hpp"
+#include "host_tools/robot/write_urdf.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/files.hpp"
 
@@ -15,6 +17,19 @@ namespace fxdyn {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// Nominal effects, the widths as they start.
+std::vector<JointFit> nominal(const Project& project, const GateData& data) {
+  std::vector<JointFit> joints = initial_joints(project, data);
+  for (JointFit& joint : joints) {
+    for (const char* name : {"viscous", "coulomb", "offset"}) {
+      EffectFit effect;
+      effect.effect = name;
+      joint.effects.push_back(effect);
+    }
+  }
+  return joints;
+}
 
 class RealPhysical : public testing::TestWithParam<const char*> {};
 
@@ -58,6 +73,57 @@ TEST_P(RealPhysical, HeldOutErrorStaysWithinTwoPercentOfTheUnconstrainedFit) {
                link.identified.mass, link.share.mass, link.identified.centre.x(), link.identified.centre.y(),
                link.identified.centre.z(), link.share.centre.x(), link.share.centre.y(), link.share.centre.z());
   }
+}
+
+TEST_P(RealPhysical, TheWrittenUrdfHasTheFitsTorque) {
+  const std::string set = GetParam();
+  if (!test::data_is_there(set)) GTEST_SKIP();
+  const fs::path out = test::folder() / (set + "_urdf");
+  const Project project = read_project(fs::path(FXDYN_SOURCE_DIR) / "tests" / "real" / (set + ".toml"));
+  GateData data = read_gate_data(project, out);
+  const Fitter fitter(project.robot, data.logs, nominal(project, data));
+  const PhysicalFit fit = fit_physical(fitter, project.robot);
+  const DhChain chain = to_dh(project.robot);
+  write_urdf(project.urdf, out / "identified.urdf", project.robot, chain, fit.inertia);
+  Robot back = read_urdf(out / "identified.urdf");
+  back.gravity = project.robot.gravity;
+  IdentifiedModel from_fit, from_urdf;
+  from_fit.robot = from_urdf.robot = back;
+  from_fit.inertia = fit.inertia;
+  for (std::size_t i = 0; i < back.size(); ++i)
+    from_urdf.inertia.push_back(to_link_inertia(*back.joints[i].inertial, chain.urdf_in_dh[i]));
+  from_fit.joints.resize(back.size());
+  from_urdf.joints.resize(back.size());
+  const ProcessedLog& log = data.logs.front();
+  const Eigen::MatrixXd expected = predict(from_fit, log.q, log.dq, log.ddq, log.step_s);
+  EXPECT_LT((predict(from_urdf, log.q, log.dq, log.ddq, log.step_s) - expected).norm(), 1e-9 * expected.norm());
+}
+
+TEST_P(RealPhysical, TheChecksNameATurnedSignAndNothingElse) {
+  const std::string set = GetParam();
+  if (!test::data_is_there(set)) GTEST_SKIP();
+  const Project project = read_project(fs::path(FXDYN_SOURCE_DIR) / "tests" / "real" / (set + ".toml"));
+  const GateData data = read_gate_data(project, test::folder());
+  const auto joints = initial_joints(project, data);
+  for (const Suspicion& suspicion : check_plausible(project.robot, data.logs, joints)) ADD_FAILURE() << suspicion.text;
+  int named = 0;
+  const auto n = static_cast<Eigen::Index>(joints.size());
+  for (Eigen::Index j = 0; j < n; ++j) {
+    std::vector<ProcessedLog> logs = data.logs;
+    for (ProcessedLog& log : logs) log.tau.col(j) *= -1;
+    for (const Suspicion& suspicion : check_plausible(project.robot, logs, joints)) {
+      fmt::print("  {} joint {} turned: {}\n", set, j + 1, suspicion.text);
+      if (suspicion.severity == Severity::error) {
+        EXPECT_EQ(suspicion.joint.value_or(0), static_cast<std::size_t>(j));
+        ++named;
+      }
+    }
+  }
+  EXPECT_EQ(named, n);
+  std::vector<ProcessedLog> logs = data.logs;
+  for (ProcessedLog& log : logs) log.tau *= 1000;
+  for (const Suspicion& suspicion : check_plausible(project.robot, logs, joints))
+    fmt::print("  {} x1000: {}\n", set, suspicion.text);
 }
 
 INSTANTIATE_TEST_SUITE_P(Sets, RealPhysical, testing::Values("emps", "kuka_kr300", "staubli_tx40", "ur10_unisa"),
