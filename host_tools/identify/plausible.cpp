@@ -24,14 +24,15 @@ constexpr double worth_a_flip = 1;
 /// Residuals below this share of the torque's RMS count as this: perfect fits are not better than perfect.
 constexpr double perfect = 1e-3;
 constexpr double sure = 5;  ///< standard deviations
+/// Shares of the torque's RMS that friction and inertia must have to be worth a word.
+constexpr double material_friction = 0.05, material_inertia = 0.2;
 /// The least mass that fits gravity and inertia, for a robot that reaches 1 m; robots of one kind grow with the cube.
-/// Real arms: 5 .. 50 kg/m^3.
-constexpr double heaviest = 3000, lightest = 0.05;
+/// Real arms: 2 .. 70 kg/m^3.
+constexpr double heaviest = 1000, lightest = 0.1;
 constexpr double shortest = 0.3;  ///< what counts as the reach of anything smaller [m]
 
 struct Estimate {
   double value = 0, std = 0;
-  bool negative() const { return value < -sure * std; }
 };
 
 /// Rows of all joints over a few hundred samples, the columns' gravity part apart.
@@ -67,12 +68,14 @@ class Rows {
       own_inertia_.emplace_back(rows, nb);
     }
     const VectorXd zero = VectorXd::Zero(n_);
+    accelerations_ = zero;
     for (Index k = 0; k < rows; ++k) {
       const ProcessedLog& log = *of[static_cast<std::size_t>(k)];
       const Index i = at[static_cast<std::size_t>(k)];
       const VectorXd q = log.q.row(i), dq = log.dq.row(i), ddq = log.ddq.row(i);
       const MatrixXd still = regressor(q, zero, zero)(Eigen::all, base_.columns);
       const MatrixXd moving = regressor(q, dq, ddq)(Eigen::all, base_.columns);
+      accelerations_ += ddq.cwiseAbs2();
       for (Index j = 0; j < n_; ++j) {
         const auto joint = static_cast<std::size_t>(j);
         gravity_[joint].row(k) = still.row(j);
@@ -176,6 +179,7 @@ class Rows {
   double gravity_of(const VectorXd& pi, Index j) const {
     return (gravity_[static_cast<std::size_t>(j)] * (base_.grouping * pi)).cwiseAbs().maxCoeff();
   }
+  double acceleration_rms(Index j) const { return std::sqrt(accelerations_[j] / static_cast<double>(tau_.rows())); }
   double torque_rms(Index j) const {
     return std::sqrt(squares_[static_cast<std::size_t>(j)] / static_cast<double>(tau_.rows()));
   }
@@ -201,6 +205,7 @@ class Rows {
   BaseSet base_;
   std::vector<bool> has_rotor_;
   MatrixXd tau_;
+  VectorXd accelerations_;  ///< sum of squares
   std::vector<MatrixXd> moving_, gravity_, own_, own_inertia_;
   std::vector<MatrixXd> grams_[2];
   std::vector<VectorXd> projections_[2];
@@ -316,23 +321,32 @@ std::vector<Suspicion> check_plausible(const Robot& robot, const std::vector<Pro
     double share = 0;
     const Estimate inertia = rows.inertia(fit, j, share);
     const Estimate friction = rows.friction(fit, j);
-    const bool known = std::fabs(inertia.value) > sure * inertia.std;
     const auto at = static_cast<std::size_t>(j);
-    if (inertia.negative() && share > 0.9) {
+    const bool revolute = robot.joints[at].type == JointType::revolute;
+    const bool heavy = std::fabs(inertia.value) > sure * inertia.std;
+    const bool rubs = std::fabs(friction.value) > sure * friction.std &&
+                      std::fabs(friction.value) > material_friction * rows.torque_rms(j);
+    const std::string of_inertia = fmt::format("its own inertia comes out as {:.3g} +- {:.2g} {}", inertia.value,
+                                               inertia.std, revolute ? "kg m^2" : "kg");
+    const std::string of_friction = fmt::format("its friction comes out as {:.3g} +- {:.2g} {}", friction.value,
+                                                friction.std, robot.joints[at].torque_unit());
+    const bool light = heavy && inertia.value < 0 && share > 0.9, drives = rubs && friction.value < 0;
+    // A turned sign turns both: where one is negative and the other is surely not, the model is what is wrong.
+    if (light && !(rubs && !drives)) {
       signs[j] = -signs[j];
-      const char* unit = robot.joints[at].type == JointType::revolute ? "kg m^2" : "kg";
-      why[at] = fmt::format("its own inertia comes out as {:.3g} +- {:.2g} {}", inertia.value, inertia.std, unit);
-    } else if (friction.negative() && -friction.value > 0.05 * rows.torque_rms(j)) {
-      const std::string what = fmt::format("its friction comes out as {:.3g} +- {:.2g} {}", friction.value,
-                                           friction.std, robot.joints[at].torque_unit());
-      if (!known) {
-        signs[j] = -signs[j];
-        why[at] = what;
-      } else {
-        out.push_back({Severity::warning, at,
-                       fmt::format("{}: {}, which brakes no joint: is an effect missing, or is its velocity wrong?",
-                                   title(robot, at), what)});
-      }
+      why[at] = of_inertia;
+    } else if (drives && !(heavy && !light)) {
+      signs[j] = -signs[j];
+      why[at] = of_friction;
+    } else if (light && -inertia.value * rows.acceleration_rms(j) > material_inertia * rows.torque_rms(j)) {
+      out.push_back({Severity::warning, at,
+                     fmt::format("{}: {}, though its friction has the right sign: is the kinematics that of the robot, "
+                                 "or an effect missing?",
+                                 title(robot, at), of_inertia)});
+    } else if (drives) {
+      out.push_back({Severity::warning, at,
+                     fmt::format("{}: {}, which brakes no joint: is an effect missing, or is its velocity wrong?",
+                                 title(robot, at), of_friction)});
     }
   }
   if (fit.up < 0) {
