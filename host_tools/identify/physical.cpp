@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "host_tools/model/effects.hpp"
@@ -395,40 +396,46 @@ Prior make_prior(const PhysicalProblem& problem, const Reduced& data) {
   return prior;
 }
 
-std::vector<DataShare> shares(const PhysicalProblem& problem, const Reduced& data, const std::vector<Matrix4d>& prior,
-                              const std::vector<LinkInertia<Real>>& inertia) {
+/// Fills in what the data decided.
+void add_shares(const PhysicalProblem& problem, const Reduced& data, const std::vector<Matrix4d>& prior,
+                PhysicalFit& fit) {
   const Index all = problem.base.grouping.cols();
   MatrixXd before = MatrixXd::Zero(all, all);  // covariance of the prior
   for (std::size_t i = 0; i < prior.size(); ++i) {
     const Index at = static_cast<Index>(i) * ten;
     before.block(at, at, ten, ten) = barrier_hessian(prior[i].inverse()).inverse();
   }
-  // information = root^T root; covariance after = before - before G^T root^T (1 + root G before G^T root^T)^-1 ...
+  // information = root^T root, S = root G: covariance after = before - (S before)^T (1 + S before S^T)^-1 (S before)
   const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(data.information / problem.variance);
   const MatrixXd seen = solver.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() * solver.eigenvectors().transpose() *
                         problem.base.grouping;
   const MatrixXd seen_before = seen * before;
   const Eigen::LLT<MatrixXd> llt(MatrixXd::Identity(seen.rows(), seen.rows()) + seen_before * seen.transpose());
-  const auto share = [&](Index at, const VectorXd& direction) {
-    const VectorXd gain = seen_before.middleCols(at, ten) * direction;
-    const double taken = llt.matrixL().solve(gain).squaredNorm();
-    return std::clamp(taken / direction.dot(before.block(at, at, ten, ten) * direction), 0.0, 1.0);
+  const auto share = [&](const VectorXd& direction) {
+    const double taken = llt.matrixL().solve(seen_before * direction).squaredNorm();
+    return std::clamp(taken / direction.dot(before * direction), 0.0, 1.0);
   };
-  std::vector<DataShare> out(prior.size());
+  fit.share.resize(prior.size());
+  VectorXd total = VectorXd::Zero(all);
   for (std::size_t i = 0; i < prior.size(); ++i) {
     const Index at = static_cast<Index>(i) * ten;
-    out[i].mass = share(at, VectorXd::Unit(ten, 0));
-    const LinkInertia<Real>& link = inertia[i];
+    total[at] = 1;
+    fit.share[i].mass = share(VectorXd::Unit(all, at));
+    const LinkInertia<Real>& link = fit.inertia[i];
     const Vector3d centre = Vector3d(link.h.x, link.h.y, link.h.z) / link.m;
     for (int axis = 0; axis < 3; ++axis) {
       const Vector3d u = problem.chain.urdf_in_dh[i].linear().col(axis);
-      VectorXd direction = VectorXd::Zero(ten);
-      direction[0] = -u.dot(centre);
-      direction.segment(1, 3) = u;
-      out[i].centre[axis] = share(at, direction);
+      VectorXd direction = VectorXd::Zero(all);
+      direction.segment(at + 1, 3) = u;
+      // m c about the URDF frame's origin o is h - m o
+      VectorXd moment = direction;
+      moment[at] = -u.dot(problem.chain.urdf_in_dh[i].translation());
+      fit.share[i].first_moment[axis] = share(moment);
+      direction[at] = -u.dot(centre);
+      fit.share[i].centre[axis] = share(direction);
     }
   }
-  return out;
+  fit.mass_share = share(total);
 }
 
 }  // namespace
@@ -476,7 +483,7 @@ PhysicalFit fit_physical(const PhysicalProblem& problem) {
         Eigen::SelfAdjointEigenSolver<Matrix4d>(body, Eigen::EigenvaluesOnly).eigenvalues()[0]);
     fit.mass += body(3, 3);
   }
-  fit.share = shares(problem, data, prior.bodies, fit.inertia);
+  add_shares(problem, data, prior.bodies, fit);
   return fit;
 }
 
@@ -514,6 +521,7 @@ Solution physical_solution(const Fitter& fitter, const PhysicalFit& fit) {
 MassCheck mass_check(const Robot& robot, const DhChain& chain, const PhysicalFit& fit) {
   MassCheck check;
   check.mass = fit.mass;
+  check.mass_share = fit.mass_share;
   check.urdf_mass = 0;
   for (std::size_t i = 0; i < robot.size(); ++i) {
     const Joint& joint = robot.joints[i];
@@ -524,6 +532,42 @@ MassCheck mass_check(const Robot& robot, const DhChain& chain, const PhysicalFit
       check.urdf_mass.reset();
   }
   return check;
+}
+
+nlohmann::json physical_json(const Robot& robot, const DhChain& chain, const PhysicalFit& fit) {
+  using nlohmann::json;
+  const MassCheck check = mass_check(robot, chain, fit);
+  const auto entry = [](double value, const char* unit, double share) {
+    return json{{"value", value}, {"unit", unit}, {"data_share", share}, {"determined", share >= determined_share}};
+  };
+  json links = json::array();
+  for (std::size_t i = 0; i < check.links.size(); ++i) {
+    const LinkMass& link = check.links[i];
+    const Vector3d moment = link.identified.mass * link.identified.centre;
+    json centre = json::array(), first_moment = json::array();
+    for (int k = 0; k < 3; ++k) {
+      centre.push_back(entry(link.identified.centre[k], "m", link.share.centre[k]));
+      first_moment.push_back(entry(moment[k], "kg m", link.share.first_moment[k]));
+    }
+    links.push_back({{"link", link.link},
+                     {"index", i + 1},
+                     {"mass", entry(link.identified.mass, "kg", link.share.mass)},
+                     {"centre", centre},
+                     {"first_moment", first_moment},
+                     {"smallest_eigenvalue", fit.smallest_eigenvalue[i]}});
+    if (link.urdf) {
+      const Vector3d given = link.urdf->mass * link.urdf->centre;
+      links.back()["urdf"] = {{"mass", link.urdf->mass},
+                              {"centre", std::vector<double>(link.urdf->centre.begin(), link.urdf->centre.end())},
+                              {"first_moment", std::vector<double>(given.begin(), given.end())}};
+    }
+  }
+  json out = {{"constrained", fit.constrained},
+              {"prior", fit.prior},
+              {"mass", entry(check.mass, "kg", check.mass_share)},
+              {"links", links}};
+  if (check.urdf_mass) out["urdf_mass"] = *check.urdf_mass;
+  return out;
 }
 
 }  // namespace fxdyn

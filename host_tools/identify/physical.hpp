@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -59,7 +61,9 @@ struct PhysicalProblem {
 /// standard deviation of about its own size. 0: the value is the prior's.
 struct DataShare {
   double mass = 0;
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< x, y, z of the link's URDF frame
+  // x, y, z of the link's URDF frame
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  Eigen::Vector3d first_moment = Eigen::Vector3d::Zero();  ///< m c, what gravity acts on
 };
 /// From here on a parameter counts as determined by the data.
 inline constexpr double determined_share = 0.99;
@@ -70,8 +74,9 @@ struct PhysicalFit {
   bool constrained = false;                 ///< false: beta and theta are the unconstrained solution itself
   std::vector<double> smallest_eigenvalue;  ///< of each pseudo-inertia
   std::vector<DataShare> share;
-  std::string prior;  ///< what it was, for people
-  double mass = 0;    ///< of all links together [kg]; see share for what it is worth
+  std::string prior;      ///< what it was, for people
+  double mass = 0;        ///< of all links together [kg]
+  double mass_share = 0;  ///< how much of that the data decided
 };
 
 /// Prior: the URDF's inertias where it has them; for other links solid ellipsoids of one density around the segment to
@@ -93,9 +98,13 @@ struct LinkMass {
 };
 struct MassCheck {
   std::vector<LinkMass> links;
-  double mass = 0;
+  double mass = 0, mass_share = 0;
   std::optional<double> urdf_mass;  ///< where all links have an inertia there
 };
 MassCheck mass_check(const Robot& robot, const DhChain& chain, const PhysicalFit& fit);
+
+/// The same with the prior and what the data decided of it, for metrics and report: every mass, centre and first moment
+/// m c (what gravity acts on) with its share, the URDF's beside it.
+nlohmann::json physical_json(const Robot& robot, const DhChain& chain, const PhysicalFit& fit);
 
 }  // namespace fxdyn

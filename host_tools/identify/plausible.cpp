@@ -358,16 +358,15 @@ std::vector<Suspicion> check_plausible(const Robot& robot, const std::vector<Pro
     out.push_back(
         {Severity::error,
          {},
-         fmt::format("torque has the wrong sign on all joints (joint 1: {}): set torque_gain = -1 for each", why[0])});
+         fmt::format("torque has the wrong sign on all joints (joint 1: {}): make each torque_gain negative", why[0])});
   } else {
     for (Index j = 0; j < n; ++j) {
       const auto at = static_cast<std::size_t>(j);
       if (signs[j] > 0) continue;
-      out.push_back(
-          {Severity::error, at,
-           fmt::format("torque of {} has the wrong sign: {}; set its torque_gain to -1, or turn its axis in the "
-                       "URDF and the sign of q",
-                       title(robot, at), why[at])});
+      out.push_back({Severity::error, at,
+                     fmt::format("torque of {} has the wrong sign: {}; make its torque_gain negative (or its q, if "
+                                 "that is what is turned)",
+                                 title(robot, at), why[at])});
     }
   }
   const bool signs_differ = (signs - fit.signs).norm() > 0;

@@ -200,7 +200,37 @@ TEST(Physical, TellsWhatTheDataDecides) {
   EXPECT_FALSE(check.urdf_mass);
   EXPECT_NEAR(check.links[0].identified.mass + check.links[1].identified.mass, check.mass, 1e-9);
   // m c is what the torque sees of the last link
+  EXPECT_GT(fit.share[1].first_moment.x(), determined_share);
+  EXPECT_LT(fit.share[1].first_moment.y(), 1e-6);
   EXPECT_NEAR(check.links[1].identified.mass * check.links[1].identified.centre.x(), 0.75, 0.05);
+}
+
+TEST(Physical, MotionThatSeesLittleLeavesTheRestToThePrior) {
+  test::Chains chains(12);
+  const Robot robot = chains.robot(6, false);
+  Experiment e(robot, 0.02, 5);
+  // joints 3 to 6 as if they had never been recorded
+  for (Index k = 0; k < e.x.rows(); ++k) {
+    if (k % 6 < 2) continue;
+    e.x.row(k).setZero();
+    e.tau[k] = 0;
+  }
+  PhysicalProblem problem = e.problem();
+  const PhysicalFit fit = fit_physical(problem);
+  expect_possible(fit);
+  EXPECT_TRUE(fit.beta.allFinite());
+  EXPECT_LE(e.rms_error(fit.beta, fit.theta), (1 + 1e-9) * e.rms_error(e.beta, e.theta));
+  // one scale of torque for all: masses scale, nothing else
+  const PhysicalFit scaled = [&] {
+    Robot heavy = robot;
+    for (Joint& joint : heavy.joints) {
+      joint.inertial->mass *= 1000;
+      joint.inertial->tensor *= 1000;
+    }
+    return fit_physical({heavy, e.chain, e.base, problem.information / 1e6, problem.projection / 1e3, problem.lower,
+                         problem.upper, problem.variance});
+  }();
+  EXPECT_LT((all_parameters(scaled) / 1000 - all_parameters(fit)).norm(), 1e-5 * all_parameters(fit).norm());
 }
 
 TEST(Physical, InertialGoesToTheDhFrameAndBack) {

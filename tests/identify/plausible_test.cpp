@@ -131,6 +131,17 @@ TEST(Plausible, KnowsWhenAllAreWrong) {
   EXPECT_NE(list[0].text.find("all joints"), std::string::npos) << list[0].text;
 }
 
+TEST(Plausible, KnowsASingleAxis) {
+  Robot robot = puma();
+  robot.joints.resize(1);
+  EXPECT_TRUE(Simulated(robot, 6).check().empty());
+  Simulated s(robot, 6);
+  s.log.tau *= -1;
+  const auto list = s.check_with(without_inertias(robot));
+  ASSERT_EQ(list.size(), 1U) << errors(list);
+  EXPECT_EQ(list[0].joint, 0U);
+}
+
 TEST(Plausible, KnowsGravityThatPointsUp) {
   const Simulated s(puma(), 4);
   Robot robot = without_inertias(puma());
