@@ -47,6 +47,7 @@ struct Rows {
   std::vector<MatrixXd> columns;  ///< a joint: rows x (10 + 2)
   std::vector<VectorXd> missing;  ///< a joint: torque that the model does not explain
   VectorXd gravity;               ///< a joint: largest gravity torque of 1 kg within 1 m of the last link's frame
+  double lifted = 0;              ///< the same of 1 kg in that frame's origin, over all joints
 };
 
 Rows build_rows(const IdentifiedModel& model, const DhChain& chain, const ProcessedLog& log) {
@@ -65,7 +66,9 @@ Rows build_rows(const IdentifiedModel& model, const DhChain& chain, const Proces
     const MatrixXd still = sampled ? MatrixXd(regressor(log.q.row(k), rest, rest).rightCols(ten) * map) : MatrixXd();
     for (Index j = 0; j < n; ++j) {
       full[static_cast<std::size_t>(j)].row(k).head(ten) = moving.row(j);
-      if (sampled) rows.gravity[j] = std::max(rows.gravity[j], still.row(j).head(4).cwiseAbs().maxCoeff());
+      if (!sampled) continue;
+      rows.gravity[j] = std::max(rows.gravity[j], still.row(j).head(4).cwiseAbs().maxCoeff());
+      rows.lifted = std::max(rows.lifted, std::fabs(still(j, 0)));
     }
   }
   for (Index j = 0; j < n; ++j) {
@@ -183,7 +186,8 @@ std::array<bool, 10> told(const Fit& fit) {
 }
 
 /// The joint to move for a better view of the load.
-std::string what_to_move(const Robot& robot, const ProcessedLog& log, const VectorXd& gravity) {
+std::string what_to_move(const Robot& robot, const ProcessedLog& log, const Rows& rows) {
+  const VectorXd& gravity = rows.gravity;
   Index best = -1;
   double smallest = 0;
   for (Index j = 0; j < gravity.size(); ++j) {
@@ -196,6 +200,8 @@ std::string what_to_move(const Robot& robot, const ProcessedLog& log, const Vect
   }
   if (best < 0)
     return "no joint of this robot lifts the load, so only its acceleration shows it: accelerate more, or weigh it";
+  if (rows.lifted < 0.1)
+    return "no joint of this robot lifts the axis of the last one, so gravity shows mass times distance only: weigh it";
   return fmt::format("move joint {} ({}, {:.2g} rad here) and the others that lift the load over a wider range",
                      best + 1, robot.joints[static_cast<std::size_t>(best)].name, smallest);
 }
@@ -245,11 +251,11 @@ LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log) {
   const double mass = fit.solution[0], mass_std = std::sqrt(std::max(0.0, fit.covariance(0, 0)));
   if (!apart[0]) {
     throw DataError(fmt::format("{}: the mass of the load can't be told from this motion: {}", log.name,
-                                what_to_move(model.robot, log, rows.gravity)));
+                                what_to_move(model.robot, log, rows)));
   }
   if (!(mass > 0) || mass_std > largest_uncertainty * mass) {
     throw DataError(fmt::format("{}: no load to be seen: mass {:.3g} kg, standard deviation {:.3g} kg; {}", log.name,
-                                mass, mass_std, what_to_move(model.robot, log, rows.gravity)));
+                                mass, mass_std, what_to_move(model.robot, log, rows)));
   }
 
   Vector3d centre = Vector3d::Zero();

@@ -31,6 +31,8 @@ constexpr double unbounded_theta = 1e29;
 /// The prior's bodies are as good as unlimited in size until the end: a path from a small prior to a large body would
 /// creep along the edge of what is possible.
 constexpr double pull_on_the_way = 1e-3;
+/// A coefficient that is zero comes out within this root of its standard deviation.
+constexpr double edge_at_the_end = 1e-4;
 /// Share of the way to the edge of what is possible that a step may go.
 constexpr double share_of_way = 0.5;
 
@@ -131,6 +133,7 @@ class Path {
       if (weight <= end) break;
     }
     pull_ = 1;
+    edge_ = edge_at_the_end;
     centre(end, 200, 1e-12);
     ConsistentFit fit;
     fit.constrained = !reach_target();
@@ -160,8 +163,8 @@ class Path {
     const VectorXd d = deviation(y);
     return 0.5 * d.dot(p_.information * d);
   }
-  /// Divergence from the prior (but for constants) and barriers of theta; infinite outside.
-  double barrier(const VectorXd& y) const {
+  /// Divergence from the prior (but for constants); infinite outside.
+  double barrier_of_bodies(const VectorXd& y) const {
     double sum = 0;
     const auto bodies = matrices(y);
     for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -170,12 +173,18 @@ class Path {
       sum += pull_ * (prior_inverse_[i] * bodies[i]).trace();
       for (int k = 0; k < 4; ++k) sum -= 2 * std::log(llt.matrixLLT()(k, k));
     }
+    return sum;
+  }
+  /// The same with barriers of theta.
+  double barrier(const VectorXd& y) const {
+    double sum = barrier_of_bodies(y);
     for (Index i = 0; i < thetas_; ++i) {
       const double value = y[bodies_ + i];
-      if (has_lower(i)) sum -= value > p_.lower[i] ? std::log(value - p_.lower[i]) : -INFINITY;
-      if (has_upper(i)) sum -= value < p_.upper[i] ? std::log(p_.upper[i] - value) : -INFINITY;
+      if ((has_lower(i) && value <= p_.lower[i]) || (has_upper(i) && value >= p_.upper[i])) return INFINITY;
+      if (has_lower(i)) sum -= edge_ * std::log(value - p_.lower[i]);
+      if (has_upper(i)) sum -= edge_ * std::log(p_.upper[i] - value);
     }
-    return std::isnan(sum) ? INFINITY : sum;
+    return sum;
   }
 
   /// Gradient and Hessian of the barrier.
@@ -197,8 +206,8 @@ class Path {
       const Index k = bodies_ + i;
       for (const double distance :
            {has_lower(i) ? y[k] - p_.lower[i] : INFINITY, has_upper(i) ? y[k] - p_.upper[i] : -INFINITY}) {
-        gradient[k] -= 1 / distance;
-        hessian(k, k) += 1 / (distance * distance);
+        gradient[k] -= edge_ / distance;
+        hessian(k, k) += edge_ / (distance * distance);
       }
     }
   }
@@ -259,7 +268,6 @@ class Path {
     VectorXd gradient;
     MatrixXd hessian;
     bool there = false;
-    // theta's barriers are of no use any more
     y_.tail(thetas_) = target_.tail(thetas_);
     for (int round = 0; round < 100; ++round) {
       derivatives(y_, gradient, hessian);
@@ -274,8 +282,8 @@ class Path {
       }
       double t = longest(step);
       if (there) {
-        const double before = barrier(y_), slope = gradient.dot(step);
-        while (t > 1e-8 && !(barrier(y_ + t * step) <= before + 0.1 * t * slope)) t /= 2;
+        const double before = barrier_of_bodies(y_), slope = gradient.head(bodies_).dot(step.head(bodies_));
+        while (t > 1e-8 && !(barrier_of_bodies(y_ + t * step) <= before + 0.1 * t * slope)) t /= 2;
         if (t <= 1e-8) break;
       }
       y_ += t * step;
@@ -285,22 +293,13 @@ class Path {
       }
       if (!there && round > 40) break;
     }
-    if (there && std::isfinite(barrier_of_bodies())) return true;
+    if (there && std::isfinite(barrier_of_bodies(y_))) return true;
     y_ = kept;
     return false;
   }
-  double barrier_of_bodies() const {
-    double sum = 0;
-    for (const Matrix4d& body : matrices(y_)) {
-      const Eigen::LLT<Matrix4d> llt(body);
-      if (llt.info() != Eigen::Success) return INFINITY;
-      sum += llt.matrixLLT().diagonal().array().log().sum();
-    }
-    return sum;
-  }
-
   const ConsistentProblem& p_;
   double pull_ = pull_on_the_way;  ///< factor of tr(P0^-1 P)
+  double edge_ = 1;                ///< factor of theta's barriers
   Index base_ = 0, bodies_ = 0, thetas_ = 0;
   std::vector<Index> others_;
   MatrixXd map_;

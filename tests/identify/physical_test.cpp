@@ -169,6 +169,13 @@ TEST(Physical, CoefficientsKeepTheirBounds) {
   EXPECT_TRUE(fit.constrained);
   EXPECT_GE(fit.theta[0], 0);
   EXPECT_LT(fit.theta[0], 1e-3);
+  // A coefficient exactly on its bound is not beyond it.
+  Experiment zero(e.robot, 0, 9);
+  PhysicalProblem problem = zero.problem();
+  problem.lower[0] = least_squares(problem.information, problem.projection)[zero.beta.size()];
+  const PhysicalFit on_bound = fit_physical(problem);
+  EXPECT_FALSE(on_bound.constrained);
+  EXPECT_LT((all_parameters(on_bound) - zero.parameters).norm(), 1e-6 * zero.parameters.norm());
 }
 
 TEST(Physical, TellsWhatTheDataDecides) {
