@@ -161,6 +161,57 @@ TEST(Physical, NoisyDataGivesPossibleBodiesAtLittleCost) {
   EXPECT_GE(constrained, 6);
 }
 
+TEST(Physical, ConstrainedFitIsTheMinimum) {
+  test::Chains chains(21);
+  int constrained = 0;
+  for (int k = 0; k < 15; ++k) {
+    SCOPED_TRACE(k);
+    const Experiment e(chains.robot(static_cast<std::size_t>(2 + k % 6)), 0.1, 50 + static_cast<std::uint64_t>(k));
+    const PhysicalProblem p = e.problem();
+    std::vector<Eigen::Matrix4d> prior;  // nothing that resembles the truth
+    for (std::size_t i = 0; i < e.robot.size(); ++i)
+      prior.push_back(pseudo_inertia(to_link_inertia(chains.inertial(), Eigen::Isometry3d::Identity())));
+    const ConsistentFit fit = fit_consistent(
+        {p.information, p.projection, p.lower, p.upper, e.base.grouping, e.base.columns, prior, p.variance});
+    if (!fit.constrained) continue;
+    ++constrained;
+    const auto parameters = [](const std::vector<Eigen::Matrix4d>& bodies) {
+      VectorXd pi(10 * static_cast<Index>(bodies.size()));
+      for (std::size_t i = 0; i < bodies.size(); ++i) {
+        const auto values = to_array(from_pseudo_inertia(bodies[i]));
+        pi.segment(10 * static_cast<Index>(i), 10) = Eigen::Map<const VectorXd>(values.data(), 10);
+      }
+      return pi;
+    };
+    // squared error / 2 variance + divergence, infinite where impossible
+    const auto objective = [&](const std::vector<Eigen::Matrix4d>& bodies) -> double {
+      const double error = e.rms_error(e.base.grouping * parameters(bodies), fit.theta);
+      double sum = static_cast<double>(e.tau.size()) * error * error / (2 * p.variance);
+      for (std::size_t i = 0; i < bodies.size(); ++i) {
+        if (Eigen::LLT<Eigen::Matrix4d>(bodies[i]).info() != Eigen::Success) return INFINITY;
+        const Eigen::Matrix4d ratio = prior[i].inverse() * bodies[i];
+        sum += ratio.trace() - std::log(ratio.determinant());
+      }
+      return sum;
+    };
+    const double best = objective(fit.bodies);
+    Random random(4);
+    for (int trial = 0; trial < 200; ++trial) {
+      // B (1 + s) B^T stays possible; s from large to small
+      std::vector<Eigen::Matrix4d> other = fit.bodies;
+      const double size = std::pow(10.0, -4 * random.uniform());
+      for (Eigen::Matrix4d& body : other) {
+        Eigen::Matrix4d step;
+        for (double& value : step.reshaped()) value = size * random.normal();
+        const Eigen::Matrix4d root = Eigen::LLT<Eigen::Matrix4d>(body).matrixL();
+        body = root * (Eigen::Matrix4d::Identity() + (step + step.transpose()) / 2) * root.transpose();
+      }
+      EXPECT_GE(objective(other), best - 1e-6);
+    }
+  }
+  EXPECT_GE(constrained, 5);
+}
+
 TEST(Physical, CoefficientsKeepTheirBounds) {
   test::Chains chains(4);
   Experiment e(chains.robot(3, false), 0, 9);
