@@ -264,8 +264,8 @@ void identify_payload(const fs::path& model_file, const fs::path& log_file, cons
   IdentifiedModel model = read_model(model_file);
   std::error_code ignored;
   if (fs::equivalent(directory / "model.json", model_file, ignored)) {
-    throw InputError(fmt::format("{}: would be overwritten by the model with load; choose another --out",
-                                 model_file.string()));
+    throw InputError(
+        fmt::format("{}: would be overwritten by the model with load; choose another --out", model_file.string()));
   }
   std::vector<bool> revolute;
   for (const Joint& joint : model.robot.joints) revolute.push_back(joint.type == JointType::revolute);
