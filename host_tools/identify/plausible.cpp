@@ -95,6 +95,9 @@ class Rows {
     }
   }
 
+  /// Twice as many rows as parameters: fewer prove nothing.
+  bool enough() const { return tau_.size() >= 2 * (static_cast<Index>(base_.columns.size()) + own * n_); }
+
   /// Weighted least squares with these signs of torque (one a joint) and of gravity.
   struct Fit {
     VectorXd solution;  ///< base, then `own` a joint
@@ -310,6 +313,7 @@ std::vector<Suspicion> check_plausible(const Robot& robot, const std::vector<Pro
                                        const std::vector<JointFit>& joints) {
   const auto n = static_cast<Index>(robot.size());
   const Rows rows(robot, logs, joints);
+  if (!rows.enough()) return {};
   Rows::Fit fit = best_signs(rows, 1, n);
   if (Rows::Fit other = best_signs(rows, -1, n); other.score < fit.score - worth_a_flip) fit = std::move(other);
 
