@@ -108,6 +108,13 @@ int run(int argc, char** argv) {
       ->check(CLI::IsMember({"real", "fixed"}))
       ->capture_default_str();
   predict_verb->add_option("--out", out, "directory for the prediction")->required();
+  CLI::App* payload_verb =
+      app.add_subcommand("payload",
+                         "Load on the last link from a log recorded with it: payload.json, and the model with it.\n"
+                         "Example: fxdyn payload --model out/robot/model.json --log loaded.csv --out out/loaded");
+  payload_verb->add_option("--model", model, "model.json, identified without load")->required();
+  payload_verb->add_option("--log", log, "log (CSV) recorded with the load")->required();
+  payload_verb->add_option("--out", out, "directory for the results")->required();
   CLI::App* effects_verb =
       app.add_subcommand("effects", "List the effects that the model knows.\nExample: fxdyn effects --json");
   effects_verb->add_flag("--json", as_json, "for machines");
@@ -124,6 +131,9 @@ int run(int argc, char** argv) {
   } else if (*predict_verb) {
     predict_log(model, log, numbers == "fixed", out);
     fmt::print("prediction in {}\n", out);
+  } else if (*payload_verb) {
+    identify_payload(model, log, out);
+    fmt::print("load in {}/payload.json, model with it in {}/model.json\n", out, out);
   } else {
     Pipeline pipeline(project, out);
     if (*run_verb) pipeline.run();

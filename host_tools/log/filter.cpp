@@ -59,15 +59,16 @@ MatrixXd derive(const Eigen::Ref<const MatrixXd>& columns, double step_s, Index 
   const Index width = std::min(end_width, n);
   const Index ends = n > 2 * half ? half : n;  // a short log has no middle
   const VectorXd middle = n > 2 * half ? VectorXd(stencil(2 * half + 1, half, derivative) * scale) : VectorXd();
+  if (const Index inner = n - 2 * ends; inner > 0) {
+    for (Index k = 0; k < middle.size(); ++k)
+      result.middleRows(ends, inner) += middle[k] * columns.middleRows(ends - half + k, inner);
+  }
   for (Index i = 0; i < n; ++i) {
-    if (i >= ends && i < n - ends) {
-      for (Index c = 0; c < columns.cols(); ++c)
-        result(i, c) = middle.dot(columns.col(c).segment(i - half, 2 * half + 1));
-    } else {
-      const Index from = i < ends ? 0 : n - width;
-      const VectorXd weights = stencil(width, i - from, derivative) * scale;
-      for (Index c = 0; c < columns.cols(); ++c) result(i, c) = weights.dot(columns.col(c).segment(from, width));
-    }
+    if (i == ends) i = std::max(ends, n - ends);
+    if (i == n) break;
+    const Index from = i < ends ? 0 : n - width;
+    const VectorXd weights = stencil(width, i - from, derivative) * scale;
+    for (Index c = 0; c < columns.cols(); ++c) result(i, c) = weights.dot(columns.col(c).segment(from, width));
   }
   return result;
 }
@@ -98,15 +99,19 @@ MatrixXd ZeroPhaseFilter::apply(const Eigen::Ref<const MatrixXd>& columns) const
   // Far enough for the start to be forgotten to 1e-9: 4.5 times the 1 % of edge_samples().
   const Index pad = std::min(n - 1, edge_samples() * 9 / 2 + 1);
 
+  // Several columns side by side: each step waits for the one before it, and the columns fill the wait.
+  constexpr Index lanes = 8;
+  using Lanes = Eigen::Array<double, 1, lanes>;
+  std::vector<Lanes> work(static_cast<std::size_t>(n + 2 * pad));
   // In place, from state at rest on the first value.
   const auto pass = [this](auto begin, auto end) {
     for (const Section& s : sections_) {
-      const double first = *begin;
-      double z2 = (s.b2 - s.a2) * first;
-      double z1 = (s.b1 - s.a1) * first + z2;
+      const Lanes first = *begin;
+      Lanes z2 = (s.b2 - s.a2) * first;
+      Lanes z1 = (s.b1 - s.a1) * first + z2;
       for (auto it = begin; it != end; ++it) {
-        const double x = *it;
-        const double y = s.b0 * x + z1;
+        const Lanes x = *it;
+        const Lanes y = s.b0 * x + z1;
         z1 = s.b1 * x - s.a1 * y + z2;
         z2 = s.b2 * x - s.a2 * y;
         *it = y;
@@ -115,23 +120,31 @@ MatrixXd ZeroPhaseFilter::apply(const Eigen::Ref<const MatrixXd>& columns) const
   };
 
   MatrixXd result(n, columns.cols());
-  std::vector<double> work(static_cast<std::size_t>(n + 2 * pad));
-  for (Index c = 0; c < columns.cols(); ++c) {
-    const auto x = columns.col(c);
+  for (Index from = 0; from < columns.cols(); from += lanes) {
+    const Index count = std::min(lanes, columns.cols() - from);
     // A zero-phase filter leaves straight lines alone: the one through the ends is taken out, so that the reflection is
     // about zero and ramps pass exactly.
-    const double slope = (x[n - 1] - x[0]) / static_cast<double>(n - 1);
-    for (Index i = 0; i < n; ++i)
-      work[static_cast<std::size_t>(pad + i)] = x[i] - (x[0] + slope * static_cast<double>(i));
-    work[static_cast<std::size_t>(pad + n - 1)] = 0;
+    Lanes start = Lanes::Zero(), slope = Lanes::Zero();
+    for (Index c = 0; c < count; ++c) {
+      start[c] = columns(0, from + c);
+      slope[c] = (columns(n - 1, from + c) - start[c]) / static_cast<double>(n - 1);
+    }
+    const auto at = [&](Index i) -> Lanes& { return work[static_cast<std::size_t>(pad + i)]; };
+    for (Index i = 0; i < n; ++i) {
+      at(i).setZero();
+      for (Index c = 0; c < count; ++c)
+        at(i)[c] = columns(i, from + c) - (start[c] + slope[c] * static_cast<double>(i));
+    }
+    at(n - 1).setZero();
     for (Index i = 1; i <= pad; ++i) {
-      work[static_cast<std::size_t>(pad - i)] = -work[static_cast<std::size_t>(pad + i)];
-      work[static_cast<std::size_t>(pad + n - 1 + i)] = -work[static_cast<std::size_t>(pad + n - 1 - i)];
+      at(-i) = -at(i);
+      at(n - 1 + i) = -at(n - 1 - i);
     }
     pass(work.begin(), work.end());
     pass(work.rbegin(), work.rend());
-    for (Index i = 0; i < n; ++i) {
-      result(i, c) = work[static_cast<std::size_t>(pad + i)] + (x[0] + slope * static_cast<double>(i));
+    for (Index c = 0; c < count; ++c) {
+      for (Index i = 0; i < n; ++i)
+        result(i, from + c) = at(i)[c] + (start[c] + slope[c] * static_cast<double>(i));
     }
   }
   return result;

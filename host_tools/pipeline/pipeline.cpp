@@ -8,6 +8,7 @@
 #include "host_tools/export/export.hpp"
 #include "host_tools/export/proof.hpp"
 #include "host_tools/files.hpp"
+#include "host_tools/identify/payload.hpp"
 #include "host_tools/report/metrics.hpp"
 #include "host_tools/report/report.hpp"
 #include "host_tools/train/train.hpp"
@@ -258,6 +259,25 @@ void Pipeline::run() {
   train();
   export_tables();
   report();
+}
+
+void identify_payload(const fs::path& model_file, const fs::path& log_file, const fs::path& directory) {
+  IdentifiedModel model = read_model(model_file);
+  std::error_code ignored;
+  if (fs::equivalent(directory / "model.json", model_file, ignored)) {
+    throw InputError(
+        fmt::format("{}: would be overwritten by the model with load; choose another --out", model_file.string()));
+  }
+  std::vector<bool> revolute;
+  for (const Joint& joint : model.robot.joints) revolute.push_back(joint.type == JointType::revolute);
+  const Log log = read_log(log_file, model.robot.size(), revolute, format_of(model, log_file), {}, {});
+  const LoadFit fit = identify_load(model, process(log, model.filter));
+  model.body.push_back(fit.effect);
+  model.formats.reset();  // the tables are another model's now
+  model.tables_crc = 0;
+  const json report = load_json(fit, model.robot);
+  write_file(directory / "model.json", to_json(model).dump(1) + "\n");
+  write_file(directory / "payload.json", report.dump(1) + "\n");
 }
 
 void predict_log(const fs::path& model_file, const fs::path& log_file, bool fixed, const fs::path& directory) {

@@ -44,6 +44,10 @@ class Pipeline {
 void predict_log(const std::filesystem::path& model, const std::filesystem::path& log, bool fixed,
                  const std::filesystem::path& directory);
 
+/// `fxdyn payload`: the load of a second log, payload.json and the model with it, model.json.
+void identify_payload(const std::filesystem::path& model, const std::filesystem::path& log,
+                      const std::filesystem::path& directory);
+
 struct Replay {
   bool same = false;           ///< every torque and saturation count
   std::filesystem::path file;  ///< replay.json: in DIR, or in DIR/joint_N for the drive of one joint

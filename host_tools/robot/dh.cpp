@@ -153,6 +153,19 @@ LinkInertia<Real> to_link_inertia(const Inertial& inertial, const Isometry3d& po
   return link;
 }
 
+Inertial to_inertial(const LinkInertia<Real>& link, const Isometry3d& pose) {
+  Inertial inertial;
+  inertial.mass = link.m;
+  const Vector3d centre = Vector3d(link.h.x, link.h.y, link.h.z) / link.m;
+  inertial.centre = pose.inverse() * centre;
+  Matrix3d j;
+  j << link.xx, link.xy, link.xz, link.xy, link.yy, link.yz, link.xz, link.yz, link.zz;
+  const Matrix3d second = pose.linear().transpose() * (j - link.m * centre * centre.transpose()) * pose.linear();
+  inertial.tensor = second.trace() * Matrix3d::Identity() - second;
+  inertial.tensor = ((inertial.tensor + inertial.tensor.transpose()) / 2).eval();
+  return inertial;
+}
+
 LinkInertia<Real> with_load(const LinkInertia<Real>& last, double mass, const Vector3d& com, const DhChain& chain) {
   const Vector3d r = chain.urdf_in_dh.back() * com;
   return Payload::add_to(last, mass, {r.x(), r.y(), r.z()});

@@ -65,6 +65,8 @@ DhChain to_dh(const Robot& robot);
 
 /// Ten parameters of model/rigid_body.hpp, of a body given in a frame whose pose in the DH frame is `pose`.
 LinkInertia<Real> to_link_inertia(const Inertial& inertial, const Eigen::Isometry3d& pose);
+/// Back from the DH frame. The mass must not be zero.
+Inertial to_inertial(const LinkInertia<Real>& link, const Eigen::Isometry3d& pose);
 
 /// The last link with a point mass at `com` in its URDF frame.
 LinkInertia<Real> with_load(const LinkInertia<Real>& last, double mass, const Eigen::Vector3d& com,

@@ -102,6 +102,9 @@ done
 
 echo '{"schema": "fxdyn.model/1"}' >"$work/model.json"
 expect 2 "model.json" predict --model "$work/model.json" --log "$work/good.csv" --out "$work/out"
+expect 1 "the mass of the load can't be told from this motion: no joint of this robot lifts" payload --model "$work/good/model.json" --log "$work/good.csv" --out "$work/out"
+expect 2 "would be overwritten" payload --model "$work/good/model.json" --log "$work/good.csv" --out "$work/good"
+expect 2 "none.csv" payload --model "$work/good/model.json" --log "$work/none.csv" --out "$work/out"
 mkdir "$work/apart" && cp "$work/good.csv" "$work/apart"
 expect 2 "prediction" predict --model "$work/good/model.json" --log "$work/apart/good.csv" --out "$work/apart"
 expect 2 "holds a model" predict --model "$work/good/model.json" --log "$work/good.csv" --out "$work/good"

@@ -13,6 +13,7 @@
 #include "host_tools/random.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "tests/support/files.hpp"
+#include "tests/support/filter.hpp"
 
 namespace fxdyn {
 namespace {
@@ -51,13 +52,7 @@ fs::path play(const std::string& name, const std::string& sensors, const std::st
 
 Log read(const fs::path& file) { return read_log(file, 6, std::vector<bool>(6, true), {}, {}, {}); }
 
-const FilterFit filter = [] {
-  FilterFit fit;
-  fit.position_cutoff_hz = 25;
-  fit.torque_cutoff_hz = 15;
-  fit.edge_s = 0.3;
-  return fit;
-}();
+const FilterFit filter = test::filter_of(25, 15, 0.3);
 
 /// The plant's own model: rigid body of the URDF, effects but for those on the position.
 IdentifiedModel truth() {

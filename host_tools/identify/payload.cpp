@@ -1,0 +1,371 @@
+#include "host_tools/identify/payload.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "host_tools/error.hpp"
+#include "host_tools/identify/physical.hpp"
+#include "host_tools/identify/solver.hpp"
+#include "host_tools/model/evaluator.hpp"
+#include "model/effects/coulomb.hpp"
+#include "model/effects/offset.hpp"
+#include "model/effects/payload.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+constexpr auto ten = static_cast<Index>(parameters_per_link);
+constexpr Index nuisances = 2;  ///< Coulomb, offset of each joint
+/// Share of a column's square that the others must leave for it to count as told apart.
+constexpr double told_apart = 1e-6;
+/// A mass with a larger relative standard deviation is none.
+constexpr double largest_uncertainty = 0.3;
+
+/// Ten parameters in the URDF frame -> ten in the DH frame.
+MatrixXd to_dh_frame(const Eigen::Isometry3d& pose) {
+  MatrixXd map(ten, ten);
+  for (Index k = 0; k < ten; ++k) {
+    std::array<double, parameters_per_link> unit{};
+    unit[static_cast<std::size_t>(k)] = 1;
+    // [r; 1] = pose [r'; 1], so P = pose P' pose^T
+    const Eigen::Matrix4d p = pose.matrix() * pseudo_inertia(to_inertia(unit)) * pose.matrix().transpose();
+    const auto values = to_array(from_pseudo_inertia(p));
+    map.col(k) = Eigen::Map<const VectorXd>(values.data(), ten);
+  }
+  return map;
+}
+
+struct Rows {
+  std::vector<MatrixXd> columns;  ///< a joint: rows x (10 + 2)
+  std::vector<VectorXd> missing;  ///< a joint: torque that the model does not explain
+  VectorXd gravity;               ///< a joint: largest gravity torque of 1 kg within 1 m of the last link's frame
+  double lifted = 0;              ///< the same of 1 kg in that frame's origin, over all joints
+};
+
+Rows build_rows(const IdentifiedModel& model, const DhChain& chain, const ProcessedLog& log) {
+  const auto n = static_cast<Index>(model.robot.size());
+  const MatrixXd missing = log.decimate(log.filter_columns(log.tau - predict(model, log)));
+  const MotionRows motion = log.motion();
+  const MatrixXd map = to_dh_frame(chain.urdf_in_dh.back());
+  std::vector<MatrixXd> full(static_cast<std::size_t>(n), MatrixXd(log.q.rows(), ten + nuisances));
+  Regressor regressor(chain);
+  Rows rows;
+  rows.gravity = VectorXd::Zero(n);
+  for (Index k = 0; k < log.q.rows(); ++k) {
+    const MatrixXd moving = regressor(motion.q.row(k), motion.dq.row(k), motion.ddq.row(k)).rightCols(ten) * map;
+    const VectorXd rest = VectorXd::Zero(n);
+    const bool sampled = k % 20 == 0;
+    const MatrixXd still = sampled ? MatrixXd(regressor(motion.q.row(k), rest, rest).rightCols(ten) * map) : MatrixXd();
+    for (Index j = 0; j < n; ++j) {
+      full[static_cast<std::size_t>(j)].row(k).head(ten) = moving.row(j);
+      if (!sampled) continue;
+      rows.gravity[j] = std::max(rows.gravity[j], still.row(j).head(4).cwiseAbs().maxCoeff());
+      rows.lifted = std::max(rows.lifted, std::fabs(still(j, 0)));
+    }
+  }
+  for (Index j = 0; j < n; ++j) {
+    const auto at = static_cast<std::size_t>(j);
+    const JointSeries series{motion.q.col(j), motion.dq.col(j), motion.ddq.col(j), {}, log.step_s};
+    full[at].col(ten) = effect_columns(Coulomb::name, {}, model.joints[at].sign_width, series);
+    full[at].col(ten + 1) = effect_columns(Offset::name, {}, model.joints[at].sign_width, series);
+    rows.columns.push_back(log.decimate(log.filter_columns(full[at])));
+    full[at].resize(0, 0);
+    rows.missing.emplace_back(missing.col(j));
+  }
+  return rows;
+}
+
+/// Sums of neighbouring residuals' products over lags 0 .. last, until they fade.
+VectorXd autocovariance(const VectorXd& r) {
+  std::vector<double> out;
+  const Index rows = r.size();
+  for (Index lag = 0; lag < rows / 4; ++lag) {
+    const double c = r.head(rows - lag).dot(r.tail(rows - lag)) / static_cast<double>(rows);
+    if (lag > 0 && c < 0.02 * out.front()) break;
+    out.push_back(c);
+  }
+  return Eigen::Map<const VectorXd>(out.data(), static_cast<Index>(out.size()));
+}
+
+struct Fit {
+  MatrixXd information;
+  VectorXd projection, solution;
+  MatrixXd covariance;  ///< of the ten parameters
+  MatrixXd own;         ///< information of the ten, nuisances taken out
+  VectorXd nuisance_std;
+  double correlated = 1;  ///< rows for an independent one, mean
+};
+
+Fit solve(const Rows& rows) {
+  const auto n = static_cast<Index>(rows.columns.size());
+  const Index p = ten + nuisances * n;
+  Fit fit;
+  VectorXd weights(n);
+  const auto residual = [&](Index j) {
+    const auto at = static_cast<std::size_t>(j);
+    VectorXd own(ten + nuisances);
+    own << fit.solution.head(ten), fit.solution.segment(ten + nuisances * j, nuisances);
+    return VectorXd(rows.missing[at] - rows.columns[at] * own);
+  };
+  const auto place = [&](MatrixXd& sum, Index j, const MatrixXd& gram) {
+    const Index at = ten + nuisances * j;
+    sum.topLeftCorner(ten, ten) += gram.topLeftCorner(ten, ten);
+    sum.block(0, at, ten, nuisances) += gram.topRightCorner(ten, nuisances);
+    sum.block(at, 0, nuisances, ten) += gram.bottomLeftCorner(nuisances, ten);
+    sum.block(at, at, nuisances, nuisances) += gram.bottomRightCorner(nuisances, nuisances);
+  };
+  fit.solution = VectorXd::Zero(p);
+  for (int round = 0; round < 4; ++round) {
+    fit.information = MatrixXd::Zero(p, p);
+    fit.projection = VectorXd::Zero(p);
+    for (Index j = 0; j < n; ++j) {
+      const auto at = static_cast<std::size_t>(j);
+      const double square = rows.missing[at].squaredNorm();
+      weights[j] =
+          static_cast<double>(rows.missing[at].size()) / std::max(residual(j).squaredNorm(), 1e-18 * square + 1e-300);
+      place(fit.information, j, weights[j] * rows.columns[at].transpose() * rows.columns[at]);
+      const VectorXd b = weights[j] * rows.columns[at].transpose() * rows.missing[at];
+      fit.projection.head(ten) += b.head(ten);
+      fit.projection.segment(ten + nuisances * j, nuisances) += b.tail(nuisances);
+    }
+    fit.solution = SymmetricSolver(fit.information).solve(fit.projection);
+  }
+  // Sandwich with the residuals' autocovariance: sum over lags of gamma X_k^T X_{k+lag}.
+  MatrixXd middle = MatrixXd::Zero(p, p);
+  fit.correlated = 0;
+  for (Index j = 0; j < n; ++j) {
+    const MatrixXd& x = rows.columns[static_cast<std::size_t>(j)];
+    const VectorXd gamma = autocovariance(residual(j));
+    MatrixXd sum = gamma[0] * x.transpose() * x;
+    for (Index lag = 1; lag < gamma.size(); ++lag) {
+      const MatrixXd across = gamma[lag] * x.topRows(x.rows() - lag).transpose() * x.bottomRows(x.rows() - lag);
+      sum += across + across.transpose();
+    }
+    place(middle, j, weights[j] * weights[j] * sum);
+    fit.correlated += (2 * gamma.sum() / gamma[0] - 1) / static_cast<double>(n);
+  }
+  MatrixXd inverse(p, p);
+  for (Index k = 0; k < p; ++k) inverse.col(k) = least_squares(fit.information, VectorXd::Unit(p, k));
+  const MatrixXd covariance = inverse * middle * inverse.transpose();
+  fit.covariance = covariance.topLeftCorner(ten, ten);
+  fit.nuisance_std = covariance.diagonal().tail(p - ten).cwiseMax(0).cwiseSqrt();
+  const MatrixXd nuisance = fit.information.bottomRightCorner(p - ten, p - ten);
+  fit.own = fit.information.topLeftCorner(ten, ten);
+  for (Index k = 0; k < ten; ++k) {
+    fit.own.col(k) -=
+        fit.information.topRightCorner(ten, p - ten) * least_squares(nuisance, fit.information.col(k).tail(p - ten));
+  }
+  return fit;
+}
+
+/// Which of the ten no sum of the others and of friction imitates.
+std::array<bool, 10> told(const Fit& fit) {
+  VectorXd scale = fit.information.diagonal().head(ten).cwiseMax(0).cwiseSqrt();
+  std::array<bool, 10> out{};
+  for (Index k = 0; k < ten; ++k) {
+    out[static_cast<std::size_t>(k)] = scale[k] > 1e-9 * scale.maxCoeff();
+    scale[k] = out[static_cast<std::size_t>(k)] ? 1 / scale[k] : 0;
+  }
+  const MatrixXd scaled = scale.asDiagonal() * (fit.own + fit.own.transpose()) / 2 * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(scaled);
+  for (Index i = 0; i < ten; ++i) {
+    if (solver.eigenvalues()[i] > told_apart) continue;
+    for (Index k = 0; k < ten; ++k) {
+      if (std::fabs(solver.eigenvectors()(k, i)) > 0.03) out[static_cast<std::size_t>(k)] = false;
+    }
+  }
+  return out;
+}
+
+/// The joint to move for a better view of the load.
+std::string what_to_move(const Robot& robot, const ProcessedLog& log, const Rows& rows) {
+  const VectorXd& gravity = rows.gravity;
+  Index best = -1;
+  double smallest = 0;
+  for (Index j = 0; j < gravity.size(); ++j) {
+    const auto& joint = robot.joints[static_cast<std::size_t>(j)];
+    if (gravity[j] < 0.1 || joint.type != JointType::revolute) continue;
+    if (best < 0 || log.q_range[j] < smallest) {
+      best = j;
+      smallest = log.q_range[j];
+    }
+  }
+  if (best < 0)
+    return "no joint of this robot lifts the load, so only its acceleration shows it: accelerate more, or weigh it";
+  if (rows.lifted < 0.1)
+    return "no joint of this robot lifts the axis of the last one, so gravity shows mass times distance only: weigh it";
+  return fmt::format("move joint {} ({}, {:.2g} rad here) and the others that lift the load over a wider range",
+                     best + 1, robot.joints[static_cast<std::size_t>(best)].name, smallest);
+}
+
+/// A ball of plastic (2000 kg/m^3) where the data sees the centre.
+Eigen::Matrix4d ball(double mass, const Vector3d& centre) {
+  const double radius = std::cbrt(3 * mass / (4 * std::numbers::pi * 2000));
+  Inertial body;
+  body.mass = mass;
+  body.centre = centre;
+  body.tensor = 0.4 * mass * radius * radius * Matrix3d::Identity();
+  return pseudo_inertia(to_link_inertia(body, Eigen::Isometry3d::Identity()));
+}
+
+/// d(mass, centre, tensor about the centre) / d(ten parameters).
+MatrixXd jacobian(const Inertial& body) {
+  MatrixXd out = MatrixXd::Zero(ten, ten);
+  const Vector3d& c = body.centre;
+  for (Index k = 0; k < ten; ++k) {
+    std::array<double, parameters_per_link> unit{};
+    unit[static_cast<std::size_t>(k)] = 1;
+    const Eigen::Matrix4d d = pseudo_inertia(to_inertia(unit));
+    const Vector3d h = d.topRightCorner<3, 1>();
+    const Matrix3d second =
+        d.topLeftCorner<3, 3>() - h * c.transpose() - c * h.transpose() + d(3, 3) * c * c.transpose();
+    const Matrix3d tensor = second.trace() * Matrix3d::Identity() - second;
+    out(0, k) = d(3, 3);
+    out.col(k).segment(1, 3) = (h - d(3, 3) * c) / body.mass;
+    out.col(k).tail(6) << tensor(0, 0), tensor(1, 1), tensor(2, 2), tensor(0, 1), tensor(0, 2), tensor(1, 2);
+  }
+  return out;
+}
+
+}  // namespace
+
+LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log) {
+  for (const EffectFit& effect : model.body) {
+    if (effect.effect == Payload::name)
+      throw InputError("the model has a payload already: take the model that was identified without load");
+  }
+  if (log.tau.size() == 0) throw InputError(fmt::format("{}: no torque; a load shows in the torque only", log.name));
+  const DhChain chain = to_dh(model.robot);
+  const auto n = static_cast<Index>(model.robot.size());
+  const Rows rows = build_rows(model, chain, log);
+  const Fit fit = solve(rows);
+  const std::array<bool, 10> apart = told(fit);
+  const double mass = fit.solution[0], mass_std = std::sqrt(std::max(0.0, fit.covariance(0, 0)));
+  if (!apart[0]) {
+    throw DataError(fmt::format("{}: the mass of the load can't be told from this motion: {}", log.name,
+                                what_to_move(model.robot, log, rows)));
+  }
+  if (!(mass > 0) || mass_std > largest_uncertainty * mass) {
+    throw DataError(fmt::format("{}: no load to be seen: mass {:.3g} kg, standard deviation {:.3g} kg; {}", log.name,
+                                mass, mass_std, what_to_move(model.robot, log, rows)));
+  }
+
+  Vector3d centre = Vector3d::Zero();
+  for (int k = 0; k < 3; ++k) {
+    if (apart[static_cast<std::size_t>(1 + k)]) centre[k] = fit.solution[1 + k] / mass;
+  }
+  const VectorXd free = VectorXd::Constant(nuisances * n, unbounded);
+  std::vector<Index> columns(static_cast<std::size_t>(ten));
+  for (Index k = 0; k < ten; ++k) columns[static_cast<std::size_t>(k)] = k;
+  const ConsistentFit possible = fit_consistent({fit.information,
+                                                 fit.projection,
+                                                 -free,
+                                                 free,
+                                                 MatrixXd::Identity(ten, ten),
+                                                 columns,
+                                                 {ball(mass, centre)},
+                                                 fit.correlated});
+  LoadFit out;
+  out.constrained = possible.constrained;
+  out.body = to_inertial(from_pseudo_inertia(possible.bodies[0]), Eigen::Isometry3d::Identity());
+  const MatrixXd to_output = jacobian(out.body);
+  const VectorXd std = (to_output * fit.covariance * to_output.transpose()).diagonal().cwiseMax(0).cwiseSqrt();
+  const Matrix3d& t = out.body.tensor;
+  const double values[] = {out.body.mass,
+                           out.body.centre.x(),
+                           out.body.centre.y(),
+                           out.body.centre.z(),
+                           t(0, 0),
+                           t(1, 1),
+                           t(2, 2),
+                           t(0, 1),
+                           t(0, 2),
+                           t(1, 2)};
+  static constexpr std::array names{"mass", "x", "y", "z", "ixx", "iyy", "izz", "ixy", "ixz", "iyz"};
+  // an entry of the tensor is a sum of the second moments across it
+  const bool xx = apart[4], yy = apart[5], zz = apart[6];
+  const bool identifiable[] = {apart[0], apart[1], apart[2], apart[3], yy && zz,
+                               xx && zz, xx && yy, apart[7], apart[8], apart[9]};
+  for (std::size_t k = 0; k < 10; ++k) {
+    out.parameters[k] = {names[k],
+                         k == 0  ? "kg"
+                         : k < 4 ? "m"
+                                 : "kg m^2",
+                         values[k], std[static_cast<Index>(k)], identifiable[k]};
+  }
+
+  out.effect.effect = Payload::name;
+  out.effect.named = true;
+  const Vector3d& centre = out.body.centre;
+  out.effect.linear = {out.body.mass, centre.x(), centre.y(), centre.z()};
+  out.effect.linear_std = {std[0]};
+  for (Index k = 1; k < 4; ++k) out.effect.linear_std.push_back(std[k]);
+
+  Inertial point = out.body;
+  point.tensor.setZero();
+  const auto in_urdf = [](const Inertial& body) {
+    const auto v = to_array(to_link_inertia(body, Eigen::Isometry3d::Identity()));
+    return VectorXd(Eigen::Map<const VectorXd>(v.data(), ten));
+  };
+  const VectorXd whole = in_urdf(out.body), point_only = in_urdf(point);
+  out.coulomb = out.coulomb_std = out.offset = out.before = out.after = out.with_effect = VectorXd::Zero(n);
+  for (Index j = 0; j < n; ++j) {
+    const auto at = static_cast<std::size_t>(j);
+    const auto nuisance = possible.theta.segment(nuisances * j, nuisances);
+    out.coulomb[j] = nuisance[0];
+    out.coulomb_std[j] = fit.nuisance_std[nuisances * j];
+    out.offset[j] = nuisance[1];
+    const MatrixXd& x = rows.columns[at];
+    const VectorXd& y = rows.missing[at];
+    const double root = std::sqrt(static_cast<double>(y.size()));
+    out.before[j] = y.norm() / root;
+    out.after[j] = (y - x.leftCols(ten) * whole - x.rightCols(nuisances) * nuisance).norm() / root;
+    out.with_effect[j] = (y - x.leftCols(ten) * point_only).norm() / root;
+  }
+  return out;
+}
+
+nlohmann::json load_json(const LoadFit& fit, const Robot& robot) {
+  using nlohmann::json;
+  const auto& p = fit.parameters;
+  const auto entry = [](const LoadParameter& parameter) {
+    return json{{"value", parameter.value},
+                {"std", parameter.std},
+                {"unit", parameter.unit},
+                {"identifiable", parameter.identifiable}};
+  };
+  json com, tensor, joints = json::array();
+  for (std::size_t k = 1; k < 4; ++k) com[p[k].name] = entry(p[k]);
+  for (std::size_t k = 4; k < 10; ++k) tensor[p[k].name] = entry(p[k]);
+  for (std::size_t j = 0; j < robot.size(); ++j) {
+    const auto k = static_cast<Index>(j);
+    joints.push_back({{"joint", robot.joints[j].name},
+                      {"index", j + 1},
+                      {"unit", robot.joints[j].torque_unit()},
+                      {"residual_before", fit.before[k]},
+                      {"residual_after", fit.after[k]},
+                      {"residual_with_model", fit.with_effect[k]},
+                      {"coulomb_change", fit.coulomb[k]},
+                      {"coulomb_change_std", fit.coulomb_std[k]},
+                      {"offset_change", fit.offset[k]}});
+  }
+  return {{"schema", "fxdyn.payload/1"},
+          {"link", robot.joints.back().link},
+          {"frame", "URDF frame of the link"},
+          {"mass", entry(p[0])},
+          {"com", com},
+          {"inertia_about_com", tensor},
+          {"constrained", fit.constrained},
+          {"joints", joints}};
+}
+
+}  // namespace fxdyn

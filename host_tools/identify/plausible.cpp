@@ -1,0 +1,390 @@
+#include "host_tools/identify/plausible.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host_tools/identify/physical.hpp"
+#include "host_tools/identify/regressor.hpp"
+#include "model/math.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index samples_used = 400;
+/// Coulomb, viscous, offset and, where it is not absorbed, rotor inertia.
+constexpr Index own = 4, viscous = 1, rotor = 3;
+/// Another sign has to lower the sum over joints of log(residual square) by this much: a joint's RMS by 40 %.
+constexpr double worth_a_flip = 1;
+/// Residuals below this share of the torque's RMS count as this: perfect fits are not better than perfect.
+constexpr double perfect = 1e-3;
+constexpr double sure = 5;  ///< standard deviations
+/// Shares of the torque's RMS that friction and inertia must have to be worth a word.
+constexpr double material_friction = 0.05, material_inertia = 0.2;
+/// The least mass that fits gravity and inertia, for a robot that reaches 1 m; robots of one kind grow with the cube.
+/// Real arms: 2 .. 70 kg/m^3.
+constexpr double heaviest = 1000, lightest = 0.1;
+constexpr double shortest = 0.3;  ///< what counts as the reach of anything smaller [m]
+
+struct Estimate {
+  double value = 0, std = 0;
+};
+
+/// Rows of all joints over a few hundred samples, the columns' gravity part apart.
+class Rows {
+ public:
+  Rows(const Robot& robot, const std::vector<ProcessedLog>& logs, const std::vector<JointFit>& joints)
+      : n_(static_cast<Index>(robot.size())) {
+    const DhChain chain = to_dh(robot);
+    base_ = find_base(chain);
+    Regressor regressor(chain);
+    const auto nb = static_cast<Index>(base_.columns.size());
+    for (Index j = 0; j < n_; ++j) has_rotor_.push_back(!rotor_inertia_is_absorbed(chain, base_, j));
+    Index available = 0;
+    for (const ProcessedLog& log : logs) {
+      if (log.role == Role::train) available += log.last - log.first;
+    }
+    const Index stride = std::max<Index>(1, available / samples_used);
+    std::vector<const ProcessedLog*> of;
+    std::vector<Index> at;
+    for (const ProcessedLog& log : logs) {
+      if (log.role != Role::train) continue;
+      for (Index k = log.first; k < log.last; k += stride) {
+        of.push_back(&log);
+        at.push_back(k);
+      }
+    }
+    const auto rows = static_cast<Index>(of.size());
+    tau_.resize(rows, n_);
+    for (Index j = 0; j < n_; ++j) {
+      moving_.emplace_back(rows, nb);
+      gravity_.emplace_back(rows, nb);
+      own_.emplace_back(MatrixXd::Zero(rows, own));
+      own_inertia_.emplace_back(rows, nb);
+    }
+    const VectorXd zero = VectorXd::Zero(n_);
+    accelerations_ = zero;
+    MatrixXd filtered;
+    const ProcessedLog* filtered_of = nullptr;
+    for (Index k = 0; k < rows; ++k) {
+      const ProcessedLog& log = *of[static_cast<std::size_t>(k)];
+      if (filtered_of != &log) {
+        filtered = log.filter_columns(log.tau);
+        filtered_of = &log;
+      }
+      const Index i = at[static_cast<std::size_t>(k)];
+      const MotionRows motion = log.motion(i, 1);
+      const VectorXd q = motion.q.row(0), dq = motion.dq.row(0), ddq = motion.ddq.row(0);
+      const MatrixXd still = regressor(q, zero, zero)(Eigen::all, base_.columns);
+      const MatrixXd moving = regressor(q, dq, ddq)(Eigen::all, base_.columns);
+      accelerations_ += ddq.cwiseAbs2();
+      for (Index j = 0; j < n_; ++j) {
+        const auto joint = static_cast<std::size_t>(j);
+        gravity_[joint].row(k) = still.row(j);
+        moving_[joint].row(k) = moving.row(j) - still.row(j);
+        own_[joint].row(k) << tanh_of(dq[j] / joints[joint].sign_width), dq[j], 1, has_rotor_[joint] ? ddq[j] : 0;
+        own_inertia_[joint].row(k) = regressor(q, zero, VectorXd::Unit(n_, j)).row(j)(base_.columns) - still.row(j);
+        tau_(k, j) = filtered(i, j);
+      }
+    }
+    for (Index j = 0; j < n_; ++j) {
+      for (const double up : {1.0, -1.0}) {
+        const MatrixXd x = columns(j, up);
+        grams_[up < 0].push_back(x.transpose() * x);
+        projections_[up < 0].push_back(x.transpose() * tau_.col(j));
+      }
+      squares_.push_back(std::max(tau_.col(j).squaredNorm(), 1e-300));
+    }
+  }
+
+  /// Twice as many rows as parameters: fewer prove nothing.
+  bool enough() const { return tau_.size() >= 2 * (static_cast<Index>(base_.columns.size()) + own * n_); }
+
+  /// Weighted least squares with these signs of torque (one a joint) and of gravity.
+  struct Fit {
+    VectorXd solution;  ///< base, then `own` a joint
+    MatrixXd covariance;
+    double score = 0;  ///< sum over joints of log(residual square / torque square)
+    double up = 1;
+    VectorXd signs;
+  };
+  Fit fit(double up, const VectorXd& signs) const {
+    const auto nb = static_cast<Index>(base_.columns.size());
+    const Index p = nb + own * n_;
+    const auto& grams = grams_[up < 0];
+    const auto& projections = projections_[up < 0];
+    Fit fit;
+    fit.up = up;
+    fit.signs = signs;
+    VectorXd residual = Eigen::Map<const VectorXd>(squares_.data(), n_);
+    MatrixXd information;
+    for (int round = 0; round < 4; ++round) {
+      information = MatrixXd::Zero(p, p);
+      VectorXd projection = VectorXd::Zero(p);
+      for (Index j = 0; j < n_; ++j) {
+        const auto joint = static_cast<std::size_t>(j);
+        const double w = static_cast<double>(tau_.rows()) / residual[j];
+        const Index at = nb + own * j;
+        information.topLeftCorner(nb, nb) += w * grams[joint].topLeftCorner(nb, nb);
+        information.block(0, at, nb, own) = w * grams[joint].topRightCorner(nb, own);
+        information.block(at, 0, own, nb) = w * grams[joint].bottomLeftCorner(own, nb);
+        information.block(at, at, own, own) = w * grams[joint].bottomRightCorner(own, own);
+        projection.head(nb) += w * signs[j] * projections[joint].head(nb);
+        projection.segment(at, own) = w * signs[j] * projections[joint].tail(own);
+      }
+      fit.solution = least_squares(information, projection);
+      fit.score = 0;
+      for (Index j = 0; j < n_; ++j) {
+        const auto joint = static_cast<std::size_t>(j);
+        const VectorXd x = of_joint(fit.solution, j);
+        const double square = squares_[joint] - 2 * signs[j] * x.dot(projections[joint]) + x.dot(grams[joint] * x);
+        residual[j] = std::max(square, perfect * perfect * squares_[joint]);
+        fit.score += std::log(residual[j] / squares_[joint]);
+      }
+    }
+    fit.covariance.resize(p, p);
+    for (Index k = 0; k < p; ++k) fit.covariance.col(k) = least_squares(information, VectorXd::Unit(p, k));
+    return fit;
+  }
+
+  /// M_jj, mean over the poses, and the share of poses where it is negative.
+  Estimate inertia(const Fit& fit, Index j, double& share_negative) const {
+    const auto joint = static_cast<std::size_t>(j);
+    const auto nb = own_inertia_[joint].cols();
+    VectorXd row = VectorXd::Zero(fit.solution.size());
+    row.head(nb) = own_inertia_[joint].colwise().mean().transpose();
+    row[nb + own * j + rotor] = has_rotor_[joint] ? 1 : 0;
+    VectorXd all = own_inertia_[joint] * fit.solution.head(nb);
+    if (has_rotor_[joint]) all.array() += fit.solution[nb + own * j + rotor];
+    share_negative = static_cast<double>((all.array() < 0).count()) / static_cast<double>(all.size());
+    return estimate(fit, row);
+  }
+  /// Coulomb and viscous friction at the RMS of the velocity.
+  Estimate friction(const Fit& fit, Index j) const {
+    const auto joint = static_cast<std::size_t>(j);
+    const Index at = fit.solution.size() - own * (n_ - j);
+    VectorXd row = VectorXd::Zero(fit.solution.size());
+    row[at] = 1;
+    row[at + viscous] = own_[joint].col(viscous).norm() / std::sqrt(static_cast<double>(own_[joint].rows()));
+    return estimate(fit, row);
+  }
+  /// Largest gravity torque.
+  Estimate gravity(const Fit& fit, Index j) const {
+    const auto joint = static_cast<std::size_t>(j);
+    const Index nb = gravity_[joint].cols();
+    const VectorXd all = (gravity_[joint] * fit.solution.head(nb)).cwiseAbs();
+    Index where = 0;
+    all.maxCoeff(&where);
+    VectorXd row = VectorXd::Zero(fit.solution.size());
+    row.head(nb) = gravity_[joint].row(where);
+    const Estimate signed_one = estimate(fit, row);
+    return {std::fabs(signed_one.value), signed_one.std};
+  }
+  /// Largest gravity torque of bodies pi.
+  double gravity_of(const VectorXd& pi, Index j) const {
+    return (gravity_[static_cast<std::size_t>(j)] * (base_.grouping * pi)).cwiseAbs().maxCoeff();
+  }
+  double acceleration_rms(Index j) const { return std::sqrt(accelerations_[j] / static_cast<double>(tau_.rows())); }
+  double torque_rms(Index j) const {
+    return std::sqrt(squares_[static_cast<std::size_t>(j)] / static_cast<double>(tau_.rows()));
+  }
+
+ private:
+  MatrixXd columns(Index j, double up) const {
+    const auto joint = static_cast<std::size_t>(j);
+    MatrixXd x(tau_.rows(), moving_[joint].cols() + own);
+    x << moving_[joint] + up * gravity_[joint], own_[joint];
+    return x;
+  }
+  VectorXd of_joint(const VectorXd& solution, Index j) const {
+    const Index nb = solution.size() - own * n_;
+    VectorXd x(nb + own);
+    x << solution.head(nb), solution.segment(nb + own * j, own);
+    return x;
+  }
+  static Estimate estimate(const Fit& fit, const VectorXd& row) {
+    return {row.dot(fit.solution), std::sqrt(std::max(0.0, row.dot(fit.covariance * row)))};
+  }
+
+  Index n_;
+  BaseSet base_;
+  std::vector<bool> has_rotor_;
+  MatrixXd tau_;
+  VectorXd accelerations_;  ///< sum of squares
+  std::vector<MatrixXd> moving_, gravity_, own_, own_inertia_;
+  std::vector<MatrixXd> grams_[2];
+  std::vector<VectorXd> projections_[2];
+  std::vector<double> squares_;
+};
+
+/// Flips one joint's torque after the other while that explains all joints far better.
+Rows::Fit best_signs(const Rows& rows, double up, Index joints) {
+  Rows::Fit best = rows.fit(up, VectorXd::Ones(joints));
+  for (;;) {
+    Rows::Fit next = best;
+    for (Index j = 0; j < joints; ++j) {
+      if (best.signs[j] < 0) continue;
+      VectorXd signs = best.signs;
+      signs[j] = -1;
+      Rows::Fit candidate = rows.fit(up, signs);
+      if (candidate.score < next.score) next = std::move(candidate);
+    }
+    if (!(next.score < best.score - worth_a_flip)) return best;
+    best = std::move(next);
+  }
+}
+
+/// Longest distance from a joint to the last link's frame, whatever the pose.
+double reach_of(const Robot& robot, std::size_t joint) {
+  double reach = 0;
+  for (std::size_t i = joint + 1; i < robot.size(); ++i) {
+    reach += robot.joints[i].origin.translation().norm();
+    const auto& limits = robot.joints[i].limits;
+    if (robot.joints[i].type == JointType::prismatic && limits)
+      reach += std::max(std::fabs(limits->lower), std::fabs(limits->upper));
+  }
+  return reach;
+}
+
+std::string title(const Robot& robot, std::size_t joint) {
+  return fmt::format("joint {} ({})", joint + 1, robot.joints[joint].name);
+}
+
+void check_units(const Robot& robot, const Rows& rows, const Rows::Fit& fit, std::vector<Suspicion>& out) {
+  const double reach = reach_of(robot, 0);
+  const double strength = robot.gravity.norm();
+  double mass = 0, mass_std = 0;
+  for (std::size_t j = 0; j < robot.size(); ++j) {
+    const double arm = std::max(reach_of(robot, j), shortest);
+    if (robot.joints[j].type != JointType::revolute || reach_of(robot, j) < 0.2 * reach) continue;
+    double ignored = 0;
+    const Estimate inertia = rows.inertia(fit, static_cast<Index>(j), ignored);
+    const Estimate gravity = rows.gravity(fit, static_cast<Index>(j));
+    for (const Estimate& e :
+         {Estimate{inertia.value / (arm * arm), inertia.std / (arm * arm)},
+          strength > 0 ? Estimate{gravity.value / (strength * arm), gravity.std / (strength * arm)} : Estimate{}}) {
+      if (e.value > mass) mass = e.value, mass_std = e.std;
+    }
+  }
+  const double volume = std::pow(std::max(reach, shortest), 3);
+  if (reach > 0 && mass - sure * mass_std > heaviest * volume) {
+    out.push_back(
+        {Severity::error,
+         {},
+         fmt::format("torques ask for a robot of at least {:.3g} kg that reaches {:.2g} m: are they in mN*m or "
+                     "motor current? Set torque_gain so that they are in N*m at the joint",
+                     mass, reach)});
+  } else if (reach > 0 && mass > 0 && mass + sure * mass_std < lightest * volume) {
+    out.push_back(
+        {Severity::error,
+         {},
+         fmt::format("torques ask for no more than {:.2g} kg in a robot that reaches {:.2g} m: are they in "
+                     "kN*m, or on the motor's side of the gearbox? Set torque_gain so that they are in N*m at "
+                     "the joint",
+                     mass, reach)});
+  }
+}
+
+void check_against_urdf(const Robot& robot, const Rows& rows, const Rows::Fit& fit, std::vector<Suspicion>& out) {
+  const DhChain chain = to_dh(robot);
+  const auto n = static_cast<Index>(robot.size());
+  VectorXd pi(n * static_cast<Index>(parameters_per_link));
+  for (std::size_t i = 0; i < robot.size(); ++i) {
+    if (!robot.joints[i].inertial) return;
+    const auto values = to_array(to_link_inertia(*robot.joints[i].inertial, chain.urdf_in_dh[i]));
+    pi.segment(static_cast<Index>(i * parameters_per_link), static_cast<Index>(parameters_per_link)) =
+        Eigen::Map<const VectorXd>(values.data(), static_cast<Index>(parameters_per_link));
+  }
+  VectorXd given(n);
+  for (Index j = 0; j < n; ++j) given[j] = rows.gravity_of(pi, j);
+  for (Index j = 0; j < n; ++j) {
+    if (!(given[j] > 0.1 * given.maxCoeff()) || robot.gravity.norm() == 0) continue;
+    const Estimate found = rows.gravity(fit, j);
+    const double ratio = found.value / given[j], spread = sure * found.std / given[j];
+    if (ratio - spread < 10 && ratio + spread > 0.1) continue;
+    out.push_back(
+        {Severity::warning, static_cast<std::size_t>(j),
+         fmt::format("gravity on {} is {:.2g} times that of the URDF's masses: check torque_gain, or the URDF",
+                     title(robot, static_cast<std::size_t>(j)), ratio)});
+  }
+}
+
+}  // namespace
+
+std::vector<Suspicion> check_plausible(const Robot& robot, const std::vector<ProcessedLog>& logs,
+                                       const std::vector<JointFit>& joints) {
+  const auto n = static_cast<Index>(robot.size());
+  const Rows rows(robot, logs, joints);
+  if (!rows.enough()) return {};
+  Rows::Fit fit = best_signs(rows, 1, n);
+  if (Rows::Fit other = best_signs(rows, -1, n); other.score < fit.score - worth_a_flip) fit = std::move(other);
+
+  // The other joints can't tell which of two opposite signs all have: inertia and friction can.
+  VectorXd signs = fit.signs;
+  std::vector<std::string> why(robot.size(), "the other joints' torques fit together only with the opposite sign");
+  std::vector<Suspicion> out;
+  for (Index j = 0; j < n; ++j) {
+    double share = 0;
+    const Estimate inertia = rows.inertia(fit, j, share);
+    const Estimate friction = rows.friction(fit, j);
+    const auto at = static_cast<std::size_t>(j);
+    const bool revolute = robot.joints[at].type == JointType::revolute;
+    const bool heavy = std::fabs(inertia.value) > sure * inertia.std;
+    const bool rubs = std::fabs(friction.value) > sure * friction.std &&
+                      std::fabs(friction.value) > material_friction * rows.torque_rms(j);
+    const std::string of_inertia = fmt::format("its own inertia comes out as {:.3g} +- {:.2g} {}", inertia.value,
+                                               inertia.std, revolute ? "kg m^2" : "kg");
+    const std::string of_friction = fmt::format("its friction comes out as {:.3g} +- {:.2g} {}", friction.value,
+                                                friction.std, robot.joints[at].torque_unit());
+    const bool light = heavy && inertia.value < 0 && share > 0.9, drives = rubs && friction.value < 0;
+    // A turned sign turns both: where one is negative and the other is surely not, the model is what is wrong.
+    if (light && !(rubs && !drives)) {
+      signs[j] = -signs[j];
+      why[at] = of_inertia;
+    } else if (drives && !(heavy && !light)) {
+      signs[j] = -signs[j];
+      why[at] = of_friction;
+    } else if (light && -inertia.value * rows.acceleration_rms(j) > material_inertia * rows.torque_rms(j)) {
+      out.push_back({Severity::warning, at,
+                     fmt::format("{}: {}, though its friction has the right sign: is the kinematics that of the robot, "
+                                 "or an effect missing?",
+                                 title(robot, at), of_inertia)});
+    } else if (drives) {
+      out.push_back({Severity::warning, at,
+                     fmt::format("{}: {}, which brakes no joint: is an effect missing, or is its velocity wrong?",
+                                 title(robot, at), of_friction)});
+    }
+  }
+  if (fit.up < 0) {
+    out.push_back({Severity::error,
+                   {},
+                   "gravity acts against the masses that move: turn robot.gravity round, or check zero and sign of q"});
+  }
+  if ((signs.array() < 0).all() && n > 1) {
+    out.push_back(
+        {Severity::error,
+         {},
+         fmt::format("torque has the wrong sign on all joints (joint 1: {}): make each torque_gain negative", why[0])});
+  } else {
+    for (Index j = 0; j < n; ++j) {
+      const auto at = static_cast<std::size_t>(j);
+      if (signs[j] > 0) continue;
+      out.push_back({Severity::error, at,
+                     fmt::format("torque of {} has the wrong sign: {}; make its torque_gain negative (or its q, if "
+                                 "that is what is turned)",
+                                 title(robot, at), why[at])});
+    }
+  }
+  const bool signs_differ = (signs - fit.signs).norm() > 0;
+  const Rows::Fit final_fit = signs_differ ? rows.fit(fit.up, signs) : std::move(fit);
+  check_units(robot, rows, final_fit, out);
+  check_against_urdf(robot, rows, final_fit, out);
+  return out;
+}
+
+}  // namespace fxdyn
