@@ -62,18 +62,18 @@ JointSeries joint_series(const ProcessedLog& log, std::size_t joint, const std::
   const auto j = static_cast<Eigen::Index>(joint);
   MotionRows motion = log.joint_motion(j);
   JointSeries series{motion.q, motion.dq, motion.ddq, {}, log.step_s};
-  const auto& effects = designs[joint].effects;
-  const bool peers = std::any_of(effects.begin(), effects.end(),
-                                 [](const EffectFit& fit) { return find_effect(fit.effect)->needs_peers; });
-  if (peers) {
-    MotionRows all = log.motion();
-    series.peers_sign.resize(all.dq.rows(), all.dq.cols());
-    for (std::size_t k = 0; k < designs.size(); ++k) {
-      const auto peer = static_cast<Eigen::Index>(k);
-      series.peers_sign.col(peer) = (all.dq.col(peer) / designs[k].sign_width).array().tanh();
+  for (const EffectFit& fit : designs[joint].effects) {
+    if (!find_effect(fit.effect)->needs_peers) continue;
+    // the one that its first shape names; nobody looks at the others
+    const auto peer = static_cast<std::size_t>(fit.shape[0]) - 1;
+    const auto k = static_cast<Eigen::Index>(peer);
+    for (Eigen::MatrixXd* all : {&series.peers_dq, &series.peers_sign, &series.peers_ddq}) {
+      if (all->size() == 0) all->setZero(log.samples(), log.q.cols());
     }
-    series.peers_dq = std::move(all.dq);
-    series.peers_ddq = std::move(all.ddq);
+    const MotionRows other = log.joint_motion(k);
+    series.peers_sign.col(k) = (other.dq / designs[peer].sign_width).array().tanh();
+    series.peers_dq.col(k) = other.dq;
+    series.peers_ddq.col(k) = other.ddq;
   }
   return series;
 }
@@ -207,23 +207,44 @@ Fitter::Fitter(const Robot& robot, const std::vector<ProcessedLog>& logs, std::v
   own_rows_.resize(joints());
   own_moments_.resize(joints());
   torque_rows_.resize(joints());
-  set_torque_lead(logs.front().filter.torque_lead_s);
+  parallel_for(joints(), [&](std::size_t j) { make_base_moments(j); });
+  set_torque_lead(logs.front().filter.torque_lead_s, filtered_torque());
   for (std::size_t j = 0; j < joints(); ++j) set_design(j, design_[j]);
 }
 
-void Fitter::set_torque_lead(double seconds) {
+std::vector<Eigen::MatrixXd> Fitter::filtered_torque() const {
+  std::vector<Eigen::MatrixXd> out;
+  for (const ProcessedLog& log : logs()) out.push_back(log.filter_columns(log.tau));
+  return out;
+}
+
+void Fitter::set_torque_lead(double seconds, const std::vector<Eigen::MatrixXd>& filtered) {
   torque_lead_s_ = seconds;
   parallel_for(joints(), [&](std::size_t j) {
     torque_rows_[j].resize(data_->load_rows[j].size());
     for (std::size_t l = 0; l < logs().size(); ++l) {
       const ProcessedLog& log = logs()[l];
-      const Eigen::MatrixXd tau = at_other_times(log.tau.col(static_cast<Eigen::Index>(j)), -seconds / log.step_s);
-      torque_rows_[j].segment(data_->first_row[l], log.rows()) = log.decimate(log.filter_columns(tau));
+      const auto tau = filtered[l].col(static_cast<Eigen::Index>(j));
+      torque_rows_[j].segment(data_->first_row[l], log.rows()) =
+          log.decimate(at_other_times(tau, -seconds / log.step_s));
     }
     torque_rows_[j] -= data_->load_rows[j];  // a load that is known is not looked for
-    make_base_moments(j);
-    if (own_rows_[j].size() > 0 || own_moments_[j].size() > 0) own_moments_[j] = own_moments(j, own_rows_[j]);
+    project_torque(j);
   });
+}
+
+void Fitter::project_torque(std::size_t joint) {
+  for (std::size_t b = 0; b < data_->blocks.size(); ++b) {
+    const Block& block = data_->blocks[b];
+    const Eigen::Index count = block.to - block.from;
+    const auto y = torque_rows_[joint].segment(block.from, count);
+    const Eigen::VectorXd wy = row_weights_[joint].segment(block.from, count).cwiseProduct(y);
+    BaseMoments& m = base_moments_[joint][b];
+    m.projection = data_->base_rows[joint].middleRows(block.from, count).transpose() * wy;
+    m.square = wy.dot(y);
+    if (!own_moments_[joint].empty())
+      own_moments_[joint][b].projection = own_rows_[joint].middleRows(block.from, count).transpose() * wy;
+  }
 }
 
 Eigen::MatrixXd Fitter::own_rows(std::size_t joint, const JointFit& design) const {
@@ -232,8 +253,9 @@ Eigen::MatrixXd Fitter::own_rows(std::size_t joint, const JointFit& design) cons
   // Columns of effects that are as in the current design need not be made again.
   std::vector<Eigen::Index> kept(design.effects.size(), -1);
   const JointFit& now = design_[joint];
-  if (own_rows_[joint].size() > 0 && now.sign_width == design.sign_width) {
+  if (own_rows_[joint].size() > 0) {
     for (std::size_t e = 0; e < design.effects.size(); ++e) {
+      if (now.sign_width != design.sign_width && find_effect(design.effects[e].effect)->uses_sign) continue;
       Eigen::Index at = 0;
       for (const EffectFit& fit : now.effects) {
         if (fit.effect == design.effects[e].effect && fit.shape == design.effects[e].shape) kept[e] = at;
@@ -275,13 +297,12 @@ void Fitter::make_base_moments(std::size_t joint) {
   for (const Block& block : data_->blocks) {
     const Eigen::Index count = block.to - block.from;
     const auto x = data_->base_rows[joint].middleRows(block.from, count);
-    const auto y = torque_rows_[joint].segment(block.from, count);
     const auto w = row_weights_[joint].segment(block.from, count);
-    const Eigen::MatrixXd wx = w.asDiagonal() * x;
-    BaseMoments m{Eigen::MatrixXd::Zero(x.cols(), x.cols()), wx.transpose() * y, (w.array() * y.array().square()).sum(),
-                  w.sum()};
-    m.gram.triangularView<Eigen::Lower>() += wx.transpose() * x;
+    BaseMoments m;
+    m.gram.setZero(x.cols(), x.cols());
+    m.gram.triangularView<Eigen::Lower>() += x.transpose() * (w.asDiagonal() * x);
     m.gram.triangularView<Eigen::StrictlyUpper>() = m.gram.transpose();
+    m.count = w.sum();
     moments.push_back(std::move(m));
   }
 }
@@ -513,6 +534,14 @@ std::vector<std::size_t> Fitter::train_blocks() const {
 
 NormalEquations Fitter::normal_equations() const { return assemble(train_blocks(), current(), designs()); }
 
+double Fitter::train_rows() const {
+  double rows = 0;
+  for (const auto& joint : base_moments_) {
+    for (const std::size_t b : train_blocks()) rows += joint[b].count;
+  }
+  return rows;
+}
+
 Solution Fitter::fit() const {
   const NormalEquations equations = normal_equations();
   Solution solution = solve(equations);
@@ -568,7 +597,8 @@ IdentifiedModel Fitter::to_model(const Solution& solution) const {
     const auto k = static_cast<Eigen::Index>(i);
     links[column / parameters_per_link][column % parameters_per_link] = solution.beta[k];
     model.base.push_back({column, parameter_name(base().columns[i]), solution.beta[k],
-                          solution.beta_std.size() > 0 ? solution.beta_std[k] : 0.0, expression(base(), k)});
+                          solution.beta_std.size() > 0 ? solution.beta_std[k] : 0.0,
+                          solution.essential.empty() || solution.essential[i], expression(base(), k)});
   }
   for (const auto& link : links) model.inertia.push_back(to_inertia(link));
   for (std::size_t j = 0; j < joints(); ++j) {

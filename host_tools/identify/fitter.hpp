@@ -29,6 +29,7 @@ struct Solution {
   std::vector<Eigen::VectorXd> theta;  ///< per joint, the joint's own columns
   Eigen::VectorXd beta_std;
   std::vector<Eigen::VectorXd> theta_std;
+  std::vector<bool> essential;  ///< per base parameter; empty: all
   std::vector<double> sign_width_std;
   std::vector<std::vector<std::vector<double>>> shape_std;  ///< [joint][effect][shape], 0: not estimated
   Eigen::MatrixXd covariance;                               ///< of x (NormalEquations)
@@ -81,7 +82,9 @@ class Fitter {
 
   void set_design(std::size_t joint, JointFit design);
   /// The torque columns are this far ahead of the motion (FilterFit::torque_lead_s).
-  void set_torque_lead(double seconds);
+  /// `filtered`: filtered_torque(), which does not change with the lead.
+  void set_torque_lead(double seconds, const std::vector<Eigen::MatrixXd>& filtered);
+  std::vector<Eigen::MatrixXd> filtered_torque() const;
   double torque_lead_s() const { return torque_lead_s_; }
 
   /// Effects whose columns are, on the train rows, sums of base columns and of the effects before them (relative 1e-5):
@@ -113,6 +116,8 @@ class Fitter {
   /// The fit on all train rows, with standard deviations: a sandwich of the residual's autocorrelation, so that
   /// filtered (correlated) noise counts as what it is; shapes are unknowns there like the coefficients.
   Solution fit() const;
+  /// The same values, nothing else.
+  Solution estimate() const { return solve(normal_equations()); }
   /// The same without standard deviations by recursive least squares (square-root information form: every row is
   /// rotated into [R | z], R x = z) over the train rows in their order. What was known a second ago counts `forgetting`
   /// (1: nothing is forgotten, and the last estimate is fit()'s). `trace`: x at `points` moments.
@@ -124,6 +129,10 @@ class Fitter {
   Recursion recursive(double forgetting, Eigen::Index points) const;
   /// Of the train rows with the current weights.
   NormalEquations normal_equations() const;
+  /// Sum over the train rows of the weighted squared residual.
+  double weighted_square(const Solution& solution) const;
+  /// Rows of all joints in the train logs, by their weights.
+  double train_rows() const;
   IdentifiedModel to_model(const Solution& solution) const;
   /// Rows that are left out since the drive was at its limit, of each joint.
   std::vector<Eigen::Index> saturated_rows() const;
@@ -150,7 +159,9 @@ class Fitter {
   using Own = std::vector<OwnMoments>;  ///< by block
 
   Eigen::MatrixXd own_rows(std::size_t joint, const JointFit& design) const;
+  /// But for what the torque enters.
   void make_base_moments(std::size_t joint);
+  void project_torque(std::size_t joint);
   Own own_moments(std::size_t joint, const Eigen::MatrixXd& own) const;
   Eigen::VectorXd residual(std::size_t joint, const Solution& solution) const;
   static Eigen::VectorXd ridge_of(const JointFit& design, double ridge, Eigen::Index count);
@@ -165,7 +176,6 @@ class Fitter {
   /// The normal equations of coefficients and shapes together at a solution; projection is X^T W residual.
   NormalEquations with_shapes(const Solution& solution, std::vector<Eigen::MatrixXd>& shape_rows) const;
   void add_standard_deviations(Solution& solution) const;
-  double weighted_square(const Solution& solution) const;
   /// Joints `first` .. `last` - 1.
   std::vector<Judgement> judged(std::size_t first, std::size_t last, const std::vector<const Own*>& own,
                                 const std::vector<const JointFit*>& design) const;

@@ -318,10 +318,6 @@ FlexibleJoint identify_joint(const JointData& data, const IdentifiedModel& model
   return out;
 }
 
-nlohmann::json quantity_json(double value, double std, std::string_view unit) {
-  return {{"value", value}, {"std", std}, {"unit", unit}};
-}
-
 }  // namespace
 
 std::vector<FlexibleJoint> identify_flexible(const FlexibleInput& input) {
@@ -354,24 +350,6 @@ std::vector<FlexibleJoint> identify_flexible(const FlexibleInput& input) {
     if (joint) found.push_back(std::move(*joint));
   }
   return found;
-}
-
-nlohmann::json flexible_json(const FlexibleJoint& flexible, const Robot& robot) {
-  const Joint& joint = robot.joints[flexible.joint];
-  const bool revolute = joint.type == JointType::revolute;
-  nlohmann::json out = {{"joint", joint.name},
-                        {"index", flexible.joint + 1},
-                        {"found", flexible.found},
-                        {"deflection_rms", {{"value", flexible.deflection_rms}, {"unit", joint.position_unit()}}},
-                        {"explained", flexible.explained},
-                        {"note", flexible.note}};
-  if (!flexible.found) return out;
-  out["stiffness"] = quantity_json(flexible.stiffness, flexible.stiffness_std, revolute ? "N*m/rad" : "N/m");
-  out["damping"] = quantity_json(flexible.damping, flexible.damping_std, revolute ? "N*m*s/rad" : "N*s/m");
-  if (flexible.effective_inertia != 0)
-    out["effective_inertia"] =
-        quantity_json(flexible.effective_inertia, flexible.inertia_std, revolute ? "kg*m^2" : "kg");
-  return out;
 }
 
 EffectFit elasticity_effect(const FlexibleJoint& joint) {

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
-#include <string>
 #include <vector>
 
 #include "host_tools/identify/dataset.hpp"
@@ -17,18 +15,6 @@
 
 namespace fxdyn {
 
-/// One joint's gear. Prismatic joints: N/m, N*s/m, kg.
-struct FlexibleJoint {
-  std::size_t joint = 0;                          ///< from 0
-  double stiffness = 0, stiffness_std = 0;        ///< K [N*m/rad]
-  double damping = 0, damping_std = 0;            ///< B [N*m*s/rad]
-  double effective_inertia = 0, inertia_std = 0;  ///< J_eff: rotor and gears [kg*m^2]; 0: not known
-  double deflection_rms = 0;                      ///< of q - qlink about its mean, filtered [rad | m]
-  double explained = 0;                           ///< share of its power that the fit explains
-  bool found = false;                             ///< else the figures are noise and `note` says why
-  std::string note;                               ///< what a reader should know, empty if nothing
-};
-
 struct FlexibleInput {
   const IdentifiedModel& model;           ///< as identified: rigid body on the link's motion, effects on the motor's
   const std::vector<ProcessedLog>& logs;  ///< those that fit
@@ -42,10 +28,6 @@ struct FlexibleInput {
 /// the data shows them, and noted. A joint that does not bend measurably, or whose load is not known well enough, comes
 /// back with found = false.
 std::vector<FlexibleJoint> identify_flexible(const FlexibleInput& input);
-
-/// {"joint", "index", "found", "stiffness": {"value", "std", "unit"}, "damping", "effective_inertia", ...} for
-/// model.json.
-nlohmann::json flexible_json(const FlexibleJoint& joint, const Robot& robot);
 
 /// The same gear as an effect of the model: compliance 1 / K, relaxation B / K (0 where B is not told from 0).
 EffectFit elasticity_effect(const FlexibleJoint& joint);

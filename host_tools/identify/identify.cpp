@@ -6,6 +6,9 @@
 
 #include "host_tools/error.hpp"
 #include "host_tools/files.hpp"
+#include "host_tools/identify/essential.hpp"
+#include "host_tools/identify/flexible.hpp"
+#include "host_tools/identify/plausible.hpp"
 #include "host_tools/parallel.hpp"
 
 namespace fxdyn {
@@ -59,6 +62,7 @@ struct Scales {
 /// The joint's design with the motor that it shares with a neighbour, at the best of neighbours, directions and widths.
 Candidate search_coupling(const Fitter& fitter, std::size_t joint, std::string_view effect, const Scales& scales) {
   const bool motor = effect == MotorCoupling::name;
+  const double now = fitter.held_out()[joint].rmse;
   Candidate best{fitter.design(joint), {}};
   for (const std::size_t k : {joint - 1, joint + 1}) {
     if (k >= fitter.joints()) continue;
@@ -74,6 +78,8 @@ Candidate search_coupling(const Fitter& fitter, std::size_t joint, std::string_v
     }
   }
   if (!motor || best.design.effects.empty() || best.design.effects.back().effect != effect) return best;
+  // only what comes near being kept is worth a search
+  if (best.judgement.rmse > (1 - 0.5 * worth_keeping) * now) return best;
   Candidate refined = search(fitter, joint, best.design, 1e-4 * scales.velocity, 0.3 * scales.velocity,
                              [](JointFit& d, double value) { d.effects.back().shape[2] = value; });
   return refined.judgement.rmse < best.judgement.rmse ? refined : best;
@@ -114,8 +120,9 @@ double overall(const std::vector<Judgement>& judgements) {
 /// share that an effect has to bring; one number for all joints does not overfit, so blocks of one log ask for no more.
 void find_torque_lead(Fitter& fitter, double cutoff_hz) {
   const double before = overall(fitter.held_out()), start = fitter.torque_lead_s();
+  const std::vector<Eigen::MatrixXd> torque = fitter.filtered_torque();
   const auto judge = [&](double lead) {
-    fitter.set_torque_lead(lead);
+    fitter.set_torque_lead(lead, torque);
     return overall(fitter.held_out());
   };
   constexpr int half = 6;
@@ -136,7 +143,7 @@ void find_torque_lead(Fitter& fitter, double cutoff_hz) {
       best_lead = lead;
     }
   }
-  fitter.set_torque_lead(best < before + std::log(1 - worth_keeping) ? best_lead : start);
+  fitter.set_torque_lead(best < before + std::log(1 - worth_keeping) ? best_lead : start, torque);
 }
 
 }  // namespace
@@ -276,6 +283,10 @@ std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progres
   }
   progress.stage("building the regressor", 1);
   auto fitter = std::make_unique<Fitter>(project.robot, data.logs, design);
+  for (const Suspicion& suspicion : check_plausible(project.robot, data.logs, design)) {
+    if (suspicion.severity == Severity::error) throw DataError(suspicion.text);
+    data.notes.push_back(suspicion.text);
+  }
   const auto dependent = fitter->dependent_effects();
   for (auto d = dependent.rbegin(); d != dependent.rend(); ++d) {
     JointFit joint = fitter->design(d->joint);
@@ -342,14 +353,46 @@ std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progres
 
 std::string project_hash(const Project& project) { return hash_of(read_file(project.file) + read_file(project.urdf)); }
 
-IdentifiedModel finish_model(const Fitter& fitter, const Project& project, const GateData& data) {
+namespace {
+
+/// Of X with columns of length one, from X^T X.
+double condition_number(const Eigen::MatrixXd& information) {
+  const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scale.asDiagonal() * information * scale.asDiagonal(),
+                                                              Eigen::EigenvaluesOnly);
+  return std::sqrt(solver.eigenvalues().maxCoeff() / std::max(solver.eigenvalues().minCoeff(), 1e-300));
+}
+
+/// The weighted squared residual of a row: 1 for weights of one over the variance.
+double variance_of_row(const Fitter& fitter, const Solution& solution) {
+  return fitter.weighted_square(solution) / fitter.train_rows();
+}
+
+}  // namespace
+
+Estimate finish_model(const Fitter& fitter, const Project& project, const GateData& data) {
+  const IdentifySettings& settings = project.identify;
+  Estimate out;
   Solution solution = fitter.fit();
-  if (project.identify.method == "rls") {
-    const Solution last = fitter.recursive(project.identify.forgetting, 1).solution;
-    solution.beta = last.beta;
-    solution.theta = last.theta;
+  const NormalEquations equations = fitter.normal_equations();
+  out.condition = condition_number(equations.information);
+  if (settings.method == "rls") {
+    out.recursion = fitter.recursive(settings.forgetting, 200);
+    solution.beta = out.recursion->solution.beta;
+    solution.theta = out.recursion->solution.theta;
   }
-  IdentifiedModel model = fitter.to_model(solution);
+  const Solution essential = essential_parameters(solution, equations);
+  if (settings.physical) {
+    out.physical = fit_physical(fitter, project.robot, variance_of_row(fitter, solution));
+    if (out.physical->constrained && !settings.essential) {
+      const Solution possible = physical_solution(fitter, *out.physical);
+      solution.beta = possible.beta;
+      solution.theta = possible.theta;
+    }
+  }
+  solution.essential = essential.essential;
+  out.model = fitter.to_model(settings.essential ? essential : solution);
+  IdentifiedModel& model = out.model;
   model.filter = data.filter;
   model.filter.torque_lead_s = fitter.torque_lead_s();
   // "": what a log that the project does not name is read with, if its own logs agree.
@@ -365,7 +408,11 @@ IdentifiedModel finish_model(const Fitter& fitter, const Project& project, const
   model.project = project.file.filename().string();
   model.project_hash = fxdyn::project_hash(project);
   model.logs = data.references;
-  return model;
+  for (const FlexibleJoint& joint : identify_flexible({model, data.logs})) {
+    model.joints[joint.joint].flexible = joint;
+    if (joint.found) model.joints[joint.joint].effects.push_back(elasticity_effect(joint));
+  }
+  return out;
 }
 
 }  // namespace fxdyn

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "host_tools/identify/fitter.hpp"
+#include "host_tools/identify/physical.hpp"
 #include "host_tools/progress.hpp"
 
 namespace fxdyn {
@@ -32,7 +33,15 @@ std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progres
 /// Of the project file and its URDF.
 std::string project_hash(const Project& project);
 
-/// The fitter's model with everything that model.json records.
-IdentifiedModel finish_model(const Fitter& fitter, const Project& project, const GateData& data);
+/// What a fitter's fit comes to.
+struct Estimate {
+  IdentifiedModel model;  ///< with everything that model.json records
+  /// The physically possible fit, where the project asks for it; the model has its base parameters unless the project
+  /// asks for the essential ones.
+  std::optional<PhysicalFit> physical;
+  double condition = 0;                       ///< of the column-normalised weighted regressor, base and own columns
+  std::optional<Fitter::Recursion> recursion;  ///< method rls
+};
+Estimate finish_model(const Fitter& fitter, const Project& project, const GateData& data);
 
 }  // namespace fxdyn

@@ -153,16 +153,15 @@ Fit solve(const Rows& rows) {
     place(middle, j, weights[j] * weights[j] * sum);
     fit.correlated += (2 * gamma.sum() / gamma[0] - 1) / static_cast<double>(n);
   }
-  MatrixXd inverse(p, p);
-  for (Index k = 0; k < p; ++k) inverse.col(k) = least_squares(fit.information, VectorXd::Unit(p, k));
+  const MatrixXd inverse = SymmetricSolver(fit.information).inverse();
   const MatrixXd covariance = inverse * middle * inverse.transpose();
   fit.covariance = covariance.topLeftCorner(ten, ten);
   fit.nuisance_std = covariance.diagonal().tail(p - ten).cwiseMax(0).cwiseSqrt();
-  const MatrixXd nuisance = fit.information.bottomRightCorner(p - ten, p - ten);
+  const SymmetricSolver nuisance(fit.information.bottomRightCorner(p - ten, p - ten));
   fit.own = fit.information.topLeftCorner(ten, ten);
   for (Index k = 0; k < ten; ++k) {
     fit.own.col(k) -=
-        fit.information.topRightCorner(ten, p - ten) * least_squares(nuisance, fit.information.col(k).tail(p - ten));
+        fit.information.topRightCorner(ten, p - ten) * nuisance.solve(fit.information.col(k).tail(p - ten));
   }
   return fit;
 }
@@ -305,8 +304,8 @@ LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log) {
 
   out.effect.effect = Payload::name;
   out.effect.named = true;
-  const Vector3d& centre = out.body.centre;
-  out.effect.linear = {out.body.mass, centre.x(), centre.y(), centre.z()};
+  const Vector3d& com = out.body.centre;
+  out.effect.linear = {out.body.mass, com.x(), com.y(), com.z()};
   out.effect.linear_std = {std[0]};
   for (Index k = 1; k < 4; ++k) out.effect.linear_std.push_back(std[k]);
 

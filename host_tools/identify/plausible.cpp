@@ -7,6 +7,7 @@
 
 #include "host_tools/identify/physical.hpp"
 #include "host_tools/identify/regressor.hpp"
+#include "host_tools/identify/solver.hpp"
 #include "model/math.hpp"
 
 namespace fxdyn {
@@ -137,7 +138,7 @@ class Rows {
         projection.head(nb) += w * signs[j] * projections[joint].head(nb);
         projection.segment(at, own) = w * signs[j] * projections[joint].tail(own);
       }
-      fit.solution = least_squares(information, projection);
+      fit.solution = SymmetricSolver(information).solve(projection);
       fit.score = 0;
       for (Index j = 0; j < n_; ++j) {
         const auto joint = static_cast<std::size_t>(j);
@@ -147,8 +148,7 @@ class Rows {
         fit.score += std::log(residual[j] / squares_[joint]);
       }
     }
-    fit.covariance.resize(p, p);
-    for (Index k = 0; k < p; ++k) fit.covariance.col(k) = least_squares(information, VectorXd::Unit(p, k));
+    fit.covariance = SymmetricSolver(information).inverse();
     return fit;
   }
 

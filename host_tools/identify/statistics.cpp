@@ -245,6 +245,7 @@ void Fitter::reweight_rows() {
           (efficient * scale / magnitude.array().max(1e-300)).min(1.0).matrix());
       make_base_moments(j);
       own_moments_[j] = own_moments(j, own_rows_[j]);
+      project_torque(j);
       weights_[static_cast<Index>(j)] = 1 / (scale * scale);
     });
   }
@@ -263,6 +264,7 @@ void Fitter::forget(double forgetting) {
   for (std::size_t j = 0; j < joints(); ++j) {
     make_base_moments(j);
     own_moments_[j] = own_moments(j, own_rows_[j]);
+    project_torque(j);
   }
 }
 

@@ -93,15 +93,13 @@ ZeroPhaseFilter::ZeroPhaseFilter(double cutoff_hz, double step_s, int order) : c
   }
 }
 
-MatrixXd ZeroPhaseFilter::apply(const Eigen::Ref<const MatrixXd>& columns) const {
+/// `lanes` columns side by side from column `from`: each step waits for the one before it, and columns fill the wait.
+template <Index lanes>
+void ZeroPhaseFilter::apply_to(const Eigen::Ref<const MatrixXd>& columns, Index from, MatrixXd& result) const {
+  using Lanes = Eigen::Array<double, 1, lanes>;
   const Index n = columns.rows();
-  if (sections_.empty() || n < 3) return columns;
   // Far enough for the start to be forgotten to 1e-9: 4.5 times the 1 % of edge_samples().
   const Index pad = std::min(n - 1, edge_samples() * 9 / 2 + 1);
-
-  // Several columns side by side: each step waits for the one before it, and the columns fill the wait.
-  constexpr Index lanes = 8;
-  using Lanes = Eigen::Array<double, 1, lanes>;
   std::vector<Lanes> work(static_cast<std::size_t>(n + 2 * pad));
   // In place, from state at rest on the first value.
   const auto pass = [this](auto begin, auto end) {
@@ -118,35 +116,40 @@ MatrixXd ZeroPhaseFilter::apply(const Eigen::Ref<const MatrixXd>& columns) const
       }
     }
   };
-
-  MatrixXd result(n, columns.cols());
-  for (Index from = 0; from < columns.cols(); from += lanes) {
-    const Index count = std::min(lanes, columns.cols() - from);
-    // A zero-phase filter leaves straight lines alone: the one through the ends is taken out, so that the reflection is
-    // about zero and ramps pass exactly.
-    Lanes start = Lanes::Zero(), slope = Lanes::Zero();
-    for (Index c = 0; c < count; ++c) {
-      start[c] = columns(0, from + c);
-      slope[c] = (columns(n - 1, from + c) - start[c]) / static_cast<double>(n - 1);
-    }
-    const auto at = [&](Index i) -> Lanes& { return work[static_cast<std::size_t>(pad + i)]; };
-    for (Index i = 0; i < n; ++i) {
-      at(i).setZero();
-      for (Index c = 0; c < count; ++c)
-        at(i)[c] = columns(i, from + c) - (start[c] + slope[c] * static_cast<double>(i));
-    }
-    at(n - 1).setZero();
-    for (Index i = 1; i <= pad; ++i) {
-      at(-i) = -at(i);
-      at(n - 1 + i) = -at(n - 1 - i);
-    }
-    pass(work.begin(), work.end());
-    pass(work.rbegin(), work.rend());
-    for (Index c = 0; c < count; ++c) {
-      for (Index i = 0; i < n; ++i)
-        result(i, from + c) = at(i)[c] + (start[c] + slope[c] * static_cast<double>(i));
-    }
+  const auto at = [&](Index i) -> Lanes& { return work[static_cast<std::size_t>(pad + i)]; };
+  // A zero-phase filter leaves straight lines alone: the one through the ends is taken out, so that the reflection is
+  // about zero and ramps pass exactly.
+  Lanes start, slope;
+  for (Index c = 0; c < lanes; ++c) {
+    start[c] = columns(0, from + c);
+    slope[c] = (columns(n - 1, from + c) - start[c]) / static_cast<double>(n - 1);
   }
+  for (Index c = 0; c < lanes; ++c) {
+    for (Index i = 0; i < n; ++i) at(i)[c] = columns(i, from + c) - (start[c] + slope[c] * static_cast<double>(i));
+  }
+  at(n - 1).setZero();
+  for (Index i = 1; i <= pad; ++i) {
+    at(-i) = -at(i);
+    at(n - 1 + i) = -at(n - 1 - i);
+  }
+  pass(work.begin(), work.end());
+  pass(work.rbegin(), work.rend());
+  for (Index c = 0; c < lanes; ++c) {
+    for (Index i = 0; i < n; ++i) result(i, from + c) = at(i)[c] + (start[c] + slope[c] * static_cast<double>(i));
+  }
+}
+
+MatrixXd ZeroPhaseFilter::apply(const Eigen::Ref<const MatrixXd>& columns) const {
+  if (sections_.empty() || columns.rows() < 3) return columns;
+  MatrixXd result(columns.rows(), columns.cols());
+  Index from = 0;
+  const auto take = [&]<Index lanes>() {
+    for (; from + lanes <= columns.cols(); from += lanes) apply_to<lanes>(columns, from, result);
+  };
+  take.operator()<8>();
+  take.operator()<4>();
+  take.operator()<2>();
+  take.operator()<1>();
   return result;
 }
 

@@ -77,6 +77,9 @@ class ZeroPhaseFilter {
   struct Section {
     double b0, b1, b2, a1, a2;
   };
+  template <Eigen::Index lanes>
+  void apply_to(const Eigen::Ref<const Eigen::MatrixXd>& columns, Eigen::Index from, Eigen::MatrixXd& result) const;
+
   double cutoff_hz_;
   double step_s_;
   std::vector<Section> sections_;

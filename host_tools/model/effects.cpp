@@ -1,5 +1,8 @@
 #include "host_tools/model/effects.hpp"
 
+#include <algorithm>
+#include <array>
+
 #include "host_tools/error.hpp"
 
 #include <fmt/format.h>
@@ -54,12 +57,40 @@ Eigen::MatrixXd columns_of(std::span<const double> shape, double sign_width, con
 
 }  // namespace
 
+namespace {
+
+/// Whether another sign of the velocity changes any phi of the effect.
+template <class E>
+bool uses_sign() {
+  std::vector<double> words;
+  for (std::size_t i = 0; i < E::shape.size(); ++i)
+    words.push_back(E::stored_shape(i, std::clamp(1e-3, E::shape[i].lower, E::shape[i].upper), 0.002));
+  std::array<std::vector<double>, 2> phis;
+  for (std::size_t k = 0; k < 2; ++k) {
+    typename E::template State<Real> state{};
+    Saturations none;
+    JointInput<Real> u{0.3, 0.02, 0.5, k == 0 ? 0.2 : 0.9, 1.0, 2.0, {}};
+    const std::array<JointInput<Real>, 1> peers{u};
+    u.peers = peers;
+    for (int tick = 0; tick < 3; ++tick) {
+      u.q += 0.01;
+      E::template basis<Real>(u, Words<Real>{words.data()}, state, none,
+                              [&](auto, std::size_t, double phi) { phis[k].push_back(phi); });
+    }
+  }
+  return phis[0] != phis[1];
+}
+
+}  // namespace
+
 const std::vector<EffectInfo>& effect_infos() {
   static const std::vector<EffectInfo> list = [] {
     std::vector<EffectInfo> all;
     const auto add = [&]<class E>() {
-      all.push_back(
-          {E::name, E::equation, E::shape, E::linear, acts_on<E>, needs_structural<E>, needs_total<E>, needs_peers<E>});
+      bool sign = false;
+      if constexpr (acts_on<E> != ActsOn::body) sign = uses_sign<E>();
+      all.push_back({E::name, E::equation, E::shape, E::linear, acts_on<E>, needs_structural<E>, needs_total<E>,
+                     needs_peers<E>, sign});
     };
     Catalogue::for_each(add);
     BodyEffects::for_each(add);

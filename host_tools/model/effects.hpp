@@ -16,6 +16,7 @@ struct EffectInfo {
   std::span<const ParameterInfo> shape, linear;
   ActsOn acts_on;
   bool needs_structural, needs_total, needs_peers;
+  bool uses_sign;  ///< its phi depends on the joint's sign width
 };
 
 /// All effects, those on the body last.

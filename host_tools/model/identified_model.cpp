@@ -127,6 +127,10 @@ Formats to_formats(const json& j) {
   return formats;
 }
 
+json quantity_json(double value, double std, std::string_view unit) {
+  return {{"value", value}, {"std", std}, {"unit", unit}};
+}
+
 json joint_json(const Robot& robot, std::size_t index, const JointFit& fit) {
   const Joint& joint = robot.joints[index];
   const bool prismatic = joint.type == JointType::prismatic;
@@ -144,6 +148,7 @@ json joint_json(const Robot& robot, std::size_t index, const JointFit& fit) {
                 {"acceleration", fit.ddq_limit},
                 {"torque", fit.tau_limit}}},
               {"effects", effects}};
+  if (fit.flexible) out["flexible"] = flexible_json(*fit.flexible, robot);
   if (fit.bls) {
     out["bls"] = {{"inputs", "physical"},
                   {"nodes", fit.bls->nodes()},
@@ -154,6 +159,24 @@ json joint_json(const Robot& robot, std::size_t index, const JointFit& fit) {
                   {"weights", matrix_json(fit.bls->weights)},
                   {"coefficients", vector_json(fit.bls->coefficients)}};
   }
+  return out;
+}
+
+FlexibleJoint to_flexible(const json& j) {
+  FlexibleJoint out;
+  out.joint = j.at("index").get<std::size_t>() - 1;
+  out.found = j.at("found");
+  out.deflection_rms = j.at("deflection_rms").at("value");
+  out.explained = j.at("explained");
+  out.note = j.at("note");
+  const auto read = [&](const char* name, double& value, double& std) {
+    if (!j.contains(name)) return;
+    value = j.at(name).at("value");
+    std = j.at(name).at("std");
+  };
+  read("stiffness", out.stiffness, out.stiffness_std);
+  read("damping", out.damping, out.damping_std);
+  read("effective_inertia", out.effective_inertia, out.inertia_std);
   return out;
 }
 
@@ -169,6 +192,7 @@ JointFit to_joint(const json& j) {
   fit.ddq_limit = limits.at("acceleration");
   fit.tau_limit = limits.at("torque");
   for (const json& effect : j.at("effects")) fit.effects.push_back(to_effect(effect));
+  if (j.contains("flexible")) fit.flexible = to_flexible(j.at("flexible"));
   if (j.contains("bls")) {
     const json& b = j.at("bls");
     BroadLearningFit bls;
@@ -195,6 +219,24 @@ const EffectFit* JointFit::find(std::string_view effect) const {
   return nullptr;
 }
 
+json flexible_json(const FlexibleJoint& flexible, const Robot& robot) {
+  const Joint& joint = robot.joints[flexible.joint];
+  const bool revolute = joint.type == JointType::revolute;
+  json out = {{"joint", joint.name},
+                        {"index", flexible.joint + 1},
+                        {"found", flexible.found},
+                        {"deflection_rms", {{"value", flexible.deflection_rms}, {"unit", joint.position_unit()}}},
+                        {"explained", flexible.explained},
+                        {"note", flexible.note}};
+  if (!flexible.found) return out;
+  out["stiffness"] = quantity_json(flexible.stiffness, flexible.stiffness_std, revolute ? "N*m/rad" : "N/m");
+  out["damping"] = quantity_json(flexible.damping, flexible.damping_std, revolute ? "N*m*s/rad" : "N*s/m");
+  if (flexible.effective_inertia != 0)
+    out["effective_inertia"] =
+        quantity_json(flexible.effective_inertia, flexible.inertia_std, revolute ? "kg*m^2" : "kg");
+  return out;
+}
+
 json formats_json(const Formats& formats) {
   json out;
   for (std::size_t i = 0; i < quantity_count; ++i) out[std::string(quantity_names[i])] = formats.quantity[i];
@@ -212,6 +254,7 @@ json to_json(const IdentifiedModel& model) {
                     {"expression", p.expression},
                     {"value", p.value},
                     {"std", p.std},
+                    {"essential", p.essential},
                     {"relative_std", p.value != 0 ? std::fabs(p.std / p.value) : 0.0}});
   }
   json inertia = json::array();
@@ -280,7 +323,8 @@ IdentifiedModel read_model(const std::filesystem::path& file) {
       throw InputError("robot, inertia and joints differ in length");
     }
     for (const json& p : j.at("base_parameters")) {
-      model.base.push_back({p.at("column"), p.at("name"), p.at("value"), p.at("std"), p.at("expression")});
+      model.base.push_back({p.at("column"), p.at("name"), p.at("value"), p.at("std"), p.value("essential", true),
+                            p.at("expression")});
     }
     const json& filter = j.at("filter");
     model.filter = {filter.at("position_cutoff_hz"),

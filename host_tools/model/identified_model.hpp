@@ -33,11 +33,25 @@ struct BroadLearningFit {
   Eigen::Index nodes() const { return weights.rows(); }
 };
 
+/// One joint's gear, by a second encoder on its link (host_tools/identify/flexible.hpp). Prismatic joints: N/m, N*s/m,
+/// kg.
+struct FlexibleJoint {
+  std::size_t joint = 0;                          ///< from 0
+  double stiffness = 0, stiffness_std = 0;        ///< K [N*m/rad]
+  double damping = 0, damping_std = 0;            ///< B [N*m*s/rad]
+  double effective_inertia = 0, inertia_std = 0;  ///< J_eff: rotor and gears [kg*m^2]; 0: not known
+  double deflection_rms = 0;                      ///< of q - qlink about its mean, filtered [rad | m]
+  double explained = 0;                           ///< share of its power that the fit explains
+  bool found = false;                             ///< else the figures are noise and `note` says why
+  std::string note;                               ///< what a reader should know, empty if nothing
+};
+
 struct JointFit {
   double sign_width = 0.01;   ///< s = tanh(dq / width) [rad/s | m/s]
   double sign_width_std = 0;  ///< 0: not estimated
   std::vector<EffectFit> effects;
   std::optional<BroadLearningFit> bls;
+  std::optional<FlexibleJoint> flexible;  ///< where the joint has a link encoder
   double rated_torque = 0;  ///< [N*m | N]
   double q_lower = 0, q_upper = 0, dq_limit = 0, ddq_limit = 0, tau_limit = 0;
   const EffectFit* find(std::string_view effect) const;
@@ -48,6 +62,7 @@ struct BaseParameter {
   std::size_t column = 0;  ///< 10 * link + parameter (model/rigid_body.hpp)
   std::string name;        ///< e.g. "hx3": first moment of link 3 about x, DH frame
   double value = 0, std = 0;
+  bool essential = true;   ///< the data would be explained worse without it
   std::string expression;  ///< the sum of standard parameters that it is, e.g. "Jzz1 + Jxx2 + 0.18 m3"
 };
 
@@ -88,6 +103,8 @@ struct IdentifiedModel {
 };
 
 nlohmann::json to_json(const IdentifiedModel& model);
+/// "flexible" of a joint in model.json.
+nlohmann::json flexible_json(const FlexibleJoint& joint, const Robot& robot);
 /// Formats as in model.json and export.json.
 nlohmann::json formats_json(const Formats& formats);
 /// @throws InputError naming the file and the missing or wrong key.

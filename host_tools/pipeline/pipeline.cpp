@@ -11,6 +11,7 @@
 #include "host_tools/identify/payload.hpp"
 #include "host_tools/report/metrics.hpp"
 #include "host_tools/report/report.hpp"
+#include "host_tools/robot/write_urdf.hpp"
 #include "host_tools/train/train.hpp"
 
 namespace fxdyn {
@@ -35,6 +36,18 @@ const LogFormat& format_of(const IdentifiedModel& model, const fs::path& log) {
   throw InputError(fmt::format(
       "{}: the project's logs have different columns or gains, and this one is none of them; name it like one",
       log.string()));
+}
+
+/// Estimates on the way through the logs: one row a moment, base parameters first, then each joint's coefficients.
+json recursion_json(const Fitter::Recursion& recursion, double forgetting) {
+  json trace = json::array();
+  for (Eigen::Index k = 0; k < recursion.trace.rows(); ++k) {
+    const Eigen::VectorXd row = recursion.trace.row(k);
+    trace.push_back(std::vector<double>(row.begin(), row.end()));
+  }
+  return {{"forgetting", forgetting},
+          {"t", std::vector<double>(recursion.t.begin(), recursion.t.end())},
+          {"estimates", trace}};
 }
 
 }  // namespace
@@ -77,7 +90,10 @@ json Pipeline::stage_metrics(const IdentifiedModel& model, const std::string& st
 }
 
 void Pipeline::finish(const Fitter& fitter, Stage stage, const json& training) {
-  IdentifiedModel model = finish_model(fitter, project_, data());
+  progress_.stage("fit, standard deviations, possible bodies", 1);
+  Estimate estimate = finish_model(fitter, project_, data());
+  progress_.step();
+  IdentifiedModel& model = estimate.model;
   model.stage = stage == Stage::trained ? "trained" : "identified";
   // The same structure with less: what friction and BLS are worth is seen on the same logs.
   const auto reduced = [&](bool friction) {
@@ -89,14 +105,35 @@ void Pipeline::finish(const Fitter& fitter, Stage stage, const json& training) {
       less.set_design(j, design);
     }
     weigh(less, project_.identify);
-    return finish_model(less, project_, data());
+    IdentifiedModel out = friction ? finish_model(less, project_, data()).model : less.to_model(less.estimate());
+    out.filter = model.filter;
+    return out;
   };
-  json stages = json::array({stage_metrics(reduced(false), "rigid"), stage_metrics(reduced(true), "friction")});
-  if (stage == Stage::trained) stages.push_back(stage_metrics(model, "bls"));
+  progress_.stage("errors on all logs", stage == Stage::trained ? 3 : 2);
+  json stages = json::array({stage_metrics(reduced(false), "rigid")});
+  progress_.step();
+  stages.push_back(stage_metrics(stage == Stage::trained ? reduced(true) : model, "friction"));
+  progress_.step();
+  if (stage == Stage::trained) {
+    stages.push_back(stage_metrics(model, "bls"));
+    progress_.step();
+  }
+  progress_.done();
   json metrics = {
       {"schema", "fxdyn.metrics/1"}, {"gate", fitter.gate()},         {"base_parameters", fitter.base().columns.size()},
       {"notes", data().notes},       {"logs", stages.back()["logs"]}, {"stages", stages}};
+  metrics["method"] = project_.identify.method;
+  metrics["condition_number"] = estimate.condition;
+  const std::vector<Eigen::Index> saturated = fitter.saturated_rows();
+  metrics["saturated_rows"] = std::vector<std::int64_t>(saturated.begin(), saturated.end());
+  if (estimate.physical)
+    metrics["physical"] = physical_json(project_.robot, to_dh(project_.robot), *estimate.physical);
+  if (estimate.recursion) metrics["recursive"] = recursion_json(*estimate.recursion, project_.identify.forgetting);
   if (!training.is_null()) metrics["training"] = training;
+  if (estimate.physical) {
+    write_urdf(project_.urdf, directory_ / "identified.urdf", project_.robot, to_dh(project_.robot),
+               estimate.physical->inertia);
+  }
   write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
   write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
   if (stage == Stage::identified) {
@@ -105,8 +142,12 @@ void Pipeline::finish(const Fitter& fitter, Stage stage, const json& training) {
 }
 
 std::unique_ptr<Fitter> Pipeline::fitter_from(const IdentifiedModel& model) {
-  auto fitter = std::make_unique<Fitter>(project_.robot, data().logs, model.joints);
-  fitter->set_torque_lead(model.filter.torque_lead_s);
+  // What a link encoder gave is found again from it.
+  std::vector<JointFit> design = model.joints;
+  for (JointFit& joint : design)
+    std::erase_if(joint.effects, [](const EffectFit& fit) { return fit.effect == Elasticity::name; });
+  auto fitter = std::make_unique<Fitter>(project_.robot, data().logs, design);
+  fitter->set_torque_lead(model.filter.torque_lead_s, fitter->filtered_torque());
   weigh(*fitter, project_.identify);
   return fitter;
 }
