@@ -1,0 +1,559 @@
+#include "host_tools/excite/sight.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include "host_tools/error.hpp"
+#include "host_tools/identify/dataset.hpp"
+#include "host_tools/identify/regressor.hpp"
+#include "host_tools/model/effects.hpp"
+#include "host_tools/model/evaluator.hpp"
+#include "host_tools/parallel.hpp"
+#include "host_tools/random.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// rho^2 below which nothing is left of a direction.
+constexpr double nothing_left = 1e-5;
+constexpr double confused_from = 0.95;
+/// Smallest effect that still counts as seen, share of rated torque.
+constexpr double seen_below = 0.005;
+/// Eigenvalues of a normalised information matrix below this count as zero.
+constexpr double rank_tolerance = 1e-12;
+constexpr std::array nominal_effects{"viscous", "coulomb", "offset", "rotor_inertia"};
+
+bool is_nominal(std::string_view effect) {
+  return std::find(nominal_effects.begin(), nominal_effects.end(), effect) != nominal_effects.end();
+}
+
+/// Columns [first, first + count) of one effect with one shape.
+struct Block {
+  EffectCandidate candidate;
+  bool on_body = false;
+  Index first = 0, count = 0;
+  std::vector<MatrixXd> raw{};  ///< per joint: mean of phi phi^T, unfiltered; 0 x 0 where it does not reach
+};
+
+std::vector<Index> range(Index first, Index count) {
+  std::vector<Index> indices;
+  for (Index i = 0; i < count; ++i) indices.push_back(first + i);
+  return indices;
+}
+
+/// Inverse of a positive semidefinite matrix on its range, rank decided after normalising the diagonal to 1.
+MatrixXd pseudo_inverse(const MatrixXd& a) {
+  const VectorXd scale = a.diagonal().unaryExpr([](double x) { return x > 0 ? 1 / std::sqrt(x) : 0.0; });
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(scale.asDiagonal() * a * scale.asDiagonal());
+  const double most = eigen.eigenvalues().tail(1)[0];
+  const VectorXd inverse =
+      eigen.eigenvalues().unaryExpr([=](double x) { return x > rank_tolerance * most ? 1 / x : 0.0; });
+  const MatrixXd half = scale.asDiagonal() * eigen.eigenvectors();
+  return half * inverse.asDiagonal() * half.transpose();
+}
+
+/// Information on columns that is left when those of the nuisance are fitted too.
+MatrixXd schur(const MatrixXd& columns, const MatrixXd& cross, const MatrixXd& nuisance) {
+  return columns - cross.transpose() * pseudo_inverse(nuisance) * cross;
+}
+
+/// Directions of an effect's columns, each of unit information before the nominal model takes its part, and what that
+/// leaves of each (rho^2).
+struct Directions {
+  MatrixXd u;       ///< columns x directions
+  VectorXd square;  ///< rho^2
+};
+
+/// @param before, after: information on the effect's columns before and after the nominal model takes its part
+Directions directions(const MatrixXd& before, const MatrixXd& after) {
+  const VectorXd scale = before.diagonal().unaryExpr([](double x) { return x > 0 ? 1 / std::sqrt(x) : 0.0; });
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> whole(scale.asDiagonal() * before * scale.asDiagonal());
+  std::vector<Index> kept;
+  for (Index i = 0; i < whole.eigenvalues().size(); ++i) {
+    if (whole.eigenvalues()[i] > 1e-10 * whole.eigenvalues().maxCoeff() && whole.eigenvalues()[i] > 0)
+      kept.push_back(i);
+  }
+  MatrixXd basis = scale.asDiagonal() * whole.eigenvectors()(Eigen::all, kept);
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    basis.col(static_cast<Index>(i)) /= std::sqrt(whole.eigenvalues()[kept[i]]);
+  if (kept.empty()) return {basis, VectorXd()};
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> left(basis.transpose() * after * basis);
+  return {basis * left.eigenvectors(), left.eigenvalues().cwiseMax(0.0).cwiseMin(1.0)};
+}
+
+/// The directions of which something is left, scaled to unit information after the nominal model.
+MatrixXd left_over(const Directions& d) {
+  std::vector<Index> kept;
+  for (Index i = 0; i < d.square.size(); ++i) {
+    if (d.square[i] >= nothing_left) kept.push_back(i);
+  }
+  MatrixXd u = d.u(Eigen::all, kept);
+  for (std::size_t i = 0; i < kept.size(); ++i) u.col(static_cast<Index>(i)) /= std::sqrt(d.square[kept[i]]);
+  return u;
+}
+
+Visibility visibility(const Block& block, const MatrixXd& before, const MatrixXd& after, double threshold,
+                      const VectorXd& rated) {
+  Visibility out;
+  out.shape = block.candidate.shape;
+  out.parameters.assign(static_cast<std::size_t>(block.count), std::numeric_limits<double>::infinity());
+  const Directions d = directions(before, after);
+  if (d.square.size() == 0) return out;
+  double sum = 0, inverse_squares = 0;
+  int kept = 0;
+  for (Index i = 0; i < d.square.size(); ++i) {
+    if (d.square[i] < nothing_left) continue;
+    double felt = 0;  // squared, share of rated torque
+    for (std::size_t j = 0; j < block.raw.size(); ++j) {
+      if (block.raw[j].size() == 0) continue;
+      const double rms = d.u.col(i).dot(block.raw[j] * d.u.col(i));
+      felt = std::max(felt, rms / (rated[static_cast<Index>(j)] * rated[static_cast<Index>(j)]));
+    }
+    sum += d.square[i];
+    inverse_squares += d.square[i] / (threshold * threshold * felt);
+    ++kept;
+  }
+  out.rho = kept > 0 ? std::sqrt(sum / kept) : std::sqrt(d.square.maxCoeff());
+  if (kept > 0) out.smallest = std::sqrt(kept / inverse_squares);
+  for (Index i = 0; i < block.count; ++i) {
+    // A parameter alone, the effect's others zero.
+    if (before(i, i) > 0 && after(i, i) >= nothing_left * before(i, i))
+      out.parameters[static_cast<std::size_t>(i)] = threshold / std::sqrt(after(i, i));
+  }
+  return out;
+}
+
+/// Share (RMS) of what is left of `e` that `f` can take.
+double correlation(const MatrixXd& e, const MatrixXd& f, const MatrixXd& between) {
+  if (e.cols() == 0 || f.cols() == 0) return 0;
+  return std::min(1.0, std::sqrt((e.transpose() * between * f).squaredNorm() / static_cast<double>(e.cols())));
+}
+
+std::string cure(const std::string& e, const std::string& f) {
+  struct Cure {
+    std::set<std::string_view> effects;
+    std::string_view text;
+  };
+  static const std::vector<Cure> cures{
+      {{"offset", "asymmetric_friction"}, "slow motion through zero velocity, both ways"},
+      {{"offset", "spring", "gravity_compensator", "ripple"}, "a wider range of positions"},
+      {{"torque_gain", "load_friction"},
+       "slow motion with and against gravity, so that the load drives the joint back"},
+      {{"viscous", "coulomb", "viscous_quadratic", "viscous_cubic", "saturation"},
+       "constant speeds from slow to the limit"},
+      {{"torque_gain", "friction_drift"}, "the first motion once more at the end"},
+      {{"coulomb", "viscous", "friction_drift"}, "the first motion once more at the end, after the robot warmed up"},
+      {{"backlash", "elasticity"}, "motion in which the load reverses; an encoder on the link"},
+      {{"coulomb", "stribeck", "presliding"}, "slow reversals of a few milliradians, and of a few degrees"},
+      {{"delay", "elasticity", "eccentricity", "backlash", "rotor_inertia"},
+       "faster motion beside the slow one; an encoder on the link"},
+  };
+  if (e == "base parameters" || f == "base parameters")
+    return "the same motions recorded without it (role = \"baseline\"), or inertias known beforehand";
+  for (const Cure& c : cures) {
+    if (c.effects.contains(e) && c.effects.contains(f)) return std::string(c.text);
+  }
+  if (e.ends_with("coupling") || f.ends_with("coupling")) return "joints moved one at a time";
+  return "other positions, speeds and loads in other combinations";
+}
+
+double largest_of(const std::vector<MatrixXd>& torque, std::size_t joint) {
+  double most = 0;
+  for (const MatrixXd& tau : torque) most = std::max(most, tau.col(static_cast<Index>(joint)).cwiseAbs().maxCoeff());
+  return most;
+}
+
+void check(const IdentifiedModel& nominal, const std::vector<Motion>& motions, const SightSettings& settings) {
+  const auto n = static_cast<Index>(nominal.robot.size());
+  if (motions.empty()) throw InputError("no motion to judge");
+  if (settings.noise.size() != n || !(settings.noise.minCoeff() > 0))
+    throw InputError(fmt::format("torque noise: expected {} positive values, one a joint", n));
+  for (const Motion& motion : motions) {
+    if (motion.step_s != motions.front().step_s) {
+      throw InputError(fmt::format("motion '{}' has steps of {} s, '{}' of {} s: sample them alike", motion.name,
+                                   motion.step_s, motions.front().name, motions.front().step_s));
+    }
+    if (motion.q.cols() != n || motion.dq.cols() != n || motion.ddq.cols() != n ||
+        motion.dq.rows() != motion.q.rows() || motion.ddq.rows() != motion.q.rows()) {
+      throw InputError(fmt::format("motion '{}': expected {} joints with q, dq and ddq", motion.name, n));
+    }
+  }
+  for (std::size_t j = 0; j < nominal.joints.size(); ++j) {
+    if (!(nominal.joints[j].rated_torque > 0))
+      throw InputError(fmt::format("joint {}: its rated torque is not known", j + 1));
+  }
+}
+
+Log to_log(const Motion& motion) {
+  Log log;
+  log.file = motion.name;
+  log.step_s = motion.step_s;
+  log.t = motion.t;
+  log.from_s = motion.t[0];
+  log.to_s = motion.t[motion.t.size() - 1];
+  log.q = motion.q;
+  log.dq = motion.dq;
+  log.ddq = motion.ddq;
+  return log;
+}
+
+/// Columns of all effects over all motions, as information: sums over rows of products, weighted so that the unit is
+/// one over a coefficient's variance.
+class Information {
+ public:
+  Information(const IdentifiedModel& nominal, const std::vector<Motion>& motions, const SightSettings& settings,
+              Progress& progress);
+
+  FilterFit filter;
+  double seconds = 0, independent_samples = 0;
+  VectorXd noise;  ///< within the cut-off [N*m | N]
+  Index base = 0;
+  std::vector<Block> blocks;  ///< nominal effects first
+  std::size_t nominal_blocks = 0;
+  MatrixXd gram;
+
+  MatrixXd between(const Block& e, const Block& f) const { return gram.block(e.first, f.first, e.count, f.count); }
+
+ private:
+  void add_blocks(const IdentifiedModel& nominal, const std::vector<Motion>& motions,
+                  const std::vector<RobotColumns>& columns);
+};
+
+void Information::add_blocks(const IdentifiedModel& nominal, const std::vector<Motion>& motions,
+                             const std::vector<RobotColumns>& columns) {
+  std::vector<MatrixXd> torque, structural;
+  for (const RobotColumns& c : columns) {
+    torque.push_back(c.torque());
+    structural.push_back(c.structural());
+  }
+  const std::size_t n = nominal.robot.size();
+  Index at = base;
+  const auto add = [&](std::string_view effect, std::size_t joint, std::vector<double> shape) {
+    const EffectInfo& info = *find_effect(effect);
+    Block block{{std::string(effect), joint, std::move(shape)},
+                info.acts_on == ActsOn::body,
+                at,
+                static_cast<Index>(info.linear.size())};
+    block.raw.resize(n);
+    at += block.count;
+    blocks.push_back(std::move(block));
+  };
+  for (std::size_t j = 0; j < n; ++j) {
+    for (const char* effect : nominal_effects) add(effect, j, {});
+  }
+  nominal_blocks = blocks.size();
+  for (const EffectInfo& info : effect_infos()) {
+    if (is_nominal(info.name)) continue;
+    for (std::size_t j = 0; j < (info.acts_on == ActsOn::body ? 1 : n); ++j) {
+      for (const auto& shape : typical_shapes(info.name, j, nominal.robot, motions, torque, structural))
+        add(info.name, j, shape);
+    }
+  }
+  gram = MatrixXd::Zero(at, at);
+}
+
+Information::Information(const IdentifiedModel& nominal, const std::vector<Motion>& motions,
+                         const SightSettings& settings, Progress& progress) {
+  const std::size_t n = nominal.robot.size();
+  std::vector<Log> logs;
+  for (const Motion& motion : motions) logs.push_back(to_log(motion));
+  SignalSettings signals;
+  signals.torque_cutoff_hz = settings.torque_cutoff_hz;
+  filter = choose_filter(logs, signals);
+
+  std::vector<RobotColumns> columns;
+  for (const Motion& motion : motions) columns.emplace_back(nominal, motion);
+  const DhChain chain = to_dh(nominal.robot);
+  const BaseSet base_set = find_base(chain);
+  base = static_cast<Index>(base_set.columns.size());
+  add_blocks(nominal, motions, columns);
+  noise.resize(static_cast<Index>(n));
+
+  std::vector<std::vector<MatrixXd>> raw(blocks.size(), std::vector<MatrixXd>(n));  // sums of phi phi^T step
+  for (std::size_t m = 0; m < motions.size(); ++m) {
+    const Motion& motion = motions[m];
+    const ProcessedLog log = process(logs[m], filter);
+    const Index samples = log.last - log.first;
+    const double nyquist = 0.5 / motion.step_s, cutoff = std::min(filter.torque_cutoff_hz, nyquist);
+    const double duration = static_cast<double>(samples) * motion.step_s;
+    seconds += duration;
+    independent_samples += 2 * cutoff * duration;
+    // White noise within the cut-off, and weights that count independent samples instead of rows.
+    noise = settings.noise * std::sqrt(cutoff / nyquist);
+    const VectorXd weight = std::sqrt(2 * cutoff * duration / static_cast<double>(log.rows())) * noise.cwiseInverse();
+
+    progress.stage(fmt::format("what {} shows", motion.name), blocks.size() + n);
+    std::vector<std::vector<MatrixXd>> effect(blocks.size());  // [block][joint], filtered and decimated
+    parallel_for(blocks.size(), [&](std::size_t b) {
+      const EffectColumns full = columns[m](blocks[b].candidate);
+      effect[b].resize(n);
+      for (std::size_t j = 0; j < n; ++j) {
+        const MatrixXd& c = full.joints[j];
+        if (c.size() == 0) continue;
+        const auto inside = c.middleRows(log.first, samples);
+        const MatrixXd power = inside.transpose() * inside * motion.step_s;
+        raw[b][j] = raw[b][j].size() == 0 ? power : MatrixXd(raw[b][j] + power);
+        effect[b][j] = log.decimate(log.filter_columns(c));
+      }
+      progress.step();
+    });
+
+    std::vector<MatrixXd> rows(n, MatrixXd(motion.q.rows(), base));
+    Regressor regressor(chain);
+    for (Index k = 0; k < motion.q.rows(); ++k) {
+      const MatrixXd& y = regressor(motion.q.row(k), motion.dq.row(k), motion.ddq.row(k));
+      for (std::size_t j = 0; j < n; ++j) rows[j].row(k) = y(static_cast<Index>(j), base_set.columns);
+    }
+    std::vector<MatrixXd> grams(n);
+    std::vector<std::vector<Index>> places(n);  // in the whole
+    parallel_for(n, [&](std::size_t j) {
+      std::vector<std::size_t> here;
+      places[j] = range(0, base);
+      for (std::size_t b = 0; b < blocks.size(); ++b) {
+        if (effect[b][j].size() == 0) continue;
+        here.push_back(b);
+        const auto own = range(blocks[b].first, blocks[b].count);
+        places[j].insert(places[j].end(), own.begin(), own.end());
+      }
+      MatrixXd x(log.rows(), static_cast<Index>(places[j].size()));
+      x.leftCols(base) = log.decimate(log.filter_columns(rows[j]));
+      rows[j].resize(0, 0);
+      Index at = base;
+      for (const std::size_t b : here) {
+        x.middleCols(at, blocks[b].count) = effect[b][j];
+        at += blocks[b].count;
+      }
+      x *= weight[static_cast<Index>(j)];
+      grams[j] = MatrixXd::Zero(x.cols(), x.cols());
+      grams[j].selfadjointView<Eigen::Lower>().rankUpdate(x.transpose());
+      grams[j].triangularView<Eigen::StrictlyUpper>() = grams[j].transpose();
+      progress.step();
+    });
+    for (std::size_t j = 0; j < n; ++j) gram(places[j], places[j]) += grams[j];
+  }
+  progress.done();
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    for (std::size_t j = 0; j < n; ++j) blocks[b].raw[j] = raw[b][j] / seconds;
+  }
+}
+
+/// Answers questions to the information.
+class Judge {
+ public:
+  Judge(const IdentifiedModel& nominal, const Information& information, double threshold);
+  EffectSight effect(std::string_view name, std::optional<std::size_t> joint) const;
+
+ private:
+  /// What the nominal columns without those of `left_out` leave of all columns.
+  MatrixXd after_nominal(const std::vector<const Block*>& left_out) const;
+  std::vector<const Block*> shapes_of(std::string_view effect, std::optional<std::size_t> joint) const;
+  Visibility seen(const Block& block, const MatrixXd& after) const;
+  Directions directions_of(const Block& block, const MatrixXd& after) const {
+    return directions(info_.between(block, block), after.block(block.first, block.first, block.count, block.count));
+  }
+
+  const Information& info_;
+  double threshold_;
+  VectorXd rated_;
+  std::size_t joints_;
+  std::vector<Index> nominal_columns_;
+  MatrixXd after_, after_healthy_, after_base_;
+  std::vector<MatrixXd> without_;  ///< after_nominal() without nominal block b
+};
+
+Judge::Judge(const IdentifiedModel& nominal, const Information& information, double threshold)
+    : info_(information), threshold_(threshold), joints_(nominal.robot.size()) {
+  rated_.resize(static_cast<Index>(joints_));
+  for (std::size_t j = 0; j < joints_; ++j) rated_[static_cast<Index>(j)] = nominal.joints[j].rated_torque;
+  const Index base = info_.base;
+  const Block& last = info_.blocks[info_.nominal_blocks - 1];
+  nominal_columns_ = range(0, last.first + last.count);
+  after_ = after_nominal({});
+  const MatrixXd& g = info_.gram;
+  const auto all = nominal_columns_;
+  const auto inertia = range(0, base), friction = range(base, last.first + last.count - base);
+  after_base_ = schur(g, g.topRows(base), g.topLeftCorner(base, base));
+  // A healthy recording of the same motions tells the base parameters, its friction fitted apart.
+  MatrixXd nuisance = g(all, all);
+  nuisance.topLeftCorner(base, base) += schur(g(inertia, inertia), g(friction, inertia), g(friction, friction));
+  after_healthy_ = schur(g, g(all, Eigen::all), nuisance);
+  without_.resize(info_.nominal_blocks);
+  parallel_for(without_.size(), [&](std::size_t b) { without_[b] = after_nominal({&info_.blocks[b]}); });
+}
+
+MatrixXd Judge::after_nominal(const std::vector<const Block*>& left_out) const {
+  std::vector<Index> columns;
+  for (const Index i : nominal_columns_) {
+    const bool out = std::any_of(left_out.begin(), left_out.end(), [&](const Block* block) {
+      return i >= block->first && i < block->first + block->count;
+    });
+    if (!out) columns.push_back(i);
+  }
+  const MatrixXd& g = info_.gram;
+  return schur(g, g(columns, Eigen::all), g(columns, columns));
+}
+
+std::vector<const Block*> Judge::shapes_of(std::string_view effect, std::optional<std::size_t> joint) const {
+  std::vector<const Block*> shapes;
+  for (const Block& block : info_.blocks) {
+    if (block.candidate.effect == effect && (block.on_body || block.candidate.joint == joint)) shapes.push_back(&block);
+  }
+  return shapes;
+}
+
+Visibility Judge::seen(const Block& block, const MatrixXd& after) const {
+  return visibility(block, info_.between(block, block), after.block(block.first, block.first, block.count, block.count),
+                    threshold_, rated_);
+}
+
+EffectSight Judge::effect(std::string_view name, std::optional<std::size_t> joint) const {
+  EffectSight out;
+  out.effect = name;
+  out.joint = joint;
+  const auto shapes = shapes_of(name, joint);
+  const Block& typical = *shapes.front();
+  const auto own = static_cast<std::size_t>(&typical - info_.blocks.data());
+  const bool nominal = own < info_.nominal_blocks;
+  const MatrixXd& after = nominal ? without_[own] : after_;
+
+  for (const Block* shape : shapes) {
+    const Visibility v = seen(*shape, after);
+    if (shape == &typical) out.typical = out.worst = v;
+    if (v.smallest > out.worst.smallest) out.worst = v;
+  }
+  if (!nominal) out.healthy = seen(typical, after_healthy_);
+  if (std::isfinite(out.typical.smallest))
+    out.verdict = out.typical.smallest <= seen_below ? SightVerdict::seen : SightVerdict::weak;
+
+  const auto note = [&](const std::string& other, double r) {
+    if (r < confused_from) return;
+    const auto known =
+        std::find_if(out.confused.begin(), out.confused.end(), [&](const Confusion& c) { return c.effect == other; });
+    if (known == out.confused.end()) {
+      out.confused.push_back({other, r, cure(out.effect, other)});
+    } else {
+      known->correlation = std::max(known->correlation, r);
+    }
+  };
+  // What no column of a joint's friction is needed for, the base parameters take.
+  const Directions alone = directions_of(typical, after_base_);
+  if (alone.square.size() > 0) note("base parameters", std::sqrt(1 - alone.square.mean()));
+  for (std::size_t b = 0; b < info_.blocks.size(); ++b) {
+    const Block& other = info_.blocks[b];
+    if (other.candidate.effect == name) continue;
+    if (joint && !other.on_body && other.candidate.joint != *joint) continue;
+    // A nominal effect is compared before it has taken its part.
+    MatrixXd both;
+    const MatrixXd* left = &after;
+    if (b < info_.nominal_blocks) {
+      if (nominal) both = after_nominal({&typical, &other});
+      left = nominal ? &both : &without_[b];
+    }
+    note(other.candidate.effect,
+         correlation(left_over(directions_of(typical, *left)), left_over(directions_of(other, *left)),
+                     left->block(typical.first, other.first, typical.count, other.count)));
+  }
+  std::stable_sort(out.confused.begin(), out.confused.end(),
+                   [](const Confusion& a, const Confusion& b) { return a.correlation > b.correlation; });
+  return out;
+}
+
+}  // namespace
+
+std::string_view to_string(SightVerdict verdict) {
+  static constexpr std::array names{"seen", "weak", "not_identifiable"};
+  return names[static_cast<std::size_t>(verdict)];
+}
+
+std::vector<std::vector<double>> typical_shapes(std::string_view effect, std::size_t joint, const Robot& robot,
+                                                const std::vector<Motion>& motions, const std::vector<MatrixXd>& torque,
+                                                const std::vector<MatrixXd>& structural) {
+  const EffectInfo* info = find_effect(effect);
+  if (info == nullptr) throw InputError(fmt::format("unknown effect '{}': see `fxdyn effects`", effect));
+  if (info->shape.empty()) return {{}};
+  const bool turns = robot.joints[joint].type == JointType::revolute;
+  const auto col = static_cast<Index>(joint);
+  double speed = 0, longest = 0;
+  for (const Motion& motion : motions) {
+    speed = std::max(speed, motion.dq.col(col).cwiseAbs().maxCoeff());
+    longest = std::max(longest, motion.step_s * static_cast<double>(motion.q.rows()));
+  }
+  const auto values = [&](const ParameterInfo& shape) -> std::vector<double> {
+    const auto shares_of = [](double scale, std::vector<double> shares) {
+      for (double& share : shares) share *= scale;
+      return shares;
+    };
+    if (shape.name == "velocity") return shares_of(speed, {0.025, 0.01, 0.05});
+    if (shape.name == "distance") return turns ? std::vector{3e-3, 1e-3, 9e-3} : std::vector{1e-4, 3e-5, 3e-4};
+    if (shape.name == "wavenumber") return turns ? std::vector{20.0, 4.0, 100.0} : std::vector{600.0, 120.0, 3000.0};
+    if (shape.name == "time_constant") return shares_of(longest, {1, 0.3, 3});
+    if (shape.name == "limit") return shares_of(largest_of(torque, joint), {0.85, 0.7, 0.95});
+    if (shape.name == "time") {
+      std::vector<double> times{2e-3, 1e-3, 4e-3};
+      for (double& time : times) time = std::min(time, Delay::largest * motions.front().step_s);
+      return times;
+    }
+    if (shape.name == "relaxation") return {1e-3, 5e-3};
+    if (shape.name == "torque_scale") return shares_of(largest_of(structural, joint), {0.05, 0.02, 0.1});
+    if (shape.name == "joint") {
+      std::vector<double> others;
+      for (std::size_t k = joint; k-- > 0;) others.push_back(static_cast<double>(k + 1));
+      for (std::size_t k = joint + 1; k < robot.size(); ++k) others.push_back(static_cast<double>(k + 1));
+      return others;
+    }
+    throw InputError(fmt::format("effect '{}': no typical values of its {} are known", effect, shape.name));
+  };
+  std::vector<std::vector<double>> shapes{{}};
+  for (const ParameterInfo& shape : info->shape) {
+    std::vector<std::vector<double>> more;
+    for (const double value : values(shape)) {
+      for (std::vector<double> before : shapes) {
+        before.push_back(std::clamp(value, shape.lower, shape.upper));
+        more.push_back(std::move(before));
+      }
+    }
+    shapes = std::move(more);
+  }
+  return shapes;
+}
+
+Sight see(const IdentifiedModel& nominal, const std::vector<Motion>& motions, const SightSettings& settings,
+          Progress& progress) {
+  check(nominal, motions, settings);
+  const Information information(nominal, motions, settings, progress);
+  const Judge judge(nominal, information, settings.threshold);
+  Sight sight;
+  sight.robot = nominal.robot;
+  sight.torque_cutoff_hz = information.filter.torque_cutoff_hz;
+  sight.threshold = settings.threshold;
+  sight.seconds = information.seconds;
+  sight.independent_samples = information.independent_samples;
+  sight.noise = information.noise;
+  for (Index j = 0; j < sight.noise.size(); ++j)
+    sight.noise[j] /= nominal.joints[static_cast<std::size_t>(j)].rated_torque;
+  std::vector<std::pair<std::string_view, std::optional<std::size_t>>> questions;
+  for (const Block& block : information.blocks) {
+    const auto joint = block.on_body ? std::nullopt : std::optional(block.candidate.joint);
+    if (std::find(questions.begin(), questions.end(), std::pair(std::string_view(block.candidate.effect), joint)) ==
+        questions.end())
+      questions.emplace_back(block.candidate.effect, joint);
+  }
+  sight.effects.resize(questions.size());
+  parallel_for(questions.size(),
+               [&](std::size_t i) { sight.effects[i] = judge.effect(questions[i].first, questions[i].second); });
+  const auto place = [](const EffectSight& e) { return find_effect(e.effect) - effect_infos().data(); };
+  std::stable_sort(sight.effects.begin(), sight.effects.end(),
+                   [&](const EffectSight& a, const EffectSight& b) { return place(a) < place(b); });
+  return sight;
+}
+
+}  // namespace fxdyn
