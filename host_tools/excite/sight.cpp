@@ -26,6 +26,7 @@ using Eigen::VectorXd;
 /// rho^2 below which nothing is left of a direction.
 constexpr double nothing_left = 1e-5;
 constexpr double confused_from = 0.95;
+constexpr std::string_view base_parameters = "base parameters";
 /// Smallest effect that still counts as seen, share of rated torque.
 constexpr double seen_below = 0.005;
 /// Eigenvalues of a normalised information matrix below this count as zero.
@@ -75,6 +76,7 @@ struct Directions {
 
 /// @param before, after: information on the effect's columns before and after the nominal model takes its part
 Directions directions(const MatrixXd& before, const MatrixXd& after) {
+  if (before.size() == 0) return {};
   const VectorXd scale = before.diagonal().unaryExpr([](double x) { return x > 0 ? 1 / std::sqrt(x) : 0.0; });
   const Eigen::SelfAdjointEigenSolver<MatrixXd> whole(scale.asDiagonal() * before * scale.asDiagonal());
   std::vector<Index> kept;
@@ -144,24 +146,25 @@ std::string cure(const std::string& e, const std::string& f) {
     std::string_view text;
   };
   static const std::vector<Cure> cures{
+      {{base_parameters, "rotor_inertia"}, "nothing: base parameters hold the rotor, and the torque is the same"},
       {{"offset", "asymmetric_friction"}, "slow motion through zero velocity, both ways"},
-      {{"offset", "spring", "gravity_compensator", "ripple"}, "a wider range of positions"},
-      {{"torque_gain", "load_friction"},
-       "slow motion with and against gravity, so that the load drives the joint back"},
+      {{"offset", "spring", "gravity_compensator", "ripple", base_parameters}, "a wider range of positions"},
+      {{"torque_gain", "load_friction", "coulomb", "viscous", "saturation"},
+       "poses in which the joint carries load, moved slowly with and against gravity"},
       {{"viscous", "coulomb", "viscous_quadratic", "viscous_cubic", "saturation"},
        "constant speeds from slow to the limit"},
-      {{"torque_gain", "friction_drift"}, "the first motion once more at the end"},
-      {{"coulomb", "viscous", "friction_drift"}, "the first motion once more at the end, after the robot warmed up"},
+      {{"coulomb", "viscous", "torque_gain", "friction_drift"},
+       "the first motion once more at the end, after the robot warmed up"},
       {{"backlash", "elasticity"}, "motion in which the load reverses; an encoder on the link"},
       {{"coulomb", "stribeck", "presliding"}, "slow reversals of a few milliradians, and of a few degrees"},
       {{"delay", "elasticity", "eccentricity", "backlash", "rotor_inertia"},
        "faster motion beside the slow one; an encoder on the link"},
   };
-  if (e == "base parameters" || f == "base parameters")
-    return "the same motions recorded without it (role = \"baseline\"), or inertias known beforehand";
   for (const Cure& c : cures) {
     if (c.effects.contains(e) && c.effects.contains(f)) return std::string(c.text);
   }
+  if (e == base_parameters || f == base_parameters)
+    return "the same motions recorded without it (role = \"baseline\"), or inertias known beforehand";
   if (e.ends_with("coupling") || f.ends_with("coupling")) return "joints moved one at a time";
   return "other positions, speeds and loads in other combinations";
 }
@@ -220,8 +223,6 @@ class Information {
   std::vector<Block> blocks;  ///< nominal effects first
   std::size_t nominal_blocks = 0;
   MatrixXd gram;
-
-  MatrixXd between(const Block& e, const Block& f) const { return gram.block(e.first, f.first, e.count, f.count); }
 
  private:
   void add_blocks(const IdentifiedModel& nominal, const std::vector<Motion>& motions,
@@ -357,9 +358,8 @@ class Judge {
   MatrixXd after_nominal(const std::vector<const Block*>& left_out) const;
   std::vector<const Block*> shapes_of(std::string_view effect, std::optional<std::size_t> joint) const;
   Visibility seen(const Block& block, const MatrixXd& after) const;
-  Directions directions_of(const Block& block, const MatrixXd& after) const {
-    return directions(info_.between(block, block), after.block(block.first, block.first, block.count, block.count));
-  }
+  /// Columns in which an effect differs from the nominal model: without the offset of a spring. All where none does.
+  std::vector<Index> own_columns(const Block& block) const;
 
   const Information& info_;
   double threshold_;
@@ -410,9 +410,17 @@ std::vector<const Block*> Judge::shapes_of(std::string_view effect, std::optiona
   return shapes;
 }
 
+std::vector<Index> Judge::own_columns(const Block& block) const {
+  const auto columns = range(block.first, block.count);
+  if (block.first < static_cast<Index>(nominal_columns_.size())) return columns;
+  auto own = columns;
+  std::erase_if(own, [&](Index i) { return after_(i, i) < nothing_left * info_.gram(i, i); });
+  return own.empty() ? columns : own;
+}
+
 Visibility Judge::seen(const Block& block, const MatrixXd& after) const {
-  return visibility(block, info_.between(block, block), after.block(block.first, block.first, block.count, block.count),
-                    threshold_, rated_);
+  const auto columns = range(block.first, block.count);
+  return visibility(block, info_.gram(columns, columns), after(columns, columns), threshold_, rated_);
 }
 
 EffectSight Judge::effect(std::string_view name, std::optional<std::size_t> joint) const {
@@ -445,8 +453,9 @@ EffectSight Judge::effect(std::string_view name, std::optional<std::size_t> join
     }
   };
   // What no column of a joint's friction is needed for, the base parameters take.
-  const Directions alone = directions_of(typical, after_base_);
-  if (alone.square.size() > 0) note("base parameters", std::sqrt(1 - alone.square.mean()));
+  const auto here = range(typical.first, typical.count);
+  const Directions alone = directions(info_.gram(here, here), after_base_(here, here));
+  if (alone.square.size() > 0) note(std::string(base_parameters), std::sqrt(1 - alone.square.mean()));
   for (std::size_t b = 0; b < info_.blocks.size(); ++b) {
     const Block& other = info_.blocks[b];
     if (other.candidate.effect == name) continue;
@@ -458,9 +467,11 @@ EffectSight Judge::effect(std::string_view name, std::optional<std::size_t> join
       if (nominal) both = after_nominal({&typical, &other});
       left = nominal ? &both : &without_[b];
     }
-    note(other.candidate.effect,
-         correlation(left_over(directions_of(typical, *left)), left_over(directions_of(other, *left)),
-                     left->block(typical.first, other.first, typical.count, other.count)));
+    const auto e = own_columns(typical), f = own_columns(other);
+    const auto left_of = [&](const std::vector<Index>& columns) {
+      return left_over(directions(info_.gram(columns, columns), (*left)(columns, columns)));
+    };
+    note(other.candidate.effect, correlation(left_of(e), left_of(f), (*left)(e, f)));
   }
   std::stable_sort(out.confused.begin(), out.confused.end(),
                    [](const Confusion& a, const Confusion& b) { return a.correlation > b.correlation; });

@@ -45,19 +45,20 @@ std::string cell(const EffectSight& effect) {
   return fmt::format("{:<4}{:>5} {:>5.2f}", joint, percent(effect.typical.smallest), effect.typical.rho);
 }
 
-/// Text broken into lines of at most 100 characters, the later ones indented.
-std::string wrapped(const std::string& text, std::size_t indent) {
-  std::string out, line;
-  std::size_t at = 0;
-  while (at < text.size()) {
+/// Text broken into lines of at most 100 characters: `first` spaces before the first, `later` before the others.
+std::string wrapped(const std::string& text, std::size_t first, std::size_t later) {
+  std::string out, line(first, ' ');
+  bool empty = true;
+  for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = std::min(text.find(' ', at), text.size());
     const std::string word = text.substr(at, end - at);
-    if (line.size() + 1 + word.size() > 100) {
+    if (!empty && line.size() + 1 + word.size() > 100) {
       out += line + "\n";
-      line = std::string(indent, ' ') + word;
-    } else {
-      line += (line.empty() ? "" : " ") + word;
+      line = std::string(later, ' ');
+      empty = true;
     }
+    line += (empty ? "" : " ") + word;
+    empty = false;
     at = end + 1;
   }
   return out + line + "\n";
@@ -105,17 +106,16 @@ std::string sight_table(const Sight& sight, const std::vector<std::string>& assu
           "{:.0f} independent samples, noise {} % of rated below {:.1f} Hz.",
           sight.threshold, sight.seconds, sight.independent_samples, percent(sight.noise.mean()),
           sight.torque_cutoff_hz),
-      2);
-  for (const std::string& assumption : assumptions) out += wrapped("Assumed: " + assumption + ".", 2);
+      0, 2);
+  for (const std::string& assumption : assumptions) out += wrapped("Assumed: " + assumption + ".", 0, 2);
   out += fmt::format("\n{:<20} {:<16} {:<16} {:<14} {:<8} {}\n", "effect", "best   %   rho", "worst  %   rho",
                      "seen/weak/no", "baseline", "mixed up with");
-  struct Hint {
+  struct Pair {
+    std::string a, b, cure;
     std::vector<std::size_t> joints;
     double correlation = 0;
-    std::string cure;
   };
-  std::map<std::pair<std::string, std::string>, Hint> hints;
-  std::vector<std::pair<std::string, std::string>> order;
+  std::vector<Pair> pairs;
   for (std::size_t first = 0; first < sight.effects.size();) {
     std::size_t last = first;
     std::array<int, 3> verdicts{};
@@ -130,14 +130,11 @@ std::string sight_table(const Sight& sight, const std::vector<std::string>& assu
       if (effect.healthy) baseline = std::min(baseline, effect.healthy->smallest);
       for (const Confusion& c : effect.confused) {
         ++mixed[c.effect];
-        const auto pair = std::minmax(effect.effect, c.effect);
-        const std::pair<std::string, std::string> key(pair.first, pair.second);
-        if (!hints.contains(key)) order.push_back(key);
-        Hint& hint = hints[key];
-        hint.cure = c.cure;
-        hint.correlation = std::max(hint.correlation, c.correlation);
-        if (effect.joint && std::find(hint.joints.begin(), hint.joints.end(), *effect.joint + 1) == hint.joints.end())
-          hint.joints.push_back(*effect.joint + 1);
+        const auto [a, b] = std::minmax(effect.effect, c.effect);
+        auto pair = std::find_if(pairs.begin(), pairs.end(), [&](const Pair& p) { return p.a == a && p.b == b; });
+        if (pair == pairs.end()) pair = pairs.insert(pairs.end(), {a, b, c.cure, {}, 0});
+        pair->correlation = std::max(pair->correlation, c.correlation);
+        if (effect.joint) pair->joints.push_back(*effect.joint + 1);
       }
     }
     std::string names;
@@ -155,14 +152,21 @@ std::string sight_table(const Sight& sight, const std::vector<std::string>& assu
     first = last;
   }
   out += "baseline: the smallest at the best joint with the same motions recorded before, without the effect.\n";
-  if (!order.empty()) out += "\nCan't be told apart, and what would help:\n";
-  for (const auto& key : order) {
-    Hint& hint = hints[key];
-    std::sort(hint.joints.begin(), hint.joints.end());
-    std::string where;
-    for (const std::size_t joint : hint.joints) where += fmt::format(" J{}", joint);
-    out +=
-        wrapped(fmt::format("  {} / {}{} ({:.2f}): {}", key.first, key.second, where, hint.correlation, hint.cure), 6);
+  if (!pairs.empty()) out += "\nCan't be told apart, and what would help:\n";
+  std::vector<std::string> cures;
+  std::map<std::string, std::string> of_cure;
+  for (Pair& pair : pairs) {
+    std::sort(pair.joints.begin(), pair.joints.end());
+    pair.joints.erase(std::unique(pair.joints.begin(), pair.joints.end()), pair.joints.end());
+    std::string text = pair.a + " / " + pair.b;
+    for (const std::size_t joint : pair.joints) text += fmt::format(" J{}", joint);
+    text += fmt::format(" ({:.2f})", pair.correlation);
+    std::string& line = of_cure[pair.cure];
+    if (line.empty()) cures.push_back(pair.cure);
+    line += (line.empty() ? "" : ", ") + text;
+  }
+  for (const std::string& cure : cures) {
+    out += wrapped(of_cure[cure], 2, 4) + wrapped("-> " + cure, 6, 9);
   }
   return out;
 }
