@@ -541,6 +541,15 @@ Sight see(const IdentifiedModel& nominal, const std::vector<Motion>& motions, co
           Progress& progress) {
   check(nominal, motions, settings);
   const Information information(nominal, motions, settings, progress);
+  const double known = static_cast<double>(nominal.robot.size()) * information.independent_samples;
+  const double asked =
+      static_cast<double>(information.base) + static_cast<double>(nominal_effects.size() * nominal.robot.size());
+  if (known < 2 * asked) {
+    throw DataError(
+        fmt::format("{:.2f} s of motion hold {:.0f} independent torques for {:.0f} nominal parameters: plan "
+                    "a longer motion",
+                    information.seconds, known, asked));
+  }
   const Judge judge(nominal, information, settings.threshold);
   Sight sight;
   sight.robot = nominal.robot;

@@ -40,9 +40,9 @@ std::string percent(double share) {
   return p < 0.995 ? fmt::format("{:.2f}", p) : p < 99.5 ? fmt::format("{:.1f}", p) : fmt::format("{:.0f}", p);
 }
 
-std::string cell(const EffectSight& effect) {
+std::string cell(const EffectSight& effect, const Visibility& v) {
   const std::string joint = effect.joint ? fmt::format("J{}", *effect.joint + 1) : "all";
-  return fmt::format("{:<4}{:>5} {:>5.2f}", joint, percent(effect.typical.smallest), effect.typical.rho);
+  return fmt::format("{:<4}{:>5} {:>5.2f}", joint, percent(v.smallest), v.rho);
 }
 
 /// Text broken into lines of at most 100 characters: `first` spaces before the first, `later` before the others.
@@ -126,7 +126,7 @@ std::string sight_table(const Sight& sight, const std::vector<std::string>& assu
       const EffectSight& effect = sight.effects[last];
       ++verdicts[static_cast<std::size_t>(effect.verdict)];
       if (effect.typical.smallest < best->typical.smallest) best = &effect;
-      if (effect.typical.smallest > worst->typical.smallest) worst = &effect;
+      if (effect.worst.smallest > worst->worst.smallest) worst = &effect;
       if (effect.healthy) baseline = std::min(baseline, effect.healthy->smallest);
       for (const Confusion& c : effect.confused) {
         ++mixed[c.effect];
@@ -146,12 +146,14 @@ std::string sight_table(const Sight& sight, const std::vector<std::string>& assu
       }
       names += more;
     }
-    out += fmt::format("{:<20} {:<16} {:<16} {:<14} {:<8} {}\n", best->effect, cell(*best),
-                       last - first > 1 ? cell(*worst) : "",
-                       fmt::format("{}/{}/{}", verdicts[0], verdicts[1], verdicts[2]), percent(baseline), names);
+    out += fmt::format("{:<20} {:<16} {:<16} {:<14} {:<8} {}\n", best->effect, cell(*best, best->typical),
+                       cell(*worst, worst->worst), fmt::format("{}/{}/{}", verdicts[0], verdicts[1], verdicts[2]),
+                       percent(baseline), names);
     first = last;
   }
-  out += "baseline: the smallest at the best joint with the same motions recorded before, without the effect.\n";
+  out +=
+      "best: joint with a typical shape of the effect; worst: over joints and shapes; seen: from 0.5 % of rated;\n"
+      "baseline: best with the same motions recorded once more, without the effect.\n";
   if (!pairs.empty()) out += "\nCan't be told apart, and what would help:\n";
   std::vector<std::string> cures;
   std::map<std::string, std::string> of_cure;
