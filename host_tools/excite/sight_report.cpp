@@ -151,9 +151,10 @@ std::string sight_table(const Sight& sight, const std::vector<std::string>& assu
                        percent(baseline), names);
     first = last;
   }
-  out +=
-      "best: joint with a typical shape of the effect; worst: over joints and shapes; seen: from 0.5 % of rated;\n"
-      "baseline: best with the same motions recorded once more, without the effect.\n";
+  out += wrapped(
+      "best: joint, with a typical shape of the effect; worst: joint and shape; seen: from 0.5 % of rated or less; "
+      "baseline: best, with the same motions recorded once more without the effect",
+      0, 2);
   if (!pairs.empty()) out += "\nCan't be told apart, and what would help:\n";
   std::vector<std::string> cures;
   std::map<std::string, std::string> of_cure;

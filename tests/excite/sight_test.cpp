@@ -137,42 +137,56 @@ VectorXd stack(const std::vector<MatrixXd>& torques, double step, double cutoff)
   return Eigen::Map<const VectorXd>(rows.data(), static_cast<Index>(rows.size()));
 }
 
+/// Projects rows onto what the nominal columns leave. With a baseline the rows are those of a healthy session, then
+/// those of the session in question, the same motions: base parameters are shared, friction is each session's own.
 class NominalRows {
  public:
-  NominalRows(const std::vector<Motion>& motions, double cutoff) {
-    const DhChain chain = to_dh(puma());
-    Regressor regressor(chain);
-    std::vector<MatrixXd> columns;  // 60 + 24, each of all motions
-    std::vector<VectorXd> stacked;
-    for (Index c = 0; c < 84; ++c) {
-      std::vector<MatrixXd> torques;
+  NominalRows(const std::vector<Motion>& motions, double cutoff, bool baseline = false) {
+    std::vector<MatrixXd> torques;  // of one column, every motion
+    const auto clear = [&] {
+      torques.clear();
       for (const Motion& motion : motions) torques.push_back(MatrixXd::Zero(motion.q.rows(), 6));
-      if (c < 60) {
-        for (std::size_t m = 0; m < motions.size(); ++m) {
-          if (regressors_.size() <= m) {
-            regressors_.emplace_back();
-            for (Index k = 0; k < motions[m].q.rows(); ++k)
-              regressors_[m].push_back(regressor(motions[m].q.row(k), motions[m].dq.row(k), motions[m].ddq.row(k)));
-          }
-          for (Index k = 0; k < motions[m].q.rows(); ++k)
-            torques[m].row(k) = regressors_[m][static_cast<std::size_t>(k)].col(c).transpose();
-        }
-      } else {
-        const Index j = (c - 60) / 4;
-        const double width = nominal().joints[static_cast<std::size_t>(j)].sign_width;
-        for (std::size_t m = 0; m < motions.size(); ++m) {
-          const VectorXd dq = motions[m].dq.col(j);
-          if (c % 4 == 0) torques[m].col(j) = dq;
-          if (c % 4 == 1) torques[m].col(j) = (dq / width).array().tanh();
-          if (c % 4 == 2) torques[m].col(j).setOnes();
-          if (c % 4 == 3) torques[m].col(j) = motions[m].ddq.col(j);
-        }
-      }
-      stacked.push_back(stack(torques, motions[0].step_s, cutoff));
-      if (stacked.back().norm() > 0) stacked.back().normalize();
+    };
+    const auto column = [&] { return VectorXd(stack(torques, motions[0].step_s, cutoff)); };
+    clear();
+    MatrixXd base(column().size(), 60), friction(column().size(), 24);
+    Regressor regressor(to_dh(puma()));
+    std::vector<std::vector<MatrixXd>> y(motions.size());
+    for (std::size_t m = 0; m < motions.size(); ++m) {
+      for (Index k = 0; k < motions[m].q.rows(); ++k)
+        y[m].push_back(regressor(motions[m].q.row(k), motions[m].dq.row(k), motions[m].ddq.row(k)));
     }
-    MatrixXd a(stacked[0].size(), static_cast<Index>(stacked.size()));
-    for (std::size_t c = 0; c < stacked.size(); ++c) a.col(static_cast<Index>(c)) = stacked[c];
+    for (Index c = 0; c < 60; ++c) {
+      for (std::size_t m = 0; m < motions.size(); ++m) {
+        for (std::size_t k = 0; k < y[m].size(); ++k)
+          torques[m].row(static_cast<Index>(k)) = y[m][k].col(c).transpose();
+      }
+      base.col(c) = column();
+    }
+    for (Index c = 0; c < 24; ++c) {
+      clear();
+      const double width = nominal().joints[static_cast<std::size_t>(c / 4)].sign_width;
+      for (std::size_t m = 0; m < motions.size(); ++m) {
+        const VectorXd dq = motions[m].dq.col(c / 4);
+        auto tau = torques[m].col(c / 4);
+        if (c % 4 == 0) tau = dq;
+        if (c % 4 == 1) tau = (dq / width).array().tanh();
+        if (c % 4 == 2) tau.setOnes();
+        if (c % 4 == 3) tau = motions[m].ddq.col(c / 4);
+      }
+      friction.col(c) = column();
+    }
+    const Index rows = base.rows();
+    MatrixXd a = MatrixXd::Zero(baseline ? 2 * rows : rows, baseline ? 108 : 84);
+    a.topLeftCorner(rows, 60) = base;
+    a.block(0, 60, rows, 24) = friction;
+    if (baseline) {
+      a.bottomLeftCorner(rows, 60) = base;
+      a.bottomRightCorner(rows, 24) = friction;
+    }
+    for (Index c = 0; c < a.cols(); ++c) {
+      if (a.col(c).norm() > 0) a.col(c).normalize();
+    }
     Eigen::ColPivHouseholderQR<MatrixXd> qr(a);
     qr.setThreshold(1e-9);
     span_ = qr.householderQ() * MatrixXd::Identity(a.rows(), qr.rank());
@@ -180,9 +194,19 @@ class NominalRows {
   VectorXd remove(const VectorXd& rows) const { return rows - span_ * (span_.transpose() * rows); }
 
  private:
-  std::vector<std::vector<MatrixXd>> regressors_;
   MatrixXd span_;
 };
+
+/// Torques with white noise of 1 % of rated torque.
+std::vector<MatrixXd> noisy(std::uint64_t seed, std::vector<MatrixXd> torques) {
+  Random random(seed);
+  for (MatrixXd& tau : torques) {
+    for (Index j = 0; j < 6; ++j) {
+      for (Index k = 0; k < tau.rows(); ++k) tau(k, j) += 0.01 * rated[static_cast<std::size_t>(j)] * random.normal();
+    }
+  }
+  return torques;
+}
 
 TEST(Sight, TheDetectionLimitIsWhatSimulatedExperimentsShow) {
   constexpr double step = 0.005;
@@ -195,19 +219,10 @@ TEST(Sight, TheDetectionLimitIsWhatSimulatedExperimentsShow) {
     for (const Motion& m : motions) out.push_back(predict(model, m.q, m.dq, m.ddq, step));
     return out;
   };
-  const auto noisy = [&](std::uint64_t seed, std::vector<MatrixXd> torques) {
-    Random random(seed);
-    for (MatrixXd& tau : torques) {
-      for (Index j = 0; j < 6; ++j) {
-        for (Index k = 0; k < tau.rows(); ++k) tau(k, j) += 0.01 * rated[static_cast<std::size_t>(j)] * random.normal();
-      }
-    }
-    return stack(torques, step, cutoff);
-  };
   const std::vector<MatrixXd> healthy = torque(nominal());
   constexpr std::uint64_t clean_runs = 150, runs = 50;
   std::vector<VectorXd> clean;
-  for (std::uint64_t seed = 0; seed < clean_runs; ++seed) clean.push_back(noisy(seed, healthy));
+  for (std::uint64_t seed = 0; seed < clean_runs; ++seed) clean.push_back(stack(noisy(seed, healthy), step, cutoff));
 
   struct Case {
     const char* effect;
@@ -240,12 +255,51 @@ TEST(Sight, TheDetectionLimitIsWhatSimulatedExperimentsShow) {
     // 150 runs tell a standard deviation to 6 %; the filter's edge is not a rectangle: some % more.
     EXPECT_NEAR(deviation / (smallest / sight.threshold), 1, 0.2) << c.effect;
     int found_twice = 0, found_half = 0;
+    const auto found = [&](std::uint64_t seed, double theta) {
+      return fitted(stack(noisy(seed, torque(with(effect, theta))), step, cutoff)) > sight.threshold * deviation;
+    };
     for (std::uint64_t seed = 1000; seed < 1000 + runs; ++seed) {
-      found_twice += fitted(noisy(seed, torque(with(effect, 2 * smallest)))) > sight.threshold * deviation;
-      found_half += fitted(noisy(seed, torque(with(effect, 0.5 * smallest)))) > sight.threshold * deviation;
+      found_twice += found(seed, 2 * smallest);
+      found_half += found(seed, 0.5 * smallest);
     }
     EXPECT_GE(found_twice, 49) << c.effect;  // 10 standard deviations, 5 needed
     EXPECT_LE(found_half, 3) << c.effect;    // 2.5 of 5: 0.6 % of runs
+  }
+}
+
+TEST(Sight, TheLimitWithABaselineIsThatOfTwoSessionsFittedTogether) {
+  constexpr double step = 0.005;
+  const std::vector<Motion> motions{fourier(1, 10, 1, step), fourier(3, 10, 0.15, step)};
+  const Sight sight = judge(motions);
+  const double cutoff = sight.torque_cutoff_hz;
+  const NominalRows nominal_rows(motions, cutoff, true);
+  constexpr std::uint64_t runs = 150;
+  for (const char* name : {"payload", "spring", "torque_gain"}) {
+    const EffectSight& effect = of(sight, name, 1);
+    std::vector<MatrixXd> still, column;
+    for (const Motion& motion : motions) {
+      still.push_back(MatrixXd::Zero(motion.q.rows(), 6));
+      column.push_back(still.back());
+      const EffectColumns c = RobotColumns(nominal(), motion)({name, 1, {}});
+      for (Index j = 0; j < 6; ++j) {
+        const MatrixXd& of_joint = c.joints[static_cast<std::size_t>(j)];
+        if (of_joint.size() > 0) column.back().col(j) = of_joint.col(0);
+      }
+    }
+    const auto sessions = [&](const std::vector<MatrixXd>& first, const std::vector<MatrixXd>& second) {
+      const VectorXd a = stack(first, step, cutoff), b = stack(second, step, cutoff);
+      VectorXd both(a.size() + b.size());
+      both << a, b;
+      return both;
+    };
+    const VectorXd left = nominal_rows.remove(sessions(still, column));
+    double square = 0;
+    for (std::uint64_t seed = 0; seed < runs; ++seed) {
+      const double theta = left.dot(sessions(noisy(seed, still), noisy(seed + runs, still))) / left.squaredNorm();
+      square += theta * theta;
+    }
+    ASSERT_TRUE(effect.healthy);
+    EXPECT_NEAR(std::sqrt(square / runs) / (effect.healthy->parameters[0] / sight.threshold), 1, 0.2) << name;
   }
 }
 
