@@ -5,16 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <set>
 
 #include "host_tools/error.hpp"
 #include "host_tools/identify/dataset.hpp"
 #include "host_tools/identify/regressor.hpp"
 #include "host_tools/model/effects.hpp"
-#include "host_tools/model/evaluator.hpp"
 #include "host_tools/parallel.hpp"
-#include "host_tools/random.hpp"
 
 namespace fxdyn {
 namespace {
@@ -148,7 +145,8 @@ std::string cure(const std::string& e, const std::string& f) {
   static const std::vector<Cure> cures{
       {{base_parameters, "rotor_inertia"}, "nothing: base parameters hold the rotor, and the torque is the same"},
       {{"offset", "asymmetric_friction"}, "slow motion through zero velocity, both ways"},
-      {{"offset", "spring", "gravity_compensator", "ripple", base_parameters}, "a wider range of positions"},
+      {{"offset", "spring", "gravity_compensator", "ripple"}, "a wider range of positions"},
+      {{"offset", "spring", "ripple", base_parameters}, "a wider range of positions, or a baseline"},
       {{"torque_gain", "load_friction", "coulomb", "viscous", "saturation"},
        "poses in which the joint carries load, moved slowly with and against gravity"},
       {{"viscous", "coulomb", "viscous_quadratic", "viscous_cubic", "saturation"},

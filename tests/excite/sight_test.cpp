@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <sstream>
 
 #include "host_tools/error.hpp"
@@ -440,6 +441,30 @@ TEST(Sight, TableAndJson) {
     EXPECT_EQ(effect.at("parameters").at(1).at("name"), "mass com_x");
     EXPECT_GT(effect.at("with_baseline").at("smallest_percent").get<double>(), 0);
   }
+}
+
+TEST(Sight, OneSlidingJointHasNoCouplings) {
+  Robot robot;
+  robot.name = "slide";
+  robot.joints.resize(1);
+  robot.joints[0].name = "rail";
+  robot.joints[0].link = "carriage";
+  robot.joints[0].type = JointType::prismatic;
+  robot.joints[0].axis = Eigen::Vector3d::UnitX();
+  robot.joints[0].inertial = Inertial{90, Eigen::Vector3d::Zero(), Eigen::Matrix3d::Identity()};
+  Motion motion = fourier(1, 20, 0.2, 0.004);
+  for (MatrixXd* m : {&motion.q, &motion.dq, &motion.ddq}) *m = MatrixXd(m->col(2));
+  SightSettings settings;
+  settings.noise = VectorXd::Constant(1, 2);
+  Progress progress;
+  const Sight sight = see(nominal_from_urdf(robot, {200}, {0.5}).model, {motion}, settings, progress);
+  for (const EffectSight& e : sight.effects) EXPECT_FALSE(e.effect.ends_with("coupling"));
+  EXPECT_EQ(of(sight, "asymmetric_friction").verdict, SightVerdict::seen);
+  EXPECT_EQ(of(sight, "rotor_inertia").verdict, SightVerdict::not_identifiable);
+  EXPECT_EQ(of(sight, "ripple").typical.shape, std::vector{600.0});
+  const nlohmann::json json = sight_json(sight);
+  EXPECT_NE(json.dump().find("\"N*s/m\""), std::string::npos);
+  EXPECT_EQ(json.dump().find("N*m*s/rad"), std::string::npos);
 }
 
 TEST(Sight, SameResultAgain) {
