@@ -8,8 +8,7 @@
 #include <set>
 
 #include "host_tools/error.hpp"
-#include "host_tools/identify/dataset.hpp"
-#include "host_tools/identify/regressor.hpp"
+#include "host_tools/excite/information.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/parallel.hpp"
 
@@ -28,25 +27,6 @@ constexpr std::string_view base_parameters = "base parameters";
 constexpr double seen_below = 0.005;
 /// Eigenvalues of a normalised information matrix below this count as zero.
 constexpr double rank_tolerance = 1e-12;
-constexpr std::array nominal_effects{"viscous", "coulomb", "offset", "rotor_inertia"};
-
-bool is_nominal(std::string_view effect) {
-  return std::find(nominal_effects.begin(), nominal_effects.end(), effect) != nominal_effects.end();
-}
-
-/// Columns [first, first + count) of one effect with one shape.
-struct Block {
-  EffectCandidate candidate;
-  bool on_body = false;
-  Index first = 0, count = 0;
-  std::vector<MatrixXd> raw{};  ///< per joint: mean of phi phi^T, unfiltered; 0 x 0 where it does not reach
-};
-
-std::vector<Index> range(Index first, Index count) {
-  std::vector<Index> indices;
-  for (Index i = 0; i < count; ++i) indices.push_back(first + i);
-  return indices;
-}
 
 /// Inverse of a positive semidefinite matrix on its range, rank decided after normalising the diagonal to 1.
 MatrixXd pseudo_inverse(const MatrixXd& a) {
@@ -167,12 +147,6 @@ std::string cure(const std::string& e, const std::string& f) {
   return "other positions, speeds and loads in other combinations";
 }
 
-double largest_of(const std::vector<MatrixXd>& torque, std::size_t joint) {
-  double most = 0;
-  for (const MatrixXd& tau : torque) most = std::max(most, tau.col(static_cast<Index>(joint)).cwiseAbs().maxCoeff());
-  return most;
-}
-
 void check(const IdentifiedModel& nominal, const std::vector<Motion>& motions, const SightSettings& settings) {
   const auto n = static_cast<Index>(nominal.robot.size());
   if (motions.empty()) throw InputError("no motion to judge");
@@ -183,6 +157,9 @@ void check(const IdentifiedModel& nominal, const std::vector<Motion>& motions, c
       throw InputError(fmt::format("motion '{}' has steps of {} s, '{}' of {} s: sample them alike", motion.name,
                                    motion.step_s, motions.front().name, motions.front().step_s));
     }
+    if (motion.t.size() < 2 || motion.t.size() != motion.q.rows())
+      throw InputError(
+          fmt::format("motion '{}': {} instants for {} positions", motion.name, motion.t.size(), motion.q.rows()));
     if (motion.q.cols() != n || motion.dq.cols() != n || motion.ddq.cols() != n ||
         motion.dq.rows() != motion.q.rows() || motion.ddq.rows() != motion.q.rows()) {
       throw InputError(fmt::format("motion '{}': expected {} joints with q, dq and ddq", motion.name, n));
@@ -191,157 +168,6 @@ void check(const IdentifiedModel& nominal, const std::vector<Motion>& motions, c
   for (std::size_t j = 0; j < nominal.joints.size(); ++j) {
     if (!(nominal.joints[j].rated_torque > 0))
       throw InputError(fmt::format("joint {}: its rated torque is not known", j + 1));
-  }
-}
-
-Log to_log(const Motion& motion) {
-  Log log;
-  log.file = motion.name;
-  log.step_s = motion.step_s;
-  log.t = motion.t;
-  log.from_s = motion.t[0];
-  log.to_s = motion.t[motion.t.size() - 1];
-  log.q = motion.q;
-  log.dq = motion.dq;
-  log.ddq = motion.ddq;
-  return log;
-}
-
-/// Columns of all effects over all motions, as information: sums over rows of products, weighted so that the unit is
-/// one over a coefficient's variance.
-class Information {
- public:
-  Information(const IdentifiedModel& nominal, const std::vector<Motion>& motions, const SightSettings& settings,
-              Progress& progress);
-
-  FilterFit filter;
-  double seconds = 0, independent_samples = 0;
-  VectorXd noise;  ///< within the cut-off [N*m | N]
-  Index base = 0;
-  std::vector<Block> blocks;  ///< nominal effects first
-  std::size_t nominal_blocks = 0;
-  MatrixXd gram;
-
- private:
-  void add_blocks(const IdentifiedModel& nominal, const std::vector<Motion>& motions,
-                  const std::vector<RobotColumns>& columns);
-};
-
-void Information::add_blocks(const IdentifiedModel& nominal, const std::vector<Motion>& motions,
-                             const std::vector<RobotColumns>& columns) {
-  std::vector<MatrixXd> torque, structural;
-  for (const RobotColumns& c : columns) {
-    torque.push_back(c.torque());
-    structural.push_back(c.structural());
-  }
-  const std::size_t n = nominal.robot.size();
-  Index at = base;
-  const auto add = [&](std::string_view effect, std::size_t joint, std::vector<double> shape) {
-    const EffectInfo& info = *find_effect(effect);
-    Block block{{std::string(effect), joint, std::move(shape)},
-                info.acts_on == ActsOn::body,
-                at,
-                static_cast<Index>(info.linear.size())};
-    block.raw.resize(n);
-    at += block.count;
-    blocks.push_back(std::move(block));
-  };
-  for (std::size_t j = 0; j < n; ++j) {
-    for (const char* effect : nominal_effects) add(effect, j, {});
-  }
-  nominal_blocks = blocks.size();
-  for (const EffectInfo& info : effect_infos()) {
-    if (is_nominal(info.name)) continue;
-    for (std::size_t j = 0; j < (info.acts_on == ActsOn::body ? 1 : n); ++j) {
-      for (const auto& shape : typical_shapes(info.name, j, nominal.robot, motions, torque, structural))
-        add(info.name, j, shape);
-    }
-  }
-  gram = MatrixXd::Zero(at, at);
-}
-
-Information::Information(const IdentifiedModel& nominal, const std::vector<Motion>& motions,
-                         const SightSettings& settings, Progress& progress) {
-  const std::size_t n = nominal.robot.size();
-  std::vector<Log> logs;
-  for (const Motion& motion : motions) logs.push_back(to_log(motion));
-  SignalSettings signals;
-  signals.torque_cutoff_hz = settings.torque_cutoff_hz;
-  filter = choose_filter(logs, signals);
-
-  std::vector<RobotColumns> columns;
-  for (const Motion& motion : motions) columns.emplace_back(nominal, motion);
-  const DhChain chain = to_dh(nominal.robot);
-  const BaseSet base_set = find_base(chain);
-  base = static_cast<Index>(base_set.columns.size());
-  add_blocks(nominal, motions, columns);
-  noise.resize(static_cast<Index>(n));
-
-  std::vector<std::vector<MatrixXd>> raw(blocks.size(), std::vector<MatrixXd>(n));  // sums of phi phi^T step
-  for (std::size_t m = 0; m < motions.size(); ++m) {
-    const Motion& motion = motions[m];
-    const ProcessedLog log = process(logs[m], filter);
-    const Index samples = log.last - log.first;
-    const double nyquist = 0.5 / motion.step_s, cutoff = std::min(filter.torque_cutoff_hz, nyquist);
-    const double duration = static_cast<double>(samples) * motion.step_s;
-    seconds += duration;
-    independent_samples += 2 * cutoff * duration;
-    // White noise within the cut-off, and weights that count independent samples instead of rows.
-    noise = settings.noise * std::sqrt(cutoff / nyquist);
-    const VectorXd weight = std::sqrt(2 * cutoff * duration / static_cast<double>(log.rows())) * noise.cwiseInverse();
-
-    progress.stage(fmt::format("what {} shows", motion.name), blocks.size() + n);
-    std::vector<std::vector<MatrixXd>> effect(blocks.size());  // [block][joint], filtered and decimated
-    parallel_for(blocks.size(), [&](std::size_t b) {
-      const EffectColumns full = columns[m](blocks[b].candidate);
-      effect[b].resize(n);
-      for (std::size_t j = 0; j < n; ++j) {
-        const MatrixXd& c = full.joints[j];
-        if (c.size() == 0) continue;
-        const auto inside = c.middleRows(log.first, samples);
-        const MatrixXd power = inside.transpose() * inside * motion.step_s;
-        raw[b][j] = raw[b][j].size() == 0 ? power : MatrixXd(raw[b][j] + power);
-        effect[b][j] = log.decimate(log.filter_columns(c));
-      }
-      progress.step();
-    });
-
-    std::vector<MatrixXd> rows(n, MatrixXd(motion.q.rows(), base));
-    Regressor regressor(chain);
-    for (Index k = 0; k < motion.q.rows(); ++k) {
-      const MatrixXd& y = regressor(motion.q.row(k), motion.dq.row(k), motion.ddq.row(k));
-      for (std::size_t j = 0; j < n; ++j) rows[j].row(k) = y(static_cast<Index>(j), base_set.columns);
-    }
-    std::vector<MatrixXd> grams(n);
-    std::vector<std::vector<Index>> places(n);  // in the whole
-    parallel_for(n, [&](std::size_t j) {
-      std::vector<std::size_t> here;
-      places[j] = range(0, base);
-      for (std::size_t b = 0; b < blocks.size(); ++b) {
-        if (effect[b][j].size() == 0) continue;
-        here.push_back(b);
-        const auto own = range(blocks[b].first, blocks[b].count);
-        places[j].insert(places[j].end(), own.begin(), own.end());
-      }
-      MatrixXd x(log.rows(), static_cast<Index>(places[j].size()));
-      x.leftCols(base) = log.decimate(log.filter_columns(rows[j]));
-      rows[j].resize(0, 0);
-      Index at = base;
-      for (const std::size_t b : here) {
-        x.middleCols(at, blocks[b].count) = effect[b][j];
-        at += blocks[b].count;
-      }
-      x *= weight[static_cast<Index>(j)];
-      grams[j] = MatrixXd::Zero(x.cols(), x.cols());
-      grams[j].selfadjointView<Eigen::Lower>().rankUpdate(x.transpose());
-      grams[j].triangularView<Eigen::StrictlyUpper>() = grams[j].transpose();
-      progress.step();
-    });
-    for (std::size_t j = 0; j < n; ++j) gram(places[j], places[j]) += grams[j];
-  }
-  progress.done();
-  for (std::size_t b = 0; b < blocks.size(); ++b) {
-    for (std::size_t j = 0; j < n; ++j) blocks[b].raw[j] = raw[b][j] / seconds;
   }
 }
 
@@ -362,23 +188,23 @@ class Judge {
   const Information& info_;
   double threshold_;
   VectorXd rated_;
-  std::size_t joints_;
   std::vector<Index> nominal_columns_;
   MatrixXd after_, after_healthy_, after_base_;
   std::vector<MatrixXd> without_;  ///< after_nominal() without nominal block b
 };
 
 Judge::Judge(const IdentifiedModel& nominal, const Information& information, double threshold)
-    : info_(information), threshold_(threshold), joints_(nominal.robot.size()) {
-  rated_.resize(static_cast<Index>(joints_));
-  for (std::size_t j = 0; j < joints_; ++j) rated_[static_cast<Index>(j)] = nominal.joints[j].rated_torque;
+    : info_(information), threshold_(threshold) {
+  rated_.resize(static_cast<Index>(nominal.joints.size()));
+  for (std::size_t j = 0; j < nominal.joints.size(); ++j)
+    rated_[static_cast<Index>(j)] = nominal.joints[j].rated_torque;
   const Index base = info_.base;
   const Block& last = info_.blocks[info_.nominal_blocks - 1];
-  nominal_columns_ = range(0, last.first + last.count);
+  nominal_columns_ = columns_from(0, last.first + last.count);
   after_ = after_nominal({});
   const MatrixXd& g = info_.gram;
   const auto all = nominal_columns_;
-  const auto inertia = range(0, base), friction = range(base, last.first + last.count - base);
+  const auto inertia = columns_from(0, base), friction = columns_from(base, last.first + last.count - base);
   after_base_ = schur(g, g.topRows(base), g.topLeftCorner(base, base));
   // A healthy recording of the same motions tells the base parameters, its friction fitted apart.
   MatrixXd nuisance = g(all, all);
@@ -409,7 +235,7 @@ std::vector<const Block*> Judge::shapes_of(std::string_view effect, std::optiona
 }
 
 std::vector<Index> Judge::own_columns(const Block& block) const {
-  const auto columns = range(block.first, block.count);
+  auto columns = columns_from(block.first, block.count);
   if (block.first < static_cast<Index>(nominal_columns_.size())) return columns;
   auto own = columns;
   std::erase_if(own, [&](Index i) { return after_(i, i) < nothing_left * info_.gram(i, i); });
@@ -417,7 +243,7 @@ std::vector<Index> Judge::own_columns(const Block& block) const {
 }
 
 Visibility Judge::seen(const Block& block, const MatrixXd& after) const {
-  const auto columns = range(block.first, block.count);
+  const auto columns = columns_from(block.first, block.count);
   return visibility(block, info_.gram(columns, columns), after(columns, columns), threshold_, rated_);
 }
 
@@ -451,7 +277,7 @@ EffectSight Judge::effect(std::string_view name, std::optional<std::size_t> join
     }
   };
   // What no column of a joint's friction is needed for, the base parameters take.
-  const auto here = range(typical.first, typical.count);
+  const auto here = columns_from(typical.first, typical.count);
   const Directions alone = directions(info_.gram(here, here), after_base_(here, here));
   if (alone.square.size() > 0) note(std::string(base_parameters), std::sqrt(1 - alone.square.mean()));
   for (std::size_t b = 0; b < info_.blocks.size(); ++b) {
@@ -483,62 +309,10 @@ std::string_view to_string(SightVerdict verdict) {
   return names[static_cast<std::size_t>(verdict)];
 }
 
-std::vector<std::vector<double>> typical_shapes(std::string_view effect, std::size_t joint, const Robot& robot,
-                                                const std::vector<Motion>& motions, const std::vector<MatrixXd>& torque,
-                                                const std::vector<MatrixXd>& structural) {
-  const EffectInfo* info = find_effect(effect);
-  if (info == nullptr) throw InputError(fmt::format("unknown effect '{}': see `fxdyn effects`", effect));
-  if (info->shape.empty()) return {{}};
-  const bool turns = robot.joints[joint].type == JointType::revolute;
-  const auto col = static_cast<Index>(joint);
-  double speed = 0, longest = 0;
-  for (const Motion& motion : motions) {
-    speed = std::max(speed, motion.dq.col(col).cwiseAbs().maxCoeff());
-    longest = std::max(longest, motion.step_s * static_cast<double>(motion.q.rows()));
-  }
-  const auto values = [&](const ParameterInfo& shape) -> std::vector<double> {
-    const auto shares_of = [](double scale, std::vector<double> shares) {
-      for (double& share : shares) share *= scale;
-      return shares;
-    };
-    if (shape.name == "velocity") return shares_of(speed, {0.025, 0.01, 0.05});
-    if (shape.name == "distance") return turns ? std::vector{3e-3, 1e-3, 9e-3} : std::vector{1e-4, 3e-5, 3e-4};
-    if (shape.name == "wavenumber") return turns ? std::vector{20.0, 4.0, 100.0} : std::vector{600.0, 120.0, 3000.0};
-    if (shape.name == "time_constant") return shares_of(longest, {1, 0.3, 3});
-    if (shape.name == "limit") return shares_of(largest_of(torque, joint), {0.85, 0.7, 0.95});
-    if (shape.name == "time") {
-      std::vector<double> times{2e-3, 1e-3, 4e-3};
-      for (double& time : times) time = std::min(time, Delay::largest * motions.front().step_s);
-      return times;
-    }
-    if (shape.name == "relaxation") return {1e-3, 5e-3};
-    if (shape.name == "torque_scale") return shares_of(largest_of(structural, joint), {0.05, 0.02, 0.1});
-    if (shape.name == "joint") {
-      std::vector<double> others;
-      for (std::size_t k = joint; k-- > 0;) others.push_back(static_cast<double>(k + 1));
-      for (std::size_t k = joint + 1; k < robot.size(); ++k) others.push_back(static_cast<double>(k + 1));
-      return others;
-    }
-    throw InputError(fmt::format("effect '{}': no typical values of its {} are known", effect, shape.name));
-  };
-  std::vector<std::vector<double>> shapes{{}};
-  for (const ParameterInfo& shape : info->shape) {
-    std::vector<std::vector<double>> more;
-    for (const double value : values(shape)) {
-      for (std::vector<double> before : shapes) {
-        before.push_back(std::clamp(value, shape.lower, shape.upper));
-        more.push_back(std::move(before));
-      }
-    }
-    shapes = std::move(more);
-  }
-  return shapes;
-}
-
 Sight see(const IdentifiedModel& nominal, const std::vector<Motion>& motions, const SightSettings& settings,
           Progress& progress) {
   check(nominal, motions, settings);
-  const Information information(nominal, motions, settings, progress);
+  const Information information(nominal, motions, settings.noise, settings.torque_cutoff_hz, progress);
   const double known = static_cast<double>(nominal.robot.size()) * information.independent_samples;
   const double asked =
       static_cast<double>(information.base) + static_cast<double>(nominal_effects.size() * nominal.robot.size());

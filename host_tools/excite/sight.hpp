@@ -51,7 +51,7 @@ struct EffectSight {
   std::string effect;
   std::optional<std::size_t> joint;  ///< index from 0; none: the robot as a whole
   SightVerdict verdict = SightVerdict::not_identifiable;
-  Visibility typical, worst;          ///< over the shapes of typical_shapes()
+  Visibility typical, worst;          ///< over the shapes of typical_shapes() (information.hpp)
   std::optional<Visibility> healthy;  ///< with a recording of the same motions from when the effect was not there
   std::vector<Confusion> confused;    ///< correlation >= 0.95, largest first
 };
@@ -64,19 +64,6 @@ struct Sight {
   double independent_samples = 0;    ///< N_eff: two per period of the cut-off
   std::vector<EffectSight> effects;  ///< catalogue order, within an effect by joint
 };
-
-/// Shapes for which an effect at a joint is judged, the typical one first:
-///   Stribeck velocity 2.5, 1, 5 % of the joint's largest velocity; presliding distance 3, 1, 9 mrad (1e-4, 3e-5, 3e-4
-///   m if prismatic); ripple 20, 4, 100 rad^-1 (600, 120, 3000 m^-1); time constant of drift 1, 0.3, 3 times the
-///   longest motion; saturation at 85, 70, 95 % of the largest torque; every other joint for couplings, the one before
-///   first; delay 2, 1, 4 ms; relaxation of elasticity 1, 5 ms; torque scale of backlash 5, 2, 10 % of the largest
-///   rigid torque.
-/// @param torque, structural of RobotColumns, one a motion
-/// @throws InputError: a shape parameter for which no typical value is known
-std::vector<std::vector<double>> typical_shapes(std::string_view effect, std::size_t joint, const Robot& robot,
-                                                const std::vector<Motion>& motions,
-                                                const std::vector<Eigen::MatrixXd>& torque,
-                                                const std::vector<Eigen::MatrixXd>& structural);
 
 /// Judges every effect of the catalogue on every joint. The nominal regressor is what `diagnose` starts from: base
 /// parameters and, per joint, viscous, coulomb, offset, rotor_inertia; weighted least squares over all joints, torque

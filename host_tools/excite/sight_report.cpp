@@ -130,7 +130,8 @@ std::string sight_table(const Sight& sight, const std::vector<std::string>& assu
       if (effect.healthy) baseline = std::min(baseline, effect.healthy->smallest);
       for (const Confusion& c : effect.confused) {
         ++mixed[c.effect];
-        const auto [a, b] = std::minmax(effect.effect, c.effect);
+        const auto& a = std::min(effect.effect, c.effect);
+        const auto& b = std::max(effect.effect, c.effect);
         auto pair = std::find_if(pairs.begin(), pairs.end(), [&](const Pair& p) { return p.a == a && p.b == b; });
         if (pair == pairs.end()) pair = pairs.insert(pairs.end(), {a, b, c.cure, {}, 0});
         pair->correlation = std::max(pair->correlation, c.correlation);
