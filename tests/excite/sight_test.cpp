@@ -106,7 +106,9 @@ TEST(Sight, HasEveryEffectOfTheCatalogueAtEveryJoint) {
     EXPECT_LE(e.typical.rho, 1) << e.effect;
     EXPECT_GE(e.worst.smallest, e.typical.smallest) << e.effect;
     // With more known beforehand an effect can only be seen better.
-    if (e.healthy) EXPECT_LE(e.healthy->smallest, e.typical.smallest * 1.001) << e.effect;
+    if (e.healthy) {
+      EXPECT_LE(e.healthy->smallest, e.typical.smallest * 1.001) << e.effect;
+    }
     EXPECT_EQ(e.typical.parameters.size(), find_effect(e.effect)->linear.size());
   }
 }
