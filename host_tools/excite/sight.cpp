@@ -1,0 +1,351 @@
+#include "host_tools/excite/sight.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+#include "host_tools/error.hpp"
+#include "host_tools/excite/information.hpp"
+#include "host_tools/model/effects.hpp"
+#include "host_tools/parallel.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// rho^2 below which nothing is left of a direction.
+constexpr double nothing_left = 1e-5;
+constexpr double confused_from = 0.95;
+constexpr std::string_view base_parameters = "base parameters";
+/// Smallest effect that still counts as seen, share of rated torque.
+constexpr double seen_below = 0.005;
+/// Eigenvalues of a normalised information matrix below this count as zero.
+constexpr double rank_tolerance = 1e-12;
+
+/// Inverse of a positive semidefinite matrix on its range, rank decided after normalising the diagonal to 1.
+MatrixXd pseudo_inverse(const MatrixXd& a) {
+  const VectorXd scale = a.diagonal().unaryExpr([](double x) { return x > 0 ? 1 / std::sqrt(x) : 0.0; });
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(scale.asDiagonal() * a * scale.asDiagonal());
+  const double most = eigen.eigenvalues().tail(1)[0];
+  const VectorXd inverse =
+      eigen.eigenvalues().unaryExpr([=](double x) { return x > rank_tolerance * most ? 1 / x : 0.0; });
+  const MatrixXd half = scale.asDiagonal() * eigen.eigenvectors();
+  return half * inverse.asDiagonal() * half.transpose();
+}
+
+/// Information on columns that is left when those of the nuisance are fitted too.
+MatrixXd schur(const MatrixXd& columns, const MatrixXd& cross, const MatrixXd& nuisance) {
+  return columns - cross.transpose() * pseudo_inverse(nuisance) * cross;
+}
+
+/// Directions of an effect's columns, each of unit information before the nominal model takes its part, and what that
+/// leaves of each (rho^2).
+struct Directions {
+  MatrixXd u;       ///< columns x directions
+  VectorXd square;  ///< rho^2
+};
+
+/// @param before, after: information on the effect's columns before and after the nominal model takes its part
+Directions directions(const MatrixXd& before, const MatrixXd& after) {
+  if (before.size() == 0) return {};
+  const VectorXd scale = before.diagonal().unaryExpr([](double x) { return x > 0 ? 1 / std::sqrt(x) : 0.0; });
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> whole(scale.asDiagonal() * before * scale.asDiagonal());
+  std::vector<Index> kept;
+  for (Index i = 0; i < whole.eigenvalues().size(); ++i) {
+    if (whole.eigenvalues()[i] > 1e-10 * whole.eigenvalues().maxCoeff() && whole.eigenvalues()[i] > 0)
+      kept.push_back(i);
+  }
+  MatrixXd basis = scale.asDiagonal() * whole.eigenvectors()(Eigen::all, kept);
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    basis.col(static_cast<Index>(i)) /= std::sqrt(whole.eigenvalues()[kept[i]]);
+  if (kept.empty()) return {basis, VectorXd()};
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> left(basis.transpose() * after * basis);
+  return {basis * left.eigenvectors(), left.eigenvalues().cwiseMax(0.0).cwiseMin(1.0)};
+}
+
+/// The directions of which something is left, scaled to unit information after the nominal model.
+MatrixXd left_over(const Directions& d) {
+  std::vector<Index> kept;
+  for (Index i = 0; i < d.square.size(); ++i) {
+    if (d.square[i] >= nothing_left) kept.push_back(i);
+  }
+  MatrixXd u = d.u(Eigen::all, kept);
+  for (std::size_t i = 0; i < kept.size(); ++i) u.col(static_cast<Index>(i)) /= std::sqrt(d.square[kept[i]]);
+  return u;
+}
+
+Visibility visibility(const Block& block, const MatrixXd& before, const MatrixXd& after, double threshold,
+                      const VectorXd& rated) {
+  Visibility out;
+  out.shape = block.candidate.shape;
+  out.parameters.assign(static_cast<std::size_t>(block.count), std::numeric_limits<double>::infinity());
+  const Directions d = directions(before, after);
+  if (d.square.size() == 0) return out;
+  double sum = 0, inverse_squares = 0;
+  int kept = 0;
+  for (Index i = 0; i < d.square.size(); ++i) {
+    if (d.square[i] < nothing_left) continue;
+    double felt = 0;  // squared, share of rated torque
+    for (std::size_t j = 0; j < block.raw.size(); ++j) {
+      if (block.raw[j].size() == 0) continue;
+      const double rms = d.u.col(i).dot(block.raw[j] * d.u.col(i));
+      felt = std::max(felt, rms / (rated[static_cast<Index>(j)] * rated[static_cast<Index>(j)]));
+    }
+    sum += d.square[i];
+    inverse_squares += d.square[i] / (threshold * threshold * felt);
+    ++kept;
+  }
+  out.rho = kept > 0 ? std::sqrt(sum / kept) : std::sqrt(d.square.maxCoeff());
+  if (kept > 0) out.smallest = std::sqrt(kept / inverse_squares);
+  for (Index i = 0; i < block.count; ++i) {
+    // A parameter alone, the effect's others zero.
+    if (before(i, i) > 0 && after(i, i) >= nothing_left * before(i, i))
+      out.parameters[static_cast<std::size_t>(i)] = threshold / std::sqrt(after(i, i));
+  }
+  return out;
+}
+
+/// Share (RMS) of what is left of `e` that `f` can take.
+double correlation(const MatrixXd& e, const MatrixXd& f, const MatrixXd& between) {
+  if (e.cols() == 0 || f.cols() == 0) return 0;
+  return std::min(1.0, std::sqrt((e.transpose() * between * f).squaredNorm() / static_cast<double>(e.cols())));
+}
+
+std::string cure(const std::string& e, const std::string& f) {
+  struct Cure {
+    std::set<std::string_view> effects;
+    std::string_view text;
+  };
+  static const std::vector<Cure> cures{
+      {{base_parameters, "rotor_inertia"}, "nothing: base parameters hold the rotor, and the torque is the same"},
+      {{"offset", "asymmetric_friction"}, "slow motion through zero velocity, both ways"},
+      {{"offset", "spring", "gravity_compensator", "ripple"}, "a wider range of positions"},
+      {{"offset", "spring", "ripple", base_parameters}, "a wider range of positions, or a baseline"},
+      {{"torque_gain", "load_friction", "coulomb", "viscous", "saturation"},
+       "poses in which the joint carries load, moved slowly with and against gravity"},
+      {{"viscous", "coulomb", "viscous_quadratic", "viscous_cubic", "saturation"},
+       "constant speeds from slow to the limit"},
+      {{"coulomb", "viscous", "torque_gain", "friction_drift"},
+       "the first motion once more at the end, after the robot warmed up"},
+      {{"backlash", "elasticity"}, "motion in which the load reverses; an encoder on the link"},
+      {{"coulomb", "stribeck", "presliding"}, "slow reversals of a few milliradians, and of a few degrees"},
+      {{"delay", "elasticity", "eccentricity", "backlash", "rotor_inertia"},
+       "faster motion beside the slow one; an encoder on the link"},
+  };
+  for (const Cure& c : cures) {
+    if (c.effects.contains(e) && c.effects.contains(f)) return std::string(c.text);
+  }
+  if (e == base_parameters || f == base_parameters)
+    return "the same motions recorded without it (role = \"baseline\"), or inertias known beforehand";
+  if (e.ends_with("coupling") || f.ends_with("coupling")) return "joints moved one at a time";
+  return "other positions, speeds and loads in other combinations";
+}
+
+void check(const IdentifiedModel& nominal, const std::vector<Motion>& motions, const SightSettings& settings) {
+  const auto n = static_cast<Index>(nominal.robot.size());
+  if (motions.empty()) throw InputError("no motion to judge");
+  if (settings.noise.size() != n || !(settings.noise.minCoeff() > 0))
+    throw InputError(fmt::format("torque noise: expected {} positive values, one a joint", n));
+  for (const Motion& motion : motions) {
+    if (motion.step_s != motions.front().step_s) {
+      throw InputError(fmt::format("motion '{}' has steps of {} s, '{}' of {} s: sample them alike", motion.name,
+                                   motion.step_s, motions.front().name, motions.front().step_s));
+    }
+    if (motion.t.size() < 2 || motion.t.size() != motion.q.rows())
+      throw InputError(
+          fmt::format("motion '{}': {} instants for {} positions", motion.name, motion.t.size(), motion.q.rows()));
+    if (motion.q.cols() != n || motion.dq.cols() != n || motion.ddq.cols() != n ||
+        motion.dq.rows() != motion.q.rows() || motion.ddq.rows() != motion.q.rows()) {
+      throw InputError(fmt::format("motion '{}': expected {} joints with q, dq and ddq", motion.name, n));
+    }
+  }
+  for (std::size_t j = 0; j < nominal.joints.size(); ++j) {
+    if (!(nominal.joints[j].rated_torque > 0))
+      throw InputError(fmt::format("joint {}: its rated torque is not known", j + 1));
+  }
+}
+
+/// Answers questions to the information.
+class Judge {
+ public:
+  Judge(const IdentifiedModel& nominal, const Information& information, double threshold);
+  EffectSight effect(std::string_view name, std::optional<std::size_t> joint) const;
+
+ private:
+  /// What the nominal columns without those of `left_out` leave of all columns.
+  MatrixXd after_nominal(const std::vector<const Block*>& left_out) const;
+  std::vector<const Block*> shapes_of(std::string_view effect, std::optional<std::size_t> joint) const;
+  Visibility seen(const Block& block, const MatrixXd& after) const;
+  /// Columns in which an effect differs from the nominal model: without the offset of a spring. All where none does.
+  std::vector<Index> own_columns(const Block& block) const;
+
+  const Information& info_;
+  double threshold_;
+  VectorXd rated_;
+  std::vector<Index> nominal_columns_;
+  MatrixXd after_, after_healthy_, after_base_;
+  std::vector<MatrixXd> without_;  ///< after_nominal() without nominal block b
+};
+
+Judge::Judge(const IdentifiedModel& nominal, const Information& information, double threshold)
+    : info_(information), threshold_(threshold) {
+  rated_.resize(static_cast<Index>(nominal.joints.size()));
+  for (std::size_t j = 0; j < nominal.joints.size(); ++j)
+    rated_[static_cast<Index>(j)] = nominal.joints[j].rated_torque;
+  const Index base = info_.base;
+  const Block& last = info_.blocks[info_.nominal_blocks - 1];
+  nominal_columns_ = columns_from(0, last.first + last.count);
+  after_ = after_nominal({});
+  const MatrixXd& g = info_.gram;
+  const auto all = nominal_columns_;
+  const auto inertia = columns_from(0, base), friction = columns_from(base, last.first + last.count - base);
+  after_base_ = schur(g, g.topRows(base), g.topLeftCorner(base, base));
+  // A healthy recording of the same motions tells the base parameters, its friction fitted apart.
+  MatrixXd nuisance = g(all, all);
+  nuisance.topLeftCorner(base, base) += schur(g(inertia, inertia), g(friction, inertia), g(friction, friction));
+  after_healthy_ = schur(g, g(all, Eigen::all), nuisance);
+  without_.resize(info_.nominal_blocks);
+  parallel_for(without_.size(), [&](std::size_t b) { without_[b] = after_nominal({&info_.blocks[b]}); });
+}
+
+MatrixXd Judge::after_nominal(const std::vector<const Block*>& left_out) const {
+  std::vector<Index> columns;
+  for (const Index i : nominal_columns_) {
+    const bool out = std::any_of(left_out.begin(), left_out.end(), [&](const Block* block) {
+      return i >= block->first && i < block->first + block->count;
+    });
+    if (!out) columns.push_back(i);
+  }
+  const MatrixXd& g = info_.gram;
+  return schur(g, g(columns, Eigen::all), g(columns, columns));
+}
+
+std::vector<const Block*> Judge::shapes_of(std::string_view effect, std::optional<std::size_t> joint) const {
+  std::vector<const Block*> shapes;
+  for (const Block& block : info_.blocks) {
+    if (block.candidate.effect == effect && (block.on_body || block.candidate.joint == joint)) shapes.push_back(&block);
+  }
+  return shapes;
+}
+
+std::vector<Index> Judge::own_columns(const Block& block) const {
+  auto columns = columns_from(block.first, block.count);
+  if (block.first < static_cast<Index>(nominal_columns_.size())) return columns;
+  auto own = columns;
+  std::erase_if(own, [&](Index i) { return after_(i, i) < nothing_left * info_.gram(i, i); });
+  return own.empty() ? columns : own;
+}
+
+Visibility Judge::seen(const Block& block, const MatrixXd& after) const {
+  const auto columns = columns_from(block.first, block.count);
+  return visibility(block, info_.gram(columns, columns), after(columns, columns), threshold_, rated_);
+}
+
+EffectSight Judge::effect(std::string_view name, std::optional<std::size_t> joint) const {
+  EffectSight out;
+  out.effect = name;
+  out.joint = joint;
+  const auto shapes = shapes_of(name, joint);
+  const Block& typical = *shapes.front();
+  const auto own = static_cast<std::size_t>(&typical - info_.blocks.data());
+  const bool nominal = own < info_.nominal_blocks;
+  const MatrixXd& after = nominal ? without_[own] : after_;
+
+  for (const Block* shape : shapes) {
+    const Visibility v = seen(*shape, after);
+    if (shape == &typical) out.typical = out.worst = v;
+    if (v.smallest > out.worst.smallest) out.worst = v;
+  }
+  if (!nominal) out.healthy = seen(typical, after_healthy_);
+  if (std::isfinite(out.typical.smallest))
+    out.verdict = out.typical.smallest <= seen_below ? SightVerdict::seen : SightVerdict::weak;
+
+  const auto note = [&](const std::string& other, double r) {
+    if (r < confused_from) return;
+    const auto known =
+        std::find_if(out.confused.begin(), out.confused.end(), [&](const Confusion& c) { return c.effect == other; });
+    if (known == out.confused.end()) {
+      out.confused.push_back({other, r, cure(out.effect, other)});
+    } else {
+      known->correlation = std::max(known->correlation, r);
+    }
+  };
+  // What no column of a joint's friction is needed for, the base parameters take.
+  const auto here = columns_from(typical.first, typical.count);
+  const Directions alone = directions(info_.gram(here, here), after_base_(here, here));
+  if (alone.square.size() > 0) note(std::string(base_parameters), std::sqrt(1 - alone.square.mean()));
+  for (std::size_t b = 0; b < info_.blocks.size(); ++b) {
+    const Block& other = info_.blocks[b];
+    if (other.candidate.effect == name) continue;
+    if (joint && !other.on_body && other.candidate.joint != *joint) continue;
+    // A nominal effect is compared before it has taken its part.
+    MatrixXd both;
+    const MatrixXd* left = &after;
+    if (b < info_.nominal_blocks) {
+      if (nominal) both = after_nominal({&typical, &other});
+      left = nominal ? &both : &without_[b];
+    }
+    const auto e = own_columns(typical), f = own_columns(other);
+    const auto left_of = [&](const std::vector<Index>& columns) {
+      return left_over(directions(info_.gram(columns, columns), (*left)(columns, columns)));
+    };
+    note(other.candidate.effect, correlation(left_of(e), left_of(f), (*left)(e, f)));
+  }
+  std::stable_sort(out.confused.begin(), out.confused.end(),
+                   [](const Confusion& a, const Confusion& b) { return a.correlation > b.correlation; });
+  return out;
+}
+
+}  // namespace
+
+std::string_view to_string(SightVerdict verdict) {
+  static constexpr std::array names{"seen", "weak", "not_identifiable"};
+  return names[static_cast<std::size_t>(verdict)];
+}
+
+Sight see(const IdentifiedModel& nominal, const std::vector<Motion>& motions, const SightSettings& settings,
+          Progress& progress) {
+  check(nominal, motions, settings);
+  const Information information(nominal, motions, settings.noise, settings.torque_cutoff_hz, progress);
+  const double known = static_cast<double>(nominal.robot.size()) * information.independent_samples;
+  const double asked =
+      static_cast<double>(information.base) + static_cast<double>(nominal_effects.size() * nominal.robot.size());
+  if (known < 2 * asked) {
+    throw DataError(
+        fmt::format("{:.2f} s of motion hold {:.0f} independent torques for {:.0f} nominal parameters: plan "
+                    "a longer motion",
+                    information.seconds, known, asked));
+  }
+  const Judge judge(nominal, information, settings.threshold);
+  Sight sight;
+  sight.robot = nominal.robot;
+  sight.torque_cutoff_hz = information.filter.torque_cutoff_hz;
+  sight.threshold = settings.threshold;
+  sight.seconds = information.seconds;
+  sight.independent_samples = information.independent_samples;
+  sight.noise = information.noise;
+  for (Index j = 0; j < sight.noise.size(); ++j)
+    sight.noise[j] /= nominal.joints[static_cast<std::size_t>(j)].rated_torque;
+  std::vector<std::pair<std::string_view, std::optional<std::size_t>>> questions;
+  for (const Block& block : information.blocks) {
+    const auto joint = block.on_body ? std::nullopt : std::optional(block.candidate.joint);
+    if (std::find(questions.begin(), questions.end(), std::pair(std::string_view(block.candidate.effect), joint)) ==
+        questions.end())
+      questions.emplace_back(block.candidate.effect, joint);
+  }
+  sight.effects.resize(questions.size());
+  parallel_for(questions.size(),
+               [&](std::size_t i) { sight.effects[i] = judge.effect(questions[i].first, questions[i].second); });
+  const auto place = [](const EffectSight& e) { return find_effect(e.effect) - effect_infos().data(); };
+  std::stable_sort(sight.effects.begin(), sight.effects.end(),
+                   [&](const EffectSight& a, const EffectSight& b) { return place(a) < place(b); });
+  return sight;
+}
+
+}  // namespace fxdyn

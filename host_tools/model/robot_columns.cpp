@@ -1,0 +1,137 @@
+#include "host_tools/model/robot_columns.hpp"
+
+#include <fmt/format.h>
+
+#include "host_tools/error.hpp"
+#include "host_tools/model/effects.hpp"
+#include "host_tools/model/evaluator.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+/// Deflections [rad | m] and tilts [rad] that are added: their curvature and the rounding of q - delta both stay below
+/// 1e-5 of the column.
+constexpr double small_angle = 1e-6;
+/// Torque that is added, as a share of the model's largest.
+constexpr double small_torque = 1e-6;
+/// The torque is linear in a payload's mass and first moment: any values do that are small beside a robot's.
+constexpr double small_mass = 1e-3, lever = 1;
+
+const EffectInfo& info_of(std::string_view effect) {
+  const EffectInfo* info = find_effect(effect);
+  if (info == nullptr) throw InputError(fmt::format("unknown effect '{}': see `fxdyn effects`", effect));
+  return *info;
+}
+
+MatrixXd predict(const IdentifiedModel& model, const Motion& motion) {
+  return predict(model, motion.q, motion.dq, motion.ddq, motion.step_s);
+}
+
+}  // namespace
+
+std::vector<ColumnName> column_names(std::string_view effect, JointType type) {
+  std::vector<ColumnName> names;
+  for (const ParameterInfo& parameter : info_of(effect).linear) {
+    names.push_back({std::string(parameter.name),
+                     std::string(type == JointType::revolute ? parameter.unit : parameter.unit_prismatic)});
+  }
+  if (effect == Payload::name) {
+    for (std::size_t i = 1; i < names.size(); ++i) names[i] = {names[0].name + " " + names[i].name, "kg*m"};
+  }
+  return names;
+}
+
+RobotColumns::RobotColumns(const IdentifiedModel& model, const Motion& motion)
+    : model_(model), motion_(&motion), torque_(predict(model, motion)) {
+  IdentifiedModel rigid = model;
+  for (JointFit& joint : rigid.joints) {
+    std::erase_if(joint.effects, [](const EffectFit& fit) { return info_of(fit.effect).acts_on != ActsOn::position; });
+    joint.bls.reset();
+  }
+  structural_ = predict(rigid, motion);
+}
+
+MatrixXd RobotColumns::phi(const EffectCandidate& candidate) const {
+  const EffectInfo& info = info_of(candidate.effect);
+  const auto j = static_cast<Index>(candidate.joint);
+  JointSeries series{motion_->q.col(j), motion_->dq.col(j), motion_->ddq.col(j), structural_.col(j), motion_->step_s};
+  series.total = torque_.col(j);
+  if (info.needs_peers) {
+    series.peers_dq = motion_->dq;
+    series.peers_sign = motion_->dq;
+    for (Index i = 0; i < series.peers_sign.cols(); ++i) {
+      const double width = model_.joints[static_cast<std::size_t>(i)].sign_width;
+      series.peers_sign.col(i) = series.peers_sign.col(i).unaryExpr([=](double dq) { return tanh_of(dq / width); });
+    }
+  }
+  return effect_columns(candidate.effect, candidate.shape, model_.joints[candidate.joint].sign_width, series);
+}
+
+MatrixXd RobotColumns::slope(const IdentifiedModel& changed, double theta) const {
+  return (predict(changed, *motion_) - torque_) / theta;
+}
+
+EffectColumns RobotColumns::operator()(const EffectCandidate& candidate) const {
+  const EffectInfo& info = info_of(candidate.effect);
+  const bool on_body = info.acts_on == ActsOn::body;
+  if (!on_body && candidate.joint >= model_.joints.size()) {
+    throw InputError(
+        fmt::format("effect '{}' at joint {}: the robot has {}", info.name, candidate.joint + 1, model_.joints.size()));
+  }
+  if (candidate.shape.size() != info.shape.size()) {
+    throw InputError(fmt::format("effect '{}' has {} shape parameters, not {}", info.name, info.shape.size(),
+                                 candidate.shape.size()));
+  }
+  EffectColumns out;
+  out.joints.resize(model_.joints.size());
+  const bool of_total_follow = !on_body && !info.needs_total && !in_order(model_.joints[candidate.joint], true).empty();
+  if (info.acts_on == ActsOn::torque && !of_total_follow) {
+    out.joints[candidate.joint] = phi(candidate);
+    return out;
+  }
+
+  std::vector<MatrixXd> slopes;  // one a column, samples x joints
+  const auto with = [&](std::vector<double> linear) {
+    IdentifiedModel changed = model_;
+    EffectFit fit;
+    fit.effect = candidate.effect;
+    fit.shape = candidate.shape;
+    fit.linear = std::move(linear);
+    (on_body ? changed.body : changed.joints[candidate.joint].effects).push_back(std::move(fit));
+    return changed;
+  };
+  if (candidate.effect == Payload::name) {
+    slopes.push_back(slope(with({small_mass, 0, 0, 0}), small_mass));
+    for (std::size_t axis = 1; axis < info.linear.size(); ++axis) {
+      // Central: the second moments, the same at both sides, drop out.
+      std::vector<double> there{small_mass, 0, 0, 0}, back = there;
+      there[axis] = lever;
+      back[axis] = -lever;
+      slopes.push_back((slope(with(there), small_mass) - slope(with(back), small_mass)) / (2 * lever));
+    }
+  } else {
+    const MatrixXd size = on_body ? MatrixXd::Ones(1, static_cast<Index>(info.linear.size())) : phi(candidate);
+    for (std::size_t i = 0; i < info.linear.size(); ++i) {
+      const double largest = size.col(static_cast<Index>(i)).cwiseAbs().maxCoeff();
+      double step = info.acts_on == ActsOn::torque ? small_torque * torque_.cwiseAbs().maxCoeff() : small_angle;
+      if (largest > 0) step /= largest;
+      std::vector<double> linear(info.linear.size());
+      linear[i] = step;
+      slopes.push_back(largest > 0 ? slope(with(linear), step) : MatrixXd::Zero(torque_.rows(), torque_.cols()));
+    }
+  }
+  for (Index j = 0; j < torque_.cols(); ++j) {
+    bool reached = false;
+    for (const MatrixXd& column : slopes) reached |= column.col(j).cwiseAbs().maxCoeff() > 0;
+    if (!reached) continue;
+    MatrixXd& columns = out.joints[static_cast<std::size_t>(j)];
+    columns.resize(torque_.rows(), static_cast<Index>(slopes.size()));
+    for (std::size_t i = 0; i < slopes.size(); ++i) columns.col(static_cast<Index>(i)) = slopes[i].col(j);
+  }
+  return out;
+}
+
+}  // namespace fxdyn
