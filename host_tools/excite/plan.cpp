@@ -36,12 +36,16 @@ constexpr std::size_t static_at = 3;  ///< the fourth trajectory is the static o
 constexpr int samples_per_harmonic = 24;  ///< while optimising
 /// Kept while optimising, beside the margin: what falls between those samples.
 constexpr double between_samples = 0.02;
-constexpr int generations = 120, population = 16;
+constexpr int population = 16;
+/// For each trajectory and start; then in rounds over the trajectories.
+constexpr int search_generations = 80, polish_generations = 250, polish_rounds = 2;
 constexpr int pool_size = 150;  ///< feasible poses, to start from and to dwell at
 constexpr Index static_poses = 10;
 constexpr double dwell_s = 1, static_speed = 0.5;
-/// Weight of the log-determinant (mean over the parameters) against the logarithms of the condition numbers.
-constexpr double determinant_weight = 0.5, all_weight = 0.5;
+/// Objective: log(condition of the base) + all_weight log(condition of all) - weight log det / parameters. The
+/// determinant is the smoother guide, the condition numbers are the aim.
+constexpr double search_weight = 0.5, polish_weight = 0.1, all_weight = 0.25;
+/// Of a violation, see LimitCheck: large enough that no optimum lies beyond a limit.
 constexpr double penalty = 50;
 
 Motion one_pose(const VectorXd& q) {
@@ -106,8 +110,9 @@ class Coordinates {
       const double middle = 0.5 * (check_.lower()[j] + check_.upper()[j]);
       const double half = 0.5 * (check_.upper()[j] - check_.lower()[j]);
       const VectorXd moved = q_ * z;
-      const double first = check_.lower()[j] - std::min(0.0, moved.minCoeff());
-      const double last = check_.upper()[j] - std::max(0.0, moved.maxCoeff());
+      const double peak = between_samples_share() * half;
+      const double first = check_.lower()[j] + peak - std::min(0.0, moved.minCoeff());
+      const double last = check_.upper()[j] - peak - std::max(0.0, moved.maxCoeff());
       const double centre = std::max(first, std::min(last, middle + half * x[j * per_joint() + null_.size()]));
       out.series.push_back(series_of(z, centre));
       out.motion.q.col(j) = moved.array() + centre;
@@ -142,15 +147,15 @@ class Coordinates {
   FourierJoint series_of(const VectorXd& z, double centre) const {
     return {centre, null_.a * z.head(null_.a.cols()), null_.b * z.tail(null_.b.cols())};
   }
-  /// The factor at which z meets the tightest of the joint's limits. The peaks between the samples are higher than
-  /// those at the samples by at most (pi / samples_per_harmonic)^2 / 2 of the highest harmonic.
+  /// The peaks between the samples are higher than those at the samples by at most this share (highest harmonic).
+  static double between_samples_share() { return 0.5 * std::pow(std::numbers::pi / samples_per_harmonic, 2); }
+  /// The factor at which z meets the tightest of the joint's limits.
   double largest_scale(Index j, const VectorXd& z) const {
     const VectorXd moved = q_ * z;
     const double range = std::max(0.0, moved.maxCoeff()) - std::min(0.0, moved.minCoeff());
-    const double kept = (1 - check_.margin()) * (1 - 0.5 * std::pow(std::numbers::pi / samples_per_harmonic, 2));
+    const double sampled = 1 - between_samples_share(), kept = sampled * (1 - check_.margin());
     const MotionLimits& limits = check_.limits();
-    const double between = kept / (1 - check_.margin());
-    return std::min({between * (check_.upper()[j] - check_.lower()[j]) / range,
+    return std::min({sampled * (check_.upper()[j] - check_.lower()[j]) / range,
                      kept * kind_.velocity * limits.velocity[j] / (dq_ * z).cwiseAbs().maxCoeff(),
                      kept * kind_.acceleration * limits.acceleration[j] / (ddq_ * z).cwiseAbs().maxCoeff()});
   }
@@ -178,8 +183,17 @@ class Planner {
   Plan plan() {
     find_poses();
     random_baseline();
-    optimise();
-    if (has_static()) add_static();
+    search();
+    if (has_static()) choose_walk();
+    polish();
+    for (std::size_t k = 0; k < coordinates_.size(); ++k) {
+      if (k == static_at) add_static();
+      add_fourier(k);
+    }
+    if (coordinates_.size() == static_at && has_static()) add_static();
+    for (std::size_t i = 0; i < plan_.trajectories.size(); ++i) {
+      plan_.trajectories[i].name = fmt::format("{}_{}", i + 1, plan_.trajectories[i].kind);
+    }
     judge();
     return std::move(plan_);
   }
@@ -201,6 +215,16 @@ class Planner {
     }
     return widths;
   }
+
+  struct Draw {
+    VectorXd x;
+    MatrixXd information;
+  };
+  /// Poses of a static trajectory and the durations of its moves.
+  struct Walk {
+    std::vector<VectorXd> poses;
+    std::vector<double> moves_s;
+  };
 
   Index joints() const { return check_.lower().size(); }
   bool has_static() const { return static_cast<std::size_t>(settings_.trajectories) > static_at; }
@@ -313,7 +337,7 @@ class Planner {
     best.log_determinant = std::max(best.log_determinant, one.log_determinant);
   }
 
-  double value(const MatrixXd& information) const {
+  double value(const MatrixXd& information, double determinant_weight) const {
     const Conditioning c = conditioning(information);
     // A plan that can't tell a parameter still compares with another one.
     const auto log_of = [](double condition) { return std::min(std::log(condition), 40.0); };
@@ -350,67 +374,84 @@ class Planner {
     for (const Conditioning& one : firsts) keep_best(plan_.trajectory_before, one);
   }
 
-  void optimise() {
-    const auto list = fourier_kinds();
+  /// From several starts, each trajectory with those before it.
+  void search() {
     total_ = MatrixXd::Zero(columns_.size(), columns_.size());
-    for (std::size_t k = 0; k < list.size(); ++k) {
+    for (std::size_t k = 0; k < coordinates_.size(); ++k) {
       const Coordinates& coordinates = coordinates_[k];
-      progress_.stage(fmt::format("optimising {} ({}/{})", list[k]->name, k + 1, list.size()),
-                      static_cast<std::size_t>(settings_.starts) * generations);
-      const auto objective = [&](const VectorXd& x) {
-        const auto decoded = coordinates.decode(x);
-        return value(total_ + information(coordinates, decoded.motion)) + 1e-3 * decoded.overflow +
-               penalty * check_.violation(decoded.motion, between_samples);
-      };
+      progress_.stage(fmt::format("searching {} ({}/{})", coordinates.kind().name, k + 1, coordinates_.size()),
+                      static_cast<std::size_t>(settings_.starts * search_generations));
       std::vector<double> ranks(draws_[k].size());
-      parallel_for(ranks.size(), [&](std::size_t i) { ranks[i] = value(total_ + draws_[k][i].information); });
-      std::vector<std::size_t> order(ranks.size());
-      std::iota(order.begin(), order.end(), std::size_t{0});
-      std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return ranks[a] < ranks[b]; });
-      VectorXd best;
-      double best_value = infinity;
+      parallel_for(ranks.size(),
+                   [&](std::size_t i) { ranks[i] = value(total_ + draws_[k][i].information, search_weight); });
+      const std::vector<std::size_t> order = ascending(ranks);
+      Draw best = draws_[k][order[0]];
+      double best_value = ranks[order[0]];
       for (std::size_t start = 0; start < static_cast<std::size_t>(settings_.starts); ++start) {
-        VectorXd x = minimise(objective, draws_[k][order[start % order.size()]].x,
-                              {generations, population, 0.2, settings_.seed * 100 + start}, [&] { progress_.step(); });
-        if (!make_feasible(coordinates, x)) continue;
-        const double at = objective(x);
-        if (at < best_value) {
-          best_value = at;
-          best = x;
-        }
+        const EvolutionSettings evolution{search_generations, population, 0.2, settings_.seed * 100 + start};
+        improve(coordinates, draws_[k][order[start % order.size()]].x, total_, search_weight, evolution, best,
+                best_value);
       }
-      if (best.size() == 0) best = draws_[k][order[0]].x;
-      add_fourier(coordinates, best);
+      total_ += best.information;
+      chosen_.push_back(best);
     }
   }
 
+  /// Each trajectory again, with all the others.
+  void polish() {
+    progress_.stage("polishing", static_cast<std::size_t>(polish_rounds * polish_generations) * coordinates_.size());
+    for (int round = 0; round < polish_rounds; ++round) {
+      for (std::size_t k = 0; k < coordinates_.size(); ++k) {
+        const MatrixXd others = total_ - chosen_[k].information;
+        double best_value = value(total_, polish_weight);
+        const EvolutionSettings evolution{polish_generations, population, 0.1,
+                                          settings_.seed * 100 + 50 + static_cast<std::uint64_t>(round)};
+        improve(coordinates_[k], VectorXd(chosen_[k].x), others, polish_weight, evolution, chosen_[k], best_value);
+        total_ = others + chosen_[k].information;
+      }
+    }
+  }
+
+  void improve(const Coordinates& coordinates, const VectorXd& start, const MatrixXd& others, double weight,
+               const EvolutionSettings& evolution, Draw& best, double& best_value) {
+    const auto objective = [&](const VectorXd& x) {
+      const auto decoded = coordinates.decode(x);
+      return value(others + information(coordinates, decoded.motion), weight) + 1e-3 * decoded.overflow +
+             penalty * check_.violation(decoded.motion, between_samples);
+    };
+    VectorXd x = minimise(objective, start, evolution, [&] { progress_.step(); });
+    if (!make_feasible(coordinates, x)) return;
+    const MatrixXd own = information(coordinates, coordinates.decode(x).motion);
+    if (const double at = value(others + own, weight); at < best_value) {
+      best_value = at;
+      best = {x, own};
+    }
+  }
+
+  /// Indices in ascending order of the values.
+  static std::vector<std::size_t> ascending(const std::vector<double>& values) {
+    std::vector<std::size_t> order(values.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return values[a] < values[b]; });
+    return order;
+  }
+
   /// Samples the series at the plan's step; what the coarse samples missed shrinks it.
-  void add_fourier(const Coordinates& coordinates, VectorXd x) {
+  void add_fourier(std::size_t index) {
+    const Coordinates& coordinates = coordinates_[index];
+    VectorXd x = chosen_[index].x;
     PlannedTrajectory planned;
     planned.kind = coordinates.kind().name;
     planned.period_s = coordinates.period_s();
     planned.periods = coordinates.kind().periods;
-    for (int tries = 0;; ++tries) {
-      const auto decoded = coordinates.decode(x);
-      planned.series = decoded.series;
+    for (;;) {
+      planned.series = coordinates.decode(x).series;
       static_cast<Motion&>(planned) = play(planned.series, planned.period_s, planned.periods, settings_.step_s);
-      if (check_.violation(planned) == 0 || tries == 30) {
-        const MatrixXd own = information(coordinates, decoded.motion);
-        if (plan_.trajectories.empty()) plan_.trajectory_after = conditioning(own);
-        total_ += own;
-        break;
-      }
+      if (check_.violation(planned) == 0) break;
       coordinates.shrink(x, 0.98);
     }
-    planned.name = fmt::format("{}_{}", plan_.trajectories.size() + 1, planned.kind);
     plan_.trajectories.push_back(std::move(planned));
   }
-
-  /// Poses of a static trajectory and the durations of its moves.
-  struct Walk {
-    std::vector<VectorXd> poses;
-    std::vector<double> moves_s;
-  };
 
   MatrixXd matrix(const Walk& walk) const {
     MatrixXd poses(static_cast<Index>(walk.poses.size()), joints());
@@ -460,36 +501,33 @@ class Planner {
   }
 
   /// Poses one by one, each the one that adds most to log det.
-  void add_static() {
+  void choose_walk() {
     progress_.stage("choosing poses", static_cast<std::size_t>(static_poses));
     std::vector<MatrixXd> gains(pool_.size());
     parallel_for(pool_.size(),
                  [&](std::size_t i) { gains[i] = dwell_s * columns_.information(one_pose(pool_[i]), plan_.noise); });
     MatrixXd sum = total_;
-    Walk walk;
-    while (static_cast<Index>(walk.poses.size()) < static_poses) {
-      std::vector<double> values(pool_.size());
-      parallel_for(pool_.size(), [&](std::size_t i) { values[i] = log_determinant(sum + gains[i]); });
-      std::vector<std::size_t> order(pool_.size());
-      std::iota(order.begin(), order.end(), std::size_t{0});
-      std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return values[a] > values[b]; });
-      const auto next = std::find_if(order.begin(), order.end(), [&](std::size_t i) { return extend(walk, pool_[i]); });
+    while (static_cast<Index>(walk_.poses.size()) < static_poses) {
+      std::vector<double> lost(pool_.size());
+      parallel_for(pool_.size(), [&](std::size_t i) { lost[i] = -log_determinant(sum + gains[i]); });
+      const std::vector<std::size_t> order = ascending(lost);
+      const auto next =
+          std::find_if(order.begin(), order.end(), [&](std::size_t i) { return extend(walk_, pool_[i]); });
       if (next == order.end()) break;
       sum += gains[*next];
       progress_.step();
     }
+    total_ += static_information(walk_);
+  }
+
+  void add_static() {
     PlannedTrajectory planned;
-    static_cast<Motion&>(planned) = motion(walk, settings_.step_s);
+    static_cast<Motion&>(planned) = motion(walk_, settings_.step_s);
     planned.kind = "static";
-    planned.name = fmt::format("{}_static", static_at + 1);
-    planned.poses = matrix(walk);
-    planned.moves_s = walk.moves_s;
+    planned.poses = matrix(walk_);
+    planned.moves_s = walk_.moves_s;
     planned.dwell_s = dwell_s;
-    total_ += static_information(walk);
-    plan_.trajectories.insert(plan_.trajectories.begin() + static_at, std::move(planned));
-    for (std::size_t i = static_at + 1; i < plan_.trajectories.size(); ++i) {
-      plan_.trajectories[i].name = fmt::format("{}_{}", i + 1, plan_.trajectories[i].kind);
-    }
+    plan_.trajectories.push_back(std::move(planned));
   }
 
   /// The motion of a robot that moves freely: random states, uniform within +-pi (or the limits of a sliding joint) and
@@ -515,6 +553,7 @@ class Planner {
   void judge() {
     progress_.done();
     plan_.after = conditioning(total_);
+    plan_.trajectory_after = conditioning(chosen_[0].information);
     plan_.names = columns_.names();
     plan_.information = total_ / settings_.step_s;
     const std::vector<Motion> motions(plan_.trajectories.begin(), plan_.trajectories.end());
@@ -553,11 +592,6 @@ class Planner {
     plan_.usage = check_.usage(motions);
   }
 
-  struct Draw {
-    VectorXd x;
-    MatrixXd information;
-  };
-
   const Project& project_;
   const ExciteSettings& settings_;
   Progress& progress_;
@@ -567,7 +601,9 @@ class Planner {
   std::vector<VectorXd> pool_;
   std::vector<Coordinates> coordinates_;  ///< of each Fourier trajectory
   std::vector<std::vector<Draw>> draws_;  ///< likewise, random ones
-  MatrixXd total_;                        ///< information of the plan so far
+  std::vector<Draw> chosen_;              ///< likewise, the plan's
+  Walk walk_;
+  MatrixXd total_;  ///< information of the plan so far
 };
 
 }  // namespace

@@ -243,13 +243,16 @@ class ProjectReader {
       excite.margin = margin->number();
       if (excite.margin < 0 || excite.margin > 0.5) margin->place().fail("expected 0 .. 0.5, a share of each limit");
     }
-    if (const auto step = table.find("step_s")) {
-      excite.step_s = step->positive();
-      // every harmonic's period has at least ten samples
-      if (excite.step_s * 10 * excite.order > excite.period_s) {
-        step->place().fail(
-            fmt::format("expected at most period_s / (10 x order) = {:.3g} s", excite.period_s / (10 * excite.order)));
-      }
+    set(excite.step_s, table.find("step_s"), as_positive);
+    // every harmonic's period has at least ten samples
+    if (excite.step_s * 10 * excite.order > excite.period_s) {
+      table.place().fail(fmt::format("step_s of {} s is above period_s / (10 x order) = {:.3g} s", excite.step_s,
+                                     excite.period_s / (10 * excite.order)));
+    }
+    const double samples = excite.period_s / excite.step_s;
+    if (std::fabs(samples - std::round(samples)) > 1e-6 * samples) {
+      table.place().fail(
+          fmt::format("period_s of {} s is no multiple of step_s, {} s", excite.period_s, excite.step_s));
     }
     table.finish();
   }
