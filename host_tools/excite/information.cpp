@@ -103,9 +103,12 @@ std::vector<WeakParameter> weak_parameters(const Eigen::MatrixXd& information, c
     double variance = 0, lost = 0;
     for (Eigen::Index k = 0; k < p; ++k) {
       const double part = eigen.eigenvectors()(i, k) * eigen.eigenvectors()(i, k);
-      const double value = std::max(values[k], rounding);
-      variance += value > 0 ? part / value : (part > 0 ? std::numeric_limits<double>::infinity() : 0.0);
-      if (!(values[k] > rounding) || values[k] < told) lost += part;
+      if (values[k] > rounding) {
+        variance += part / values[k];
+      } else if (part > 1e-9) {
+        variance = std::numeric_limits<double>::infinity();
+      }
+      if (values[k] <= rounding || values[k] < told) lost += part;
     }
     const auto index = static_cast<std::size_t>(i);
     WeakParameter parameter{parameters.names[index], std::sqrt(variance), lost < 0.1, parameters.joints[index]};

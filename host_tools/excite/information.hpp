@@ -62,8 +62,8 @@ struct ParameterSizes {
   Eigen::VectorXd size;              ///< a change of this size would matter
 };
 
-constexpr double weak_error = 0.01;           ///< of a parameter's size: above it the parameter is weak
-constexpr double unidentifiable_error = 0.1;  ///< of a unit direction's size: above it the direction can't be told
+constexpr double weak_error = 0.002;           ///< of a parameter's size: above it the parameter is weak
+constexpr double unidentifiable_error = 0.01;  ///< of a unit direction's size: above it the direction can't be told
 
 /// The parameters that can't be told, or are told poorly, from an information matrix (inverse covariance, p x p) of any
 /// regressor. Each column is measured in its size, S = diag(size): eigenvectors of S M S whose standard deviation

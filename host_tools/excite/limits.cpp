@@ -193,10 +193,10 @@ double LimitCheck::violation(const Motion& motion, double extra) const {
   return sum;
 }
 
-std::string LimitCheck::worst(const Motion& motion) const {
+std::string LimitCheck::worst(const Motion& motion, double extra) const {
   double most = 0;
   std::string name;
-  each_excess(motion, 0, [&](double share, auto&& describe) {
+  each_excess(motion, extra, [&](double share, auto&& describe) {
     if (share > most) {
       most = share;
       name = describe();

@@ -53,7 +53,7 @@ class LimitCheck {
   /// a share of the limit (torque) or of the box's extent. 0: within. `extra`: a further margin.
   double violation(const Motion& motion, double extra = 0) const;
   /// The limit that a motion violates most, for messages: "torque of joint 'j2' (300 N*m of 150)"; empty: none.
-  std::string worst(const Motion& motion) const;
+  std::string worst(const Motion& motion, double extra = 0) const;
   /// Every limit, over all the motions.
   std::vector<Usage> usage(const std::vector<Motion>& motions) const;
 

@@ -292,21 +292,23 @@ class Planner {
       pool_.push_back(best);
       return;
     }
-    std::string worst = check_.worst(one_pose(best));
-    if (worst.empty()) worst = "the margins kept to the limits";
+    refuse("no pose at rest", one_pose(best));
+  }
+
+  [[noreturn]] void refuse(std::string_view what, const Motion& nearest) const {
     throw InputError(
-        fmt::format("{}: no pose at rest keeps the limits; at the best one found {} is beyond {}; widen "
-                    "that limit or lower [excite] margin ({})",
-                    project_.file.string(), worst, "its margin", settings_.margin));
+        fmt::format("{}: {} keeps the limits and their margins; the best one found violates {}; widen that "
+                    "limit or lower [excite] margin ({})",
+                    project_.file.string(), what, check_.worst(nearest, between_samples), settings_.margin));
   }
 
   /// Shrinks the motion until it is feasible; whether it got there.
   bool make_feasible(const Coordinates& coordinates, VectorXd& x) const {
-    for (int i = 0; i < 30; ++i) {
-      if (check_.violation(coordinates.decode(x).motion, between_samples) == 0) return true;
+    for (int i = 0; check_.violation(coordinates.decode(x).motion, between_samples) > 0; ++i) {
+      if (i == 40) return false;
       coordinates.shrink(x, 0.85);
     }
-    return false;
+    return true;
   }
 
   VectorXd random_feasible(const Coordinates& coordinates, std::uint64_t seed) const {
@@ -317,8 +319,7 @@ class Planner {
       x = coordinates.random(random.next(), pool_[pick]);
       if (make_feasible(coordinates, x)) return x;
     }
-    throw InputError(fmt::format("{}: no motion within the limits was found: {} from the first pose on",
-                                 project_.file.string(), check_.worst(coordinates.decode(x).motion)));
+    refuse("no motion", coordinates.decode(x).motion);
   }
 
   MatrixXd information(const Coordinates& coordinates, const Motion& motion) const {
