@@ -33,12 +33,12 @@ struct Kind {
 constexpr std::array kinds{Kind{"fast", 1, 1, 1}, Kind{"slow", 0.2, 1, 1}, Kind{"reversals", 0.5, 1, 3}};
 constexpr std::size_t static_at = 3;  ///< the fourth trajectory is the static one
 
-constexpr int samples_per_harmonic = 24;  ///< while optimising
+constexpr int samples_per_harmonic = 16;  ///< while optimising
 /// Kept while optimising, beside the margin: what falls between those samples.
 constexpr double between_samples = 0.02;
 constexpr int population = 16;
 /// For each trajectory and start; then in rounds over the trajectories.
-constexpr int search_generations = 80, polish_generations = 250, polish_rounds = 2;
+constexpr int search_generations = 80, polish_generations = 350, polish_rounds = 2;
 constexpr int pool_size = 150;  ///< feasible poses, to start from and to dwell at
 constexpr Index static_poses = 10;
 constexpr double dwell_s = 1, static_speed = 0.5;
@@ -586,7 +586,8 @@ class Planner {
     if (!lost.empty()) {
       throw DataError(
           fmt::format("{}: within these limits {} can't be told; let joint '{}' move more (it covers {:.2g} "
-                      "of a free joint's range)",
+                      "of a free joint's range) by wider limits or a larger box, or take a higher order or more "
+                      "trajectories",
                       project_.file.string(), fmt::join(lost, ", "),
                       project_.robot.joints[static_cast<std::size_t>(joint)].name, movement[joint]));
     }
