@@ -37,8 +37,11 @@ constexpr int samples_per_harmonic = 16;  ///< while optimising
 /// Kept while optimising, beside the margin: what falls between those samples.
 constexpr double between_samples = 0.02;
 constexpr int population = 16;
-/// For each trajectory and start; then in rounds over the trajectories.
-constexpr int search_generations = 80, polish_generations = 350, polish_rounds = 2;
+/// Generations grow with the number of coordinates (48 with six joints and order 5): of the search for each trajectory
+/// and start, of the polish for each trajectory and round.
+int search_generations(Index coordinates) { return 30 + static_cast<int>(coordinates); }
+int polish_generations(Index coordinates) { return 60 + 6 * static_cast<int>(coordinates); }
+constexpr int polish_rounds = 2;
 constexpr int pool_size = 150;  ///< feasible poses, to start from and to dwell at
 constexpr Index static_poses = 10;
 constexpr double dwell_s = 1, static_speed = 0.5;
@@ -381,7 +384,7 @@ class Planner {
     for (std::size_t k = 0; k < coordinates_.size(); ++k) {
       const Coordinates& coordinates = coordinates_[k];
       progress_.stage(fmt::format("searching {} ({}/{})", coordinates.kind().name, k + 1, coordinates_.size()),
-                      static_cast<std::size_t>(settings_.starts * search_generations));
+                      static_cast<std::size_t>(settings_.starts * search_generations(coordinates.size())));
       std::vector<double> ranks(draws_[k].size());
       parallel_for(ranks.size(),
                    [&](std::size_t i) { ranks[i] = value(total_ + draws_[k][i].information, search_weight); });
@@ -389,7 +392,8 @@ class Planner {
       Draw best = draws_[k][order[0]];
       double best_value = ranks[order[0]];
       for (std::size_t start = 0; start < static_cast<std::size_t>(settings_.starts); ++start) {
-        const EvolutionSettings evolution{search_generations, population, 0.2, settings_.seed * 100 + start};
+        const EvolutionSettings evolution{search_generations(coordinates.size()), population, 0.2,
+                                          settings_.seed * 100 + start};
         improve(coordinates, draws_[k][order[start % order.size()]].x, total_, search_weight, evolution, best,
                 best_value);
       }
@@ -400,12 +404,13 @@ class Planner {
 
   /// Each trajectory again, with all the others.
   void polish() {
-    progress_.stage("polishing", static_cast<std::size_t>(polish_rounds * polish_generations) * coordinates_.size());
+    const int generations = polish_generations(coordinates_[0].size());
+    progress_.stage("polishing", static_cast<std::size_t>(polish_rounds * generations) * coordinates_.size());
     for (int round = 0; round < polish_rounds; ++round) {
       for (std::size_t k = 0; k < coordinates_.size(); ++k) {
         const MatrixXd others = total_ - chosen_[k].information;
         double best_value = value(total_, polish_weight);
-        const EvolutionSettings evolution{polish_generations, population, 0.1,
+        const EvolutionSettings evolution{generations, population, 0.1,
                                           settings_.seed * 100 + 50 + static_cast<std::uint64_t>(round)};
         improve(coordinates_[k], VectorXd(chosen_[k].x), others, polish_weight, evolution, chosen_[k], best_value);
         total_ = others + chosen_[k].information;
