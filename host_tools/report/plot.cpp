@@ -190,18 +190,23 @@ std::vector<std::string> draw(const std::vector<TorquePlot>& plots) {
 
 std::string draw(const std::vector<Panel>& panels, const std::vector<std::string>& names) {
   constexpr int panel_height = 260;
+  constexpr Eigen::Index panel_points = 500;
   const TemporaryDirectory directory;
   std::string script = settings;
-  script += fmt::format("set terminal svg size 1000,{} dynamic\nset output '0.svg'\nset multiplot layout {},1\n",
-                        panel_height * panels.size(), panels.size());
+  script += fmt::format(
+      "set terminal svg size 1000,{} dynamic noenhanced font 'sans-serif,13' background '#ffffff'\nset tmargin 2\nset "
+      "output '0.svg'\nset multiplot layout {},1\n",
+      panel_height * panels.size(), panels.size());
   for (std::size_t p = 0; p < panels.size(); ++p) {
     const Panel& panel = panels[p];
     std::string data, lines;
     for (Eigen::Index c = 0; c < panel.columns.cols(); ++c) {
       const auto i = static_cast<std::size_t>(c);
-      data += curve(panel.t, panel.columns.col(c), 2000);
+      std::string name = names[i];
+      std::replace(name.begin(), name.end(), '\'', ' ');  // it stands in quotes
+      data += curve(panel.t, panel.columns.col(c), panel_points);
       lines += fmt::format("{}'{}.dat' index {} with lines lw 1.4 lc rgb '{}' title '{}'", c > 0 ? ", " : "", p, c,
-                           colours[i % colours.size()], names[i]);
+                           colours[i % colours.size()], name);
     }
     write_file(directory.path() / fmt::format("{}.dat", p), data);
     script += fmt::format("set xrange [{:.6g}:{:.6g}]\nset ylabel '{}'\nset xlabel '{}'\nplot {}\n", panel.t[0],

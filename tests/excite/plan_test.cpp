@@ -176,6 +176,38 @@ TEST(Plan, SaysWhatItCouldNotCheck) {
   EXPECT_THROW(find(plan, "torque", "lift"), std::runtime_error);
 }
 
+TEST(TorqueLimits, AreCheckedByTheIdentifiedModelWhereThereIsOne) {
+  const Project robot = project("");
+  std::vector<std::string> notes;
+  IdentifiedModel model = *torque_model(robot, nowhere, notes);
+  EXPECT_NE(notes.back().find("URDF"), std::string::npos);
+  Motion still{"",
+               0.01,
+               Eigen::VectorXd::Zero(1),
+               Eigen::MatrixXd::Zero(1, 3),
+               Eigen::MatrixXd::Zero(1, 3),
+               Eigen::MatrixXd::Zero(1, 3)};
+  const auto lift_torque = [&](const std::optional<IdentifiedModel>& with) {
+    const LimitCheck check(robot.robot, motion_limits(robot), with, 0.05);
+    const auto usage = check.usage({still});
+    return std::find_if(usage.begin(), usage.end(),
+                        [](const Usage& u) { return u.limit == "torque" && u.where == "lift"; })
+        ->highest;
+  };
+  // stretched out: 4 kg at 0.2 m and 2 kg at 0.4 + 0.15 m
+  EXPECT_NEAR(lift_torque(model), 9.81 * (4 * 0.2 + 2 * 0.55), 1e-9);
+  model.joints[1].effects.push_back({"offset", {}, {3.5}, {}, {}, false});
+  const auto directory = test::folder() / "with_model";
+  write_file(directory / "model.json", to_json(model).dump());
+  EXPECT_NEAR(lift_torque(torque_model(robot, directory, notes)), 9.81 * (4 * 0.2 + 2 * 0.55) + 3.5, 1e-9);
+  EXPECT_NE(notes.back().find("model.json"), std::string::npos);
+  const LimitCheck check(robot.robot, motion_limits(robot), model, 0.05);
+  EXPECT_EQ(check.violation(still), 0);
+  still.ddq(0, 1) = 60;
+  EXPECT_GT(check.violation(still), 0);
+  EXPECT_NE(check.worst(still).find("limits.torque of joint 'lift'"), std::string::npos) << check.worst(still);
+}
+
 struct Infeasible {
   std::string name, limits;
   std::vector<std::string> message;
