@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -65,12 +66,15 @@ json usage_json(const Usage& usage) {
           {"highest", usage.highest}, {"lower", usage.lower}, {"upper", usage.upper}, {"margin", usage.margin}};
 }
 
-json weak_json(const WeakParameter& weak, const Robot& robot) {
-  return {{"parameter", weak.name},
-          {"error", weak.error},
-          {"joint_to_move", robot.joints[static_cast<std::size_t>(weak.joint)].name}};
+json parameter_json(const WeakParameter& parameter, const Robot& robot) {
+  json out{{"parameter", parameter.name}, {"error", parameter.error}, {"weak", parameter.error >= weak_error}};
+  if (parameter.error >= weak_error) {
+    out["joint_to_move"] = robot.joints[static_cast<std::size_t>(parameter.joint)].name;
+  }
+  return out;
 }
 
+/// All of excite.json.
 json to_json(const Plan& plan, const Project& project) {
   json out{{"schema", "fxdyn.excite/1"},
            {"project", project.file.filename().string()},
@@ -87,15 +91,14 @@ json to_json(const Plan& plan, const Project& project) {
              {"first_trajectory",
               {{"before", conditioning_json(plan.trajectory_before)},
                {"after", conditioning_json(plan.trajectory_after)}}}}},
-           {"parameters", plan.names},
+           {"parameters", json::array()},
            {"trajectories", json::array()},
            {"limits", json::array()},
-           {"weak_parameters", json::array()},
            {"notes", plan.notes}};
   for (const PlannedTrajectory& one : plan.trajectories)
     out["trajectories"].push_back(trajectory_json(one, project.robot));
   for (const Usage& usage : plan.usage) out["limits"].push_back(usage_json(usage));
-  for (const WeakParameter& weak : plan.weak) out["weak_parameters"].push_back(weak_json(weak, project.robot));
+  for (const WeakParameter& one : plan.parameters) out["parameters"].push_back(parameter_json(one, project.robot));
   return out;
 }
 
@@ -119,12 +122,16 @@ std::string table(const Plan& plan, const Project& project) {
     out += fmt::format("{:<14}{:<18}{:>10.4g}{:>10.4g}{:>10.4g}{:>10.4g}  {:<8}{:>6.1f} %\n", u.limit, u.where,
                        u.lowest, u.highest, u.lower, u.upper, u.unit, 100 * u.margin);
   }
-  if (!plan.weak.empty()) {
-    out += "\nweak: standard deviation, as a share of what would take the rated torque, and the joint to move more\n";
-    for (const WeakParameter& weak : plan.weak) {
-      out += fmt::format("{:<14}{:>8.1f} %  {}\n", weak.name, 100 * weak.error,
-                         project.robot.joints[static_cast<std::size_t>(weak.joint)].name);
+  std::vector<WeakParameter> weakest = plan.parameters;
+  std::stable_sort(weakest.begin(), weakest.end(), [](const auto& a, const auto& b) { return a.error > b.error; });
+  out += "\nweakest parameters: standard deviation as a share of what would take the rated torque\n";
+  for (std::size_t i = 0; i < weakest.size() && (i < 3 || weakest[i].error >= weak_error); ++i) {
+    out += fmt::format("{:<18}{:>8.3f} %", weakest[i].name, 100 * weakest[i].error);
+    if (weakest[i].error >= weak_error) {
+      out += fmt::format("  weak: let joint '{}' move more",
+                         project.robot.joints[static_cast<std::size_t>(weakest[i].joint)].name);
     }
+    out += "\n";
   }
   for (const std::string& note : plan.notes) out += fmt::format("note: {}\n", note);
   return out + "note: collisions of the robot with itself are not checked; play the motions slowly first\n";

@@ -91,7 +91,7 @@ double log_determinant(const Eigen::MatrixXd& information) {
 }
 
 std::vector<WeakParameter> weak_parameters(const Eigen::MatrixXd& information, const ParameterSizes& parameters,
-                                           const Eigen::VectorXd& movement) {
+                                           const Eigen::VectorXd& movement, double above) {
   const Eigen::Index p = information.rows();
   const auto& size = parameters.size;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(size.asDiagonal() * information * size.asDiagonal());
@@ -112,7 +112,7 @@ std::vector<WeakParameter> weak_parameters(const Eigen::MatrixXd& information, c
     }
     const auto index = static_cast<std::size_t>(i);
     WeakParameter parameter{parameters.names[index], std::sqrt(variance), lost < 0.1, parameters.joints[index]};
-    if (parameter.identifiable && parameter.error < weak_error) continue;
+    if (parameter.identifiable && parameter.error < above) continue;
     if (parameters.of_link[index]) movement.head(parameter.joint + 1).minCoeff(&parameter.joint);
     weak.push_back(parameter);
   }

@@ -69,8 +69,9 @@ constexpr double unidentifiable_error = 0.01;  ///< of a unit direction's size: 
 /// regressor. Each column is measured in its size, S = diag(size): eigenvectors of S M S whose standard deviation
 /// 1 / sqrt(eigenvalue) is above unidentifiable_error (or whose eigenvalue is rounding) can't be told; a parameter
 /// with more than a tenth of its weight in them is not identifiable. `movement`: how much each joint moved, as a share
-/// of what would be full motion; the joint named is, of those that move the parameter, the one that moved least.
+/// of what would be full motion; the joint to move is, of those that move the parameter, the one that moved least.
+/// `above`: the error from which on a parameter is returned, 0 for all.
 std::vector<WeakParameter> weak_parameters(const Eigen::MatrixXd& information, const ParameterSizes& parameters,
-                                           const Eigen::VectorXd& movement);
+                                           const Eigen::VectorXd& movement, double above = weak_error);
 
 }  // namespace fxdyn

@@ -560,7 +560,6 @@ class Planner {
     progress_.done();
     plan_.after = conditioning(total_);
     plan_.trajectory_after = conditioning(chosen_[0].information);
-    plan_.names = columns_.names();
     plan_.information = total_ / settings_.step_s;
     const std::vector<Motion> motions(plan_.trajectories.begin(), plan_.trajectories.end());
     const Motion free = free_motion();
@@ -580,11 +579,9 @@ class Planner {
     }
     std::vector<std::string> lost;
     Index joint = -1;
-    for (const WeakParameter& parameter : weak_parameters(plan_.information, sizes, movement)) {
-      if (parameter.identifiable) {
-        plan_.weak.push_back(parameter);
-        continue;
-      }
+    plan_.parameters = weak_parameters(plan_.information, sizes, movement, 0);
+    for (const WeakParameter& parameter : plan_.parameters) {
+      if (parameter.identifiable) continue;
       lost.push_back(parameter.name);
       if (joint < 0 || movement[parameter.joint] < movement[joint]) joint = parameter.joint;
     }

@@ -32,15 +32,14 @@ struct Conditioning {
 
 struct Plan {
   std::vector<PlannedTrajectory> trajectories;
-  Conditioning after;               ///< the plan
-  Conditioning before;              ///< the best of `random_plans` random feasible plans of the same kinds, each figure
-  Conditioning trajectory_after;    ///< the first trajectory alone
-  Conditioning trajectory_before;   ///< the best of as many random feasible trajectories of its kind
-  std::vector<WeakParameter> weak;  ///< told poorly, but told
-  Eigen::MatrixXd information;      ///< of the parameters `names` over the plan, with `noise` at the plan's step
-  std::vector<std::string> names;
-  Eigen::VectorXd noise;  ///< standard deviation of the torque that was assumed [N*m | N]
-  Eigen::VectorXd rated;  ///< torque that errors are measured in [N*m | N]
+  Conditioning after;              ///< the plan
+  Conditioning before;             ///< the best of `random_plans` random feasible plans of the same kinds, each figure
+  Conditioning trajectory_after;   ///< the first trajectory alone
+  Conditioning trajectory_before;  ///< the best of as many random feasible trajectories of its kind
+  std::vector<WeakParameter> parameters;  ///< all of the columns', with the error that a fit would have
+  Eigen::MatrixXd information;            ///< of `parameters` over the plan, with `noise` at the plan's step
+  Eigen::VectorXd noise;                  ///< standard deviation of the torque that was assumed [N*m | N]
+  Eigen::VectorXd rated;                  ///< torque that errors are measured in [N*m | N]
   std::vector<Usage> usage;
   std::vector<std::string> notes;
 };
