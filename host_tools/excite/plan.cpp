@@ -47,7 +47,7 @@ constexpr Index static_poses = 10;
 constexpr double dwell_s = 1, static_speed = 0.5;
 /// Objective: log(condition of the base) + all_weight log(condition of all) - weight log det / parameters. The
 /// determinant is the smoother guide, the condition numbers are the aim.
-constexpr double search_weight = 0.5, polish_weight = 0.5, all_weight = 0.25;
+constexpr double search_weight = 0.5, polish_weight = 1.0, all_weight = 0.25;
 /// Of a violation, see LimitCheck: large enough that no optimum lies beyond a limit.
 constexpr double penalty = 50;
 

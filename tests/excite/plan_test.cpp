@@ -59,6 +59,7 @@ TEST(Plan, OfAnArmWithSixJointsBeatsRandomOnesThreefoldWithinItsLimits) {
   const double random = std::min(plan.before.base, plan.trajectory_before.base);
   EXPECT_LE(plan.after.base, random / 3) << plan.before.base << " " << plan.trajectory_before.base;
   EXPECT_LT(plan.after.all, plan.before.all / 2);
+  EXPECT_GT(plan.after.log_determinant, plan.before.log_determinant);
   for (const WeakParameter& one : plan.parameters) EXPECT_LT(one.error, weak_error) << one.name;
 
   const MotionLimits limits = motion_limits(robot);
