@@ -78,6 +78,7 @@ class Value {
     return *node_.value<bool>();
   }
   bool is_string() const { return node_.is_string(); }
+  bool is_list() const { return node_.is_array(); }
   std::string string() const {
     if (!node_.is_string()) place_.fail("expected a string in quotes");
     return *node_.value<std::string>();

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/error.hpp"
+#include "host_tools/excite/excite.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
 #include "host_tools/report/report.hpp"
@@ -94,6 +95,16 @@ int run(int argc, char** argv) {
   replay_verb->add_option("--image", image, "firmware image (.elf) made by toolchains/build_image.sh")->required();
   replay_verb->add_option("--ticks", ticks, "at most this many ticks of each log")->capture_default_str();
 
+  CLI::App* excite_verb = app.add_subcommand(
+      "excite",
+      "Plan trajectories that show the robot's parameters, within its limits: CSV to play, excite.json, plots.\n"
+      "Example: fxdyn excite robot.toml --out out/plan");
+  bool paper = false;
+  auto* excite_project = excite_verb->add_option("PROJECT", project, "project file (TOML); needs no log");
+  excite_verb->add_flag("--paper", paper, "no project: the trajectory of the paper's Table 1, as printed and corrected")
+      ->excludes(excite_project);
+  excite_verb->add_option("--out", out, "directory for the results")->required();
+
   CLI::App* simulate_verb = app.add_subcommand(
       "simulate", "Make logs from a scenario.\nExample: fxdyn simulate scenario.toml --out out/logs");
   simulate_verb->add_option("SCENARIO", scenario, "scenario file (TOML)")->required();
@@ -126,6 +137,10 @@ int run(int argc, char** argv) {
   }
   if (*effects_verb) {
     print_effects(as_json);
+  } else if (*excite_verb) {
+    if (!paper && project.empty()) throw InputError("excite: name a PROJECT, or --paper; see fxdyn excite --help");
+    Progress progress;
+    fmt::print("{}", paper ? excite_paper(out) : excite(read_project(project), out, progress));
   } else if (*simulate_verb) {
     for (const auto& file : simulate(scenario, out)) fmt::print("{}\n", file.string());
   } else if (*predict_verb) {

@@ -32,6 +32,21 @@ void project_onto_boundary_conditions(FourierJoint& joint) {
   joint.b -= constraints.transpose() * gram.ldlt().solve(constraints * joint.b);
 }
 
+FourierNullSpace boundary_null_space(int order) {
+  Eigen::MatrixXd on_a(order, 1), on_b(order, 2);
+  for (Eigen::Index i = 0; i < order; ++i) {
+    const auto k = static_cast<double>(i + 1);
+    on_a(i, 0) = 1;
+    on_b.row(i) << k, 1 / k;
+  }
+  // The last columns of Q are orthogonal to the constraints.
+  const auto complement = [order](const Eigen::MatrixXd& constraints) {
+    const Eigen::MatrixXd q = Eigen::HouseholderQR<Eigen::MatrixXd>(constraints).householderQ();
+    return Eigen::MatrixXd(q.rightCols(order - constraints.cols()));
+  };
+  return {complement(on_a), complement(on_b)};
+}
+
 FourierJoint random_fourier(std::uint64_t seed, int order, double period_s, const FourierBounds& bounds, double speed) {
   Random random(seed);
   FourierJoint joint{0, Eigen::VectorXd(order), Eigen::VectorXd(order)};

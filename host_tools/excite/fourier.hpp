@@ -24,6 +24,15 @@ FourierState evaluate(const FourierJoint& joint, double period_s, double t);
 /// The nearest coefficients (least squares) that meet sum a_k = 0, sum k b_k = 0, sum b_k / k = 0.
 void project_onto_boundary_conditions(FourierJoint& joint);
 
+/// All coefficients that meet the boundary conditions: a = null_a z_a, b = null_b z_b for any z. Orthonormal columns,
+/// so |z| = |(a, b)|. Order 2 leaves b = 0 (one shape of motion); from order 3 on b has order - 2 directions.
+struct FourierNullSpace {
+  Eigen::MatrixXd a;  ///< order x (order - 1)
+  Eigen::MatrixXd b;  ///< order x (order - 2)
+  Eigen::Index size() const { return a.cols() + b.cols(); }
+};
+FourierNullSpace boundary_null_space(int order);
+
 struct FourierBounds {
   double lower, upper, velocity, acceleration;
 };

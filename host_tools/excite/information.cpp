@@ -2,221 +2,121 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
+#include <limits>
 
-#include "host_tools/error.hpp"
 #include "host_tools/model/effects.hpp"
-#include "host_tools/parallel.hpp"
 
 namespace fxdyn {
-namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
-bool is_nominal(std::string_view effect) {
-  return std::find(nominal_effects.begin(), nominal_effects.end(), effect) != nominal_effects.end();
-}
-
-double largest_of(const std::vector<MatrixXd>& torque, std::size_t joint) {
-  double most = 0;
-  for (const MatrixXd& tau : torque) most = std::max(most, tau.col(static_cast<Index>(joint)).cwiseAbs().maxCoeff());
-  return most;
-}
-
-Log to_log(const Motion& motion) {
-  Log log;
-  log.file = motion.name;
-  log.step_s = motion.step_s;
-  log.t = motion.t;
-  log.from_s = motion.t[0];
-  log.to_s = motion.t[motion.t.size() - 1];
-  log.q = motion.q;
-  log.dq = motion.dq;
-  log.ddq = motion.ddq;
-  return log;
-}
-
-}  // namespace
-
-std::vector<Index> columns_from(Index first, Index count) {
-  std::vector<Index> indices;
-  for (Index i = 0; i < count; ++i) indices.push_back(first + i);
-  return indices;
-}
-
-void Information::add_blocks(const IdentifiedModel& nominal, const std::vector<Motion>& motions,
-                             const std::vector<RobotColumns>& columns) {
-  std::vector<MatrixXd> torque, structural;
-  for (const RobotColumns& c : columns) {
-    torque.push_back(c.torque());
-    structural.push_back(c.structural());
+ParameterColumns::ParameterColumns(const Robot& robot, const Eigen::VectorXd& sign_width)
+    : chain_(to_dh(robot)), base_(find_base(chain_)), sign_width_(sign_width) {
+  const auto n = static_cast<Eigen::Index>(robot.size());
+  for (const Eigen::Index column : base_.columns) {
+    names_.push_back(parameter_name(column));
+    joints_.push_back(column / static_cast<Eigen::Index>(parameters_per_link));
   }
-  const std::size_t n = nominal.robot.size();
-  Index at = base;
-  const auto add = [&](std::string_view effect, std::size_t joint, std::vector<double> shape) {
-    const EffectInfo& info = *find_effect(effect);
-    Block block{{std::string(effect), joint, std::move(shape)},
-                info.acts_on == ActsOn::body,
-                at,
-                static_cast<Index>(info.linear.size())};
-    block.raw.resize(n);
-    at += block.count;
-    blocks.push_back(std::move(block));
-  };
-  for (std::size_t j = 0; j < n; ++j) {
-    for (const char* effect : nominal_effects) add(effect, j, {});
-  }
-  nominal_blocks = blocks.size();
-  for (const EffectInfo& info : effect_infos()) {
-    if (is_nominal(info.name)) continue;
-    for (std::size_t j = 0; j < (info.acts_on == ActsOn::body ? 1 : n); ++j) {
-      for (const auto& shape : typical_shapes(info.name, j, nominal.robot, motions, torque, structural))
-        add(info.name, j, shape);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    std::vector<Eigen::Index> inertial;  // a joint carries the links from its own on
+    for (Eigen::Index k = 0; k < base_size(); ++k) {
+      if (joints_[static_cast<std::size_t>(k)] >= j) inertial.push_back(k);
     }
+    inertial_.push_back(inertial);
   }
-  gram = MatrixXd::Zero(at, at);
-}
-
-Information::Information(const IdentifiedModel& nominal, const std::vector<Motion>& motions,
-                         const VectorXd& white_noise, std::optional<double> torque_cutoff_hz, Progress& progress) {
-  std::vector<Log> logs;
-  for (const Motion& motion : motions) logs.push_back(to_log(motion));
-  SignalSettings signals;
-  signals.torque_cutoff_hz = torque_cutoff_hz;
-  filter = choose_filter(logs, signals);
-
-  std::vector<RobotColumns> columns;
-  for (const Motion& motion : motions) columns.emplace_back(nominal, motion);
-  const DhChain chain = to_dh(nominal.robot);
-  const BaseSet base_set = find_base(chain);
-  base = static_cast<Index>(base_set.columns.size());
-  add_blocks(nominal, motions, columns);
-
-  for (std::size_t m = 0; m < motions.size(); ++m)
-    add_motion(motions[m], logs[m], columns[m], white_noise, chain, base_set, progress);
-  progress.done();
-  for (Block& block : blocks) {
-    for (MatrixXd& raw : block.raw) raw /= seconds;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    std::vector<std::string> effects{"viscous", "coulomb", "offset"};
+    if (!rotor_inertia_is_absorbed(chain_, base_, j)) effects.push_back("rotor_inertia");
+    own_.push_back(inertial_[static_cast<std::size_t>(j)]);
+    for (const std::string& effect : effects) {
+      own_.back().push_back(size());
+      names_.push_back(fmt::format("{} {}", effect, j + 1));
+      joints_.push_back(j);
+    }
+    effects_.push_back(effects);
   }
 }
 
-void Information::add_motion(const Motion& motion, const Log& recorded, const RobotColumns& columns,
-                             const VectorXd& white_noise, const DhChain& chain, const BaseSet& base_set,
-                             Progress& progress) {
-  const auto n = static_cast<std::size_t>(motion.q.cols());
-  const ProcessedLog log = process(recorded, filter);
-  const Index samples = log.last - log.first;
-  const double nyquist = 0.5 / motion.step_s, cutoff = std::min(filter.torque_cutoff_hz, nyquist);
-  const double duration = static_cast<double>(samples) * motion.step_s;
-  seconds += duration;
-  independent_samples += 2 * cutoff * duration;
-  // White noise within the cut-off, and weights that count independent samples instead of rows.
-  noise = white_noise * std::sqrt(cutoff / nyquist);
-  const VectorXd weight = std::sqrt(2 * cutoff * duration / static_cast<double>(log.rows())) * noise.cwiseInverse();
-
-  progress.stage(fmt::format("what {} shows", motion.name), blocks.size() + n);
-  std::vector<std::vector<MatrixXd>> effect(blocks.size());  // [block][joint], filtered and decimated
-  parallel_for(blocks.size(), [&](std::size_t b) {
-    const EffectColumns full = columns(blocks[b].candidate);
-    effect[b].resize(n);
-    for (std::size_t j = 0; j < n; ++j) {
-      const MatrixXd& c = full.joints[j];
-      if (c.size() == 0) continue;
-      const auto inside = c.middleRows(log.first, samples);
-      const MatrixXd power = inside.transpose() * inside * motion.step_s;
-      blocks[b].raw[j] = blocks[b].raw[j].size() == 0 ? power : MatrixXd(blocks[b].raw[j] + power);
-      effect[b][j] = log.decimate(log.filter_columns(c));
-    }
-    progress.step();
-  });
-
-  std::vector<MatrixXd> rows(n, MatrixXd(motion.q.rows(), base));
-  Regressor regressor(chain);
-  for (Index k = 0; k < motion.q.rows(); ++k) {
-    const MatrixXd& y = regressor(motion.q.row(k), motion.dq.row(k), motion.ddq.row(k));
-    for (std::size_t j = 0; j < n; ++j) rows[j].row(k) = y(static_cast<Index>(j), base_set.columns);
-  }
-  std::vector<MatrixXd> grams(n);
-  std::vector<std::vector<Index>> places(n);  // in the whole
-  parallel_for(n, [&](std::size_t j) {
-    std::vector<std::size_t> here;
-    places[j] = columns_from(0, base);
-    for (std::size_t b = 0; b < blocks.size(); ++b) {
-      if (effect[b][j].size() == 0) continue;
-      here.push_back(b);
-      const auto own = columns_from(blocks[b].first, blocks[b].count);
-      places[j].insert(places[j].end(), own.begin(), own.end());
-    }
-    MatrixXd x(log.rows(), static_cast<Index>(places[j].size()));
-    x.leftCols(base) = log.decimate(log.filter_columns(rows[j]));
-    rows[j].resize(0, 0);
-    Index at = base;
-    for (const std::size_t b : here) {
-      x.middleCols(at, blocks[b].count) = effect[b][j];
-      at += blocks[b].count;
-    }
-    x *= weight[static_cast<Index>(j)];
-    grams[j] = MatrixXd::Zero(x.cols(), x.cols());
-    grams[j].selfadjointView<Eigen::Lower>().rankUpdate(x.transpose());
-    grams[j].triangularView<Eigen::StrictlyUpper>() = grams[j].transpose();
-    progress.step();
-  });
-  for (std::size_t j = 0; j < n; ++j) gram(places[j], places[j]) += grams[j];
-}
-
-std::vector<std::vector<double>> typical_shapes(std::string_view effect, std::size_t joint, const Robot& robot,
-                                                const std::vector<Motion>& motions, const std::vector<MatrixXd>& torque,
-                                                const std::vector<MatrixXd>& structural) {
-  const EffectInfo* info = find_effect(effect);
-  if (info == nullptr) throw InputError(fmt::format("unknown effect '{}': see `fxdyn effects`", effect));
-  if (info->shape.empty()) return {{}};
-  const bool turns = robot.joints[joint].type == JointType::revolute;
-  const auto col = static_cast<Index>(joint);
-  double speed = 0, longest = 0;
-  for (const Motion& motion : motions) {
-    speed = std::max(speed, motion.dq.col(col).cwiseAbs().maxCoeff());
-    longest = std::max(longest, motion.step_s * static_cast<double>(motion.q.rows()));
-  }
-  const auto values = [&](const ParameterInfo& shape) -> std::vector<double> {
-    const auto shares_of = [](double scale, std::vector<double> shares) {
-      for (double& share : shares) share *= scale;
-      return shares;
-    };
-    if (shape.name == "velocity") return shares_of(speed, {0.025, 0.01, 0.05});
-    if (shape.name == "distance") return turns ? std::vector{3e-3, 1e-3, 9e-3} : std::vector{1e-4, 3e-5, 3e-4};
-    if (shape.name == "wavenumber") return turns ? std::vector{20.0, 4.0, 100.0} : std::vector{600.0, 120.0, 3000.0};
-    if (shape.name == "time_constant") return shares_of(longest, {1, 0.3, 3});
-    if (shape.name == "limit") return shares_of(largest_of(torque, joint), {0.85, 0.7, 0.95});
-    if (shape.name == "time") {
-      std::vector<double> times{2e-3, 1e-3, 4e-3};
-      for (double& time : times) time = std::min(time, Delay::largest * motions.front().step_s);
-      return times;
-    }
-    if (shape.name == "relaxation") return {1e-3, 5e-3};
-    if (shape.name == "torque_scale") return shares_of(largest_of(structural, joint), {0.05, 0.02, 0.1});
-    if (shape.name == "joint") {
-      std::vector<double> others;
-      for (std::size_t k = joint; k-- > 0;) others.push_back(static_cast<double>(k + 1));
-      for (std::size_t k = joint + 1; k < robot.size(); ++k) others.push_back(static_cast<double>(k + 1));
-      return others;
-    }
-    throw InputError(fmt::format("effect '{}': no typical values of its {} are known", effect, shape.name));
-  };
-  std::vector<std::vector<double>> shapes{{}};
-  for (const ParameterInfo& shape : info->shape) {
-    std::vector<std::vector<double>> more;
-    for (const double value : values(shape)) {
-      for (std::vector<double> before : shapes) {
-        before.push_back(std::clamp(value, shape.lower, shape.upper));
-        more.push_back(std::move(before));
+Eigen::MatrixXd ParameterColumns::information(const Motion& motion, const Eigen::VectorXd& scale) const {
+  const Eigen::Index samples = motion.q.rows(), n = motion.q.cols();
+  std::vector<Eigen::MatrixXd> rows;  // of each joint: samples x its own columns
+  for (const auto& own : own_) rows.emplace_back(samples, static_cast<Eigen::Index>(own.size()));
+  Regressor regressor(chain_);
+  for (Eigen::Index k = 0; k < samples; ++k) {
+    const Eigen::MatrixXd& y =
+        regressor(motion.q.row(k).transpose(), motion.dq.row(k).transpose(), motion.ddq.row(k).transpose());
+    for (std::size_t j = 0; j < rows.size(); ++j) {
+      for (std::size_t c = 0; c < inertial_[j].size(); ++c) {
+        rows[j](k, static_cast<Eigen::Index>(c)) =
+            y(static_cast<Eigen::Index>(j), base_.columns[static_cast<std::size_t>(inertial_[j][c])]);
       }
     }
-    shapes = std::move(more);
   }
-  return shapes;
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(size(), size());
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const auto joint = static_cast<std::size_t>(j);
+    const JointSeries series{motion.q.col(j), motion.dq.col(j), motion.ddq.col(j), {}, motion.step_s};
+    auto column = static_cast<Eigen::Index>(inertial_[joint].size());
+    for (const std::string& effect : effects_[joint]) {
+      rows[joint].col(column++) = effect_columns(effect, {}, sign_width_[j], series).col(0);
+    }
+    const Eigen::Index own = rows[joint].cols();
+    Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(own, own);
+    gram.selfadjointView<Eigen::Lower>().rankUpdate(rows[joint].transpose(), motion.step_s / (scale[j] * scale[j]));
+    for (Eigen::Index a = 0; a < own; ++a) {
+      for (Eigen::Index b = 0; b < own; ++b) {
+        sum(own_[joint][static_cast<std::size_t>(a)], own_[joint][static_cast<std::size_t>(b)]) +=
+            gram(std::max(a, b), std::min(a, b));
+      }
+    }
+  }
+  return sum;
+}
+
+double scaled_condition(const Eigen::MatrixXd& information) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  const Eigen::VectorXd diagonal = information.diagonal();
+  if (!(diagonal.minCoeff() > 0)) return infinity;
+  const Eigen::VectorXd inverse = diagonal.cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(inverse.asDiagonal() * information * inverse.asDiagonal(),
+                                                             Eigen::EigenvaluesOnly);
+  const double least = eigen.eigenvalues()[0], most = eigen.eigenvalues()[diagonal.size() - 1];
+  return least > 1e-15 * most ? std::sqrt(most / least) : infinity;
+}
+
+double log_determinant(const Eigen::MatrixXd& information) {
+  const Eigen::LDLT<Eigen::MatrixXd> factors(information);
+  const Eigen::VectorXd d = factors.vectorD();
+  if (!(d.minCoeff() > 0)) return -std::numeric_limits<double>::infinity();
+  return d.array().log().sum();
+}
+
+std::vector<WeakParameter> weak_parameters(const Eigen::MatrixXd& information, const ParameterSizes& parameters,
+                                           const Eigen::VectorXd& movement, double above) {
+  const Eigen::Index p = information.rows();
+  const auto& size = parameters.size;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(size.asDiagonal() * information * size.asDiagonal());
+  const Eigen::VectorXd& values = eigen.eigenvalues();
+  const double told = 1 / (unidentifiable_error * unidentifiable_error);
+  const double rounding = 1e-14 * std::max(values[p - 1], 0.0);
+  std::vector<WeakParameter> weak;
+  for (Eigen::Index i = 0; i < p; ++i) {
+    double variance = 0, lost = 0;
+    for (Eigen::Index k = 0; k < p; ++k) {
+      const double part = eigen.eigenvectors()(i, k) * eigen.eigenvectors()(i, k);
+      if (values[k] > rounding) {
+        variance += part / values[k];
+      } else if (part > 1e-9) {
+        variance = std::numeric_limits<double>::infinity();
+      }
+      if (values[k] <= rounding || values[k] < told) lost += part;
+    }
+    const auto index = static_cast<std::size_t>(i);
+    WeakParameter parameter{parameters.names[index], std::sqrt(variance), lost < 0.1, parameters.joints[index]};
+    if (parameter.identifiable && parameter.error < above) continue;
+    if (parameters.of_link[index]) movement.head(parameter.joint + 1).minCoeff(&parameter.joint);
+    weak.push_back(parameter);
+  }
+  return weak;
 }
 
 }  // namespace fxdyn

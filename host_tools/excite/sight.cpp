@@ -8,7 +8,7 @@
 #include <set>
 
 #include "host_tools/error.hpp"
-#include "host_tools/excite/information.hpp"
+#include "host_tools/excite/effect_information.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/parallel.hpp"
 

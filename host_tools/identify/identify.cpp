@@ -149,6 +149,9 @@ void find_torque_lead(Fitter& fitter, double cutoff_hz) {
 }  // namespace
 
 GateData read_gate_data(const Project& project, const std::filesystem::path& directory) {
+  if (!project.has_role(Role::train)) {
+    throw InputError(project.file.string() + ": no log to learn from; add a [[log]] with role = \"train\"");
+  }
   std::vector<Log> logs;
   for (const Role role : {Role::train, Role::validate}) {
     for (Log& log : read_logs(project, role, directory)) logs.push_back(std::move(log));

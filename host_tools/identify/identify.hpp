@@ -17,6 +17,7 @@ struct GateData {
   Eigen::VectorXd largest_torque;             ///< raw, over the train and validate logs [N*m | N]
   Eigen::VectorXd q_lower, q_upper, dq, ddq;  ///< largest of the filtered motion
 };
+/// @throws InputError where the project names no train log.
 GateData read_gate_data(const Project& project, const std::filesystem::path& directory);
 
 /// Limits and ratings of each joint: the project's, else 1.2 times the largest in the logs; URDF limits where the logs

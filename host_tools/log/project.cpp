@@ -134,11 +134,22 @@ class ProjectReader {
     set(project_.limits.velocity, table.find("velocity"), per);
     set(project_.limits.acceleration, table.find("acceleration"), per);
     set(project_.limits.torque, table.find("torque"), per);
-    if (const auto box = table.find("box")) {
-      box->expect(box->items().size(), 2, "two corners");
-      for (const Value& corner : box->items()) corner.numbers(3, "x, y, z");
-    }
+    if (const auto box = table.find("box")) read_box(*box);
     table.finish();
+  }
+
+  void read_box(const Value& value) {
+    const std::vector<Value> items = value.items();
+    value.expect(items.size(), 2, "two corners");
+    std::array<Eigen::Vector3d, 2> corners;
+    for (std::size_t i = 0; i < 2; ++i) {
+      const std::vector<double> corner = items[i].numbers(3, "x, y, z");
+      corners[i] = {corner[0], corner[1], corner[2]};
+    }
+    if (!(corners[0].array() < corners[1].array()).all()) {
+      value.place().fail("each coordinate of the first corner must be below that of the second");
+    }
+    project_.limits.box = corners;
   }
 
   LogFormat read_format(Table& table, LogFormat format) {
@@ -223,12 +234,35 @@ class ProjectReader {
     table.finish();
   }
 
-  static void read_excite(Table& table) {
-    if (const auto value = table.find("period_s")) value->positive();
-    for (const char* key : {"order", "trajectories"}) {
-      if (const auto value = table.find(key)) value->count(1);
+  void read_excite(Table& table) {
+    ExciteSettings& excite = project_.excite;
+    set(excite.period_s, table.find("period_s"), as_positive);
+    set(excite.order, table.find("order"), between(2, 50));
+    set(excite.trajectories, table.find("trajectories"), between(1, 100));
+    if (const auto noise = table.find("noise")) {
+      excite.noise =
+          noise->is_list() ? noise->numbers(joints(), per_joint()) : std::vector<double>(joints(), noise->number());
+      for (const double value : excite.noise) {
+        if (value < 0) noise->place().fail("expected 0 or more");
+      }
     }
-    table.find("noise");  // a number or one a joint
+    set(excite.seed, table.find("seed"), [](const Value& v) { return static_cast<std::uint64_t>(v.integer(0)); });
+    set(excite.starts, table.find("starts"), between(1, 1000));
+    if (const auto margin = table.find("margin")) {
+      excite.margin = margin->number();
+      if (excite.margin < 0 || excite.margin > 0.5) margin->place().fail("expected 0 .. 0.5, a share of each limit");
+    }
+    set(excite.step_s, table.find("step_s"), as_positive);
+    // every harmonic's period has at least ten samples
+    if (excite.step_s * 10 * excite.order > excite.period_s) {
+      table.place().fail(fmt::format("step_s of {} s is above period_s / (10 x order) = {:.3g} s", excite.step_s,
+                                     excite.period_s / (10 * excite.order)));
+    }
+    const double samples = excite.period_s / excite.step_s;
+    if (std::fabs(samples - std::round(samples)) > 1e-6 * samples) {
+      table.place().fail(
+          fmt::format("period_s of {} s is no multiple of step_s, {} s", excite.period_s, excite.step_s));
+    }
     table.finish();
   }
 
@@ -288,9 +322,6 @@ class ProjectReader {
   }
 
   void check_logs() const {
-    if (!project_.has_role(Role::train)) {
-      throw InputError(file_ + ": no log to learn from; add a [[log]] with role = \"train\"");
-    }
     const auto source = [](const LogEntry& e) {
       return e.scenario ? e.scenario->string() + "/" + e.scenario_log : fs::weakly_canonical(e.file).string();
     };

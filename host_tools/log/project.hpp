@@ -56,6 +56,19 @@ struct TargetSettings {
 struct LimitSettings {
   std::vector<std::array<double, 2>> position;
   std::vector<double> velocity, acceleration, torque;
+  std::optional<std::array<Eigen::Vector3d, 2>> box;  ///< lowest and highest corner, base frame [m]
+};
+
+/// How `fxdyn excite` plans its trajectories, see docs/guide/excite.md.
+struct ExciteSettings {
+  double period_s = 10;
+  int order = 5;              ///< harmonics of each series, at least 2
+  int trajectories = 4;       ///< fast, slow, reversals, static, and again fast, slow, ..
+  std::vector<double> noise;  ///< standard deviation of the torque, one a joint [N*m | N]; empty: not known
+  std::uint64_t seed = 1;
+  double step_s = 0.002;  ///< sampling interval of what is written
+  int starts = 3;         ///< of the optimiser, for each trajectory
+  double margin = 0.05;   ///< share of every limit that is left unused
 };
 
 /// A project file (TOML), see docs/guide/project.md. All paths are relative to it.
@@ -69,12 +82,13 @@ struct Project {
   SignalSettings signals;
   IdentifySettings identify;
   TrainSettings train;
+  ExciteSettings excite;
   TargetSettings target;
   bool has_role(Role role) const;
 };
 
 /// @throws InputError with file and line: not TOML, an unknown key (names the nearest known one), a wrong type, a
-/// vector whose length is not the number of joints, no train log, an unknown role, board, effect or method, overlapping
+/// vector whose length is not the number of joints, an unknown role, board, effect or method, overlapping
 /// windows of the same file whatever their roles, a missing file.
 Project read_project(const std::filesystem::path& file);
 

@@ -61,6 +61,7 @@ MatrixXd RobotColumns::phi(const EffectCandidate& candidate) const {
   series.total = torque_.col(j);
   if (info.needs_peers) {
     series.peers_dq = motion_->dq;
+    series.peers_ddq = motion_->ddq;
     series.peers_sign = motion_->dq;
     for (Index i = 0; i < series.peers_sign.cols(); ++i) {
       const double width = model_.joints[static_cast<std::size_t>(i)].sign_width;

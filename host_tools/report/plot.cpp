@@ -140,6 +140,9 @@ unset output
                      round_up((plot.measured - plot.predicted).cwiseAbs().maxCoeff()));
 }
 
+/// Colours of curves that share a panel; more curves than these take them again.
+constexpr std::array colours{"#222222", "#e4572e", "#2e6fb7", "#3a9d5d", "#b07aa1", "#c9a227", "#17a2b8", "#8c564b"};
+
 /// Cuts everything from `from` to the end of the next `to`, wherever it occurs.
 void cut(std::string& text, std::string_view from, std::string_view to) {
   for (std::size_t start = text.find(from); start != std::string::npos; start = text.find(from, start)) {
@@ -183,6 +186,36 @@ std::vector<std::string> draw(const std::vector<TorquePlot>& plots) {
     pictures.push_back(element(read_file(directory.path() / fmt::format("{}.svg", i))));
   }
   return pictures;
+}
+
+std::string draw(const std::vector<Panel>& panels, const std::vector<std::string>& names) {
+  constexpr int panel_height = 260;
+  constexpr Eigen::Index panel_points = 500;
+  const TemporaryDirectory directory;
+  std::string script = settings;
+  script += fmt::format(
+      "set terminal svg size 1000,{} dynamic noenhanced font 'sans-serif,13' background '#ffffff'\nset tmargin 2\nset "
+      "output '0.svg'\nset multiplot layout {},1\n",
+      panel_height * panels.size(), panels.size());
+  for (std::size_t p = 0; p < panels.size(); ++p) {
+    const Panel& panel = panels[p];
+    std::string data, lines;
+    for (Eigen::Index c = 0; c < panel.columns.cols(); ++c) {
+      const auto i = static_cast<std::size_t>(c);
+      std::string name = names[i];
+      std::replace(name.begin(), name.end(), '\'', ' ');  // it stands in quotes
+      data += curve(panel.t, panel.columns.col(c), panel_points);
+      lines += fmt::format("{}'{}.dat' index {} with lines lw 1.4 lc rgb '{}' title '{}'", c > 0 ? ", " : "", p, c,
+                           colours[i % colours.size()], name);
+    }
+    write_file(directory.path() / fmt::format("{}.dat", p), data);
+    script += fmt::format("set xrange [{:.6g}:{:.6g}]\nset ylabel '{}'\nset xlabel '{}'\nplot {}\n", panel.t[0],
+                          panel.t[panel.t.size() - 1], panel.label, p + 1 == panels.size() ? "time [s]" : "", lines);
+    script += "unset key\n";  // one is enough
+  }
+  write_file(directory.path() / "script.gp", script + "unset multiplot\nunset output\n");
+  run_gnuplot(directory.path());
+  return element(read_file(directory.path() / "0.svg"));
 }
 
 }  // namespace fxdyn

@@ -17,4 +17,15 @@ struct TorquePlot {
 /// @throws InputError where gnuplot is missing or fails.
 std::vector<std::string> draw(const std::vector<TorquePlot>& plots);
 
+/// Curves over time, one colour each, as a panel of a picture.
+struct Panel {
+  std::string label;        ///< with unit, as in "q [rad]"
+  Eigen::VectorXd t;        ///< [s]
+  Eigen::MatrixXd columns;  ///< samples x curves
+};
+
+/// Panels one above the other over the same time, as an <svg> element; `names` of the curves are the key.
+/// @throws InputError where gnuplot is missing or fails.
+std::string draw(const std::vector<Panel>& panels, const std::vector<std::string>& names);
+
 }  // namespace fxdyn

@@ -137,6 +137,27 @@ DhChain to_dh(const Robot& robot) {
   return chain;
 }
 
+Eigen::Matrix3Xd link_origins(const Robot& robot, const Eigen::VectorXd& q) {
+  Eigen::Index points = 0;
+  for (const Joint& joint : robot.joints) points += 1 + static_cast<Eigen::Index>(joint.fixed_frames.size());
+  Eigen::Matrix3Xd origins(3, points);
+  Isometry3d pose = Isometry3d::Identity();
+  Eigen::Index next = 0;
+  for (std::size_t i = 0; i < robot.size(); ++i) {
+    const Joint& joint = robot.joints[i];
+    const double position = q[static_cast<Eigen::Index>(i)];
+    pose = pose * joint.origin;
+    if (joint.type == JointType::revolute) {
+      pose.rotate(Eigen::AngleAxisd(position, joint.axis));
+    } else {
+      pose.translate(position * joint.axis);
+    }
+    origins.col(next++) = pose.translation();
+    for (const Vector3d& frame : joint.fixed_frames) origins.col(next++) = pose * frame;
+  }
+  return origins;
+}
+
 LinkInertia<Real> to_link_inertia(const Inertial& inertial, const Isometry3d& pose) {
   const Vector3d centre = pose * inertial.centre;
   const Matrix3d second = 0.5 * inertial.tensor.trace() * Matrix3d::Identity() - inertial.tensor;

@@ -35,6 +35,8 @@ struct Joint {
   Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< unit vector in the child frame
   std::optional<Limits> limits;
   std::optional<Inertial> inertial;
+  /// Origins of the frames fixed to the child link (flange, tool), in its frame [m].
+  std::vector<Eigen::Vector3d> fixed_frames{};
 
   /// SI unit of position, velocity, torque ...: "rad" or "m".
   const char* position_unit() const { return type == JointType::revolute ? "rad" : "m"; }
@@ -54,6 +56,10 @@ struct Robot {
 /// @throws InputError with file and, where known, line or joint: not readable, malformed XML, a branch, another joint
 /// type, a zero axis, no moving joint, an inertia that is not positive.
 Robot read_urdf(const std::filesystem::path& file);
+
+/// Forward kinematics: origins of all links' URDF frames in the base frame [m], 3 x points: joint by joint the child
+/// link's, then those fixed to it (so the flange is the last). q: one a joint [rad | m].
+Eigen::Matrix3Xd link_origins(const Robot& robot, const Eigen::VectorXd& q);
 
 /// The same chain in the frames of model/rigid_body.hpp (modified DH), see there.
 struct DhChain {

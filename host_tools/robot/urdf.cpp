@@ -204,7 +204,7 @@ class Reader {
     if (source.limits) {
       joint.limits = Limits{source.limits->lower, source.limits->upper, source.limits->velocity, source.limits->effort};
     }
-    add_bodies(joint.inertial, *child(source), Eigen::Isometry3d::Identity());
+    add_bodies(joint, *child(source), Eigen::Isometry3d::Identity());
     if (joint.inertial && joint.inertial->mass == 0) joint.inertial.reset();  // only dummy bodies
     robot_.joints.push_back(joint);
   }
@@ -219,8 +219,8 @@ class Reader {
     return Eigen::Vector3d((unit.array().abs() < rounding).select(0.0, unit)).normalized();
   }
 
-  /// The bodies of a link and of all that is fixed to it.
-  void add_bodies(std::optional<Inertial>& sum, const urdf::Link& link, const Eigen::Isometry3d& pose) const {
+  /// The bodies and frames of a link and of all that is fixed to it.
+  void add_bodies(Joint& joint, const urdf::Link& link, const Eigen::Isometry3d& pose) const {
     if (link.inertial) {
       const urdf::Inertial& body = *link.inertial;
       const Eigen::Isometry3d frame = to_pose(body.origin, false);
@@ -228,12 +228,13 @@ class Reader {
       inertial.mass = body.mass;
       inertial.tensor << body.ixx, body.ixy, body.ixz, body.ixy, body.iyy, body.iyz, body.ixz, body.iyz, body.izz;
       check(inertial, link.name);
-      add(sum, inertial, pose * frame);
+      add(joint.inertial, inertial, pose * frame);
     }
-    for (const auto& joint : link.child_joints) {
-      if (!moves(*joint)) {
-        add_bodies(sum, *child(*joint), pose * to_pose(joint->parent_to_joint_origin_transform, true));
-      }
+    for (const auto& next : link.child_joints) {
+      if (moves(*next)) continue;
+      const Eigen::Isometry3d frame = pose * to_pose(next->parent_to_joint_origin_transform, true);
+      joint.fixed_frames.push_back(frame.translation());
+      add_bodies(joint, *child(*next), frame);
     }
   }
 

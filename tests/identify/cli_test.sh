@@ -110,5 +110,12 @@ expect 2 "prediction" predict --model "$work/good/model.json" --log "$work/apart
 expect 2 "holds a model" predict --model "$work/good/model.json" --log "$work/good.csv" --out "$work/good"
 expect 2 "fxdyn export" replay "$work/good.toml" --image "$work/none.elf" --out "$work/fresh"
 
+# a project without logs is good for planning only
+project plan.toml '[limits]' 'velocity = [1, 1]'
+expect 2 "no log to learn from" identify "$work/plan.toml" --out "$work/out"
+expect 2 "name a PROJECT" excite --out "$work/out"
+sed 's/velocity.*/torque = [1, 1]/' "$work/plan.toml" >"$work/fast.toml"
+expect 2 "joint 'first': no velocity limit" excite "$work/fast.toml" --out "$work/out"
+
 [ $failures -eq 0 ] && echo "all refused as they should be"
 exit $failures

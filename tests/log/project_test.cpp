@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "host_tools/identify/identify.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "tests/support/files.hpp"
 
@@ -53,8 +54,11 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"rated_sign", robot + "rated_torque = [1.0, -1.0]\n" + log, {":3:", "above 0"}},
         Bad{"limits", robot + "[limits]\nposition = [[1, -1], [0, 1]]\n" + log, {":4:", "lower limit"}},
         Bad{"limits_count", robot + "[limits]\nvelocity = [1, 2, 3]\n" + log, {":4:", "has 3 values, expected 2"}},
-        Bad{"no_logs", robot, {"role = \"train\""}},
-        Bad{"only_test", robot + "[[log]]\nfile = \"a.csv\"\nrole = \"test\"\n", {"role = \"train\""}},
+        Bad{"box", robot + "[limits]\nbox = [[0, 0, 1], [1, 1, 0]]\n", {":4:", "first corner must be below"}},
+        Bad{"noise", robot + "[excite]\nnoise = [1.0]\n", {":4:", "has 1 values, expected 2"}},
+        Bad{"order", robot + "[excite]\norder = 1\n", {":4:", "at least 2"}},
+        Bad{"step", robot + "[excite]\nstep_s = 1.0\n", {":3:", "period_s / (10 x order)"}},
+        Bad{"period", robot + "[excite]\nperiod_s = 9.9995\n", {":3:", "no multiple of step_s"}},
         Bad{"no_role", robot + "[[log]]\nfile = \"a.csv\"\n", {":3:", "'role' is missing"}},
         Bad{"role",
             robot + "[[log]]\nfile = \"a.csv\"\nrole = \"trian\"\n",
@@ -154,6 +158,11 @@ joints = "all"
   EXPECT_EQ(project.robot.gravity.z(), -9.81);
   EXPECT_EQ(project.rated_torque, std::vector({250.0, 30.5}));
   EXPECT_EQ(project.limits.position[1][0], -1);
+  EXPECT_EQ((*project.limits.box)[1].z(), 2);
+  EXPECT_EQ(project.excite.period_s, 10);
+  EXPECT_EQ(project.excite.order, 5);
+  EXPECT_EQ(project.excite.trajectories, 3);
+  EXPECT_EQ(project.excite.noise, std::vector({0.0, 0.0}));
   ASSERT_EQ(project.logs.size(), 3U);
   EXPECT_TRUE(project.logs[0].file.is_absolute());
   EXPECT_EQ(project.logs[0].line, 12);
@@ -174,6 +183,15 @@ joints = "all"
   EXPECT_EQ(project.train.seed, 7U);
   EXPECT_EQ(*project.train.ridge, 1e-3);
   EXPECT_EQ(project.target.board, "stm32g474");
+}
+
+TEST(Project, NeedsNoLogUntilThereIsSomethingToLearn) {
+  for (const std::string& logs : {std::string(), std::string("[[log]]\nfile = \"a.csv\"\nrole = \"test\"\n")}) {
+    const auto file = write_project("no_train_log", robot + logs);
+    const Project project = read_project(file);
+    test::expect_refused(file, {"no log to learn from", "role = \"train\""},
+                         [&] { read_gate_data(project, testing::TempDir()); });
+  }
 }
 
 TEST(Project, ReadsTheLogsOfARole) {

@@ -156,5 +156,41 @@ TEST(Urdf, RoundedRightAnglesAreRightAngles) {
   EXPECT_EQ(chain.links[1].p.x, 1);
 }
 
+TEST(ForwardKinematics, OriginsFollowFromTheDefinitionOfAJoint) {
+  test::Chains chains(11);
+  for (int trial = 0; trial < 50; ++trial) {
+    Robot robot = chains.robot(6);
+    robot.joints[2].fixed_frames = {chains.vector(0.3), chains.vector(0.3)};
+    const Eigen::VectorXd q = chains.joints(6, 3);
+    const auto poses = test::poses(robot, q);
+    const Eigen::Matrix3Xd origins = link_origins(robot, q);
+    ASSERT_EQ(origins.cols(), 8);
+    for (std::size_t i = 0; i < 6; ++i) {
+      const auto column = static_cast<Eigen::Index>(i < 3 ? i : i + 2);
+      EXPECT_LT((origins.col(column) - poses[i].translation()).norm(), 1e-12);
+    }
+    for (std::size_t k = 0; k < 2; ++k) {
+      const Eigen::Vector3d expected = poses[2] * robot.joints[2].fixed_frames[k];
+      EXPECT_LT((origins.col(static_cast<Eigen::Index>(3 + k)) - expected).norm(), 1e-12);
+    }
+  }
+}
+
+TEST(ForwardKinematics, TheFlangeIsTheLastOrigin) {
+  const auto file = write(
+      "<robot name=\"r\"><link name=\"base\"/><link name=\"arm\"/><link name=\"flange\"/><link name=\"tool\"/>"
+      "<joint name=\"j\" type=\"revolute\"><parent link=\"base\"/><child link=\"arm\"/><origin xyz=\"0 0 1\"/>"
+      "<axis xyz=\"0 0 1\"/><limit lower=\"-1\" upper=\"1\" velocity=\"1\" effort=\"1\"/></joint>"
+      "<joint name=\"f\" type=\"fixed\"><parent link=\"arm\"/><child link=\"flange\"/><origin xyz=\"1 0 0\"/></joint>"
+      "<joint name=\"t\" type=\"fixed\"><parent link=\"flange\"/><child link=\"tool\"/><origin xyz=\"0.5 0 "
+      "0.2\"/></joint>"
+      "</robot>");
+  const Eigen::Matrix3Xd origins = link_origins(read_urdf(file), Eigen::VectorXd::Constant(1, std::numbers::pi / 2));
+  ASSERT_EQ(origins.cols(), 3);
+  EXPECT_LT((origins.col(0) - Eigen::Vector3d(0, 0, 1)).norm(), 1e-12);
+  EXPECT_LT((origins.col(1) - Eigen::Vector3d(0, 1, 1)).norm(), 1e-12);
+  EXPECT_LT((origins.col(2) - Eigen::Vector3d(0, 1.5, 1.2)).norm(), 1e-12);
+}
+
 }  // namespace
 }  // namespace fxdyn
