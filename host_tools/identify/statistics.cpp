@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "host_tools/identify/fitter.hpp"
 #include "host_tools/identify/solver.hpp"
@@ -150,67 +151,123 @@ void Fitter::polish() {
   }
 }
 
+namespace {
+
+/// One joint's part of the sandwich: rows of one stretch of consecutive samples.
+struct Stretch {
+  MatrixXd x;  ///< all unknowns that act on the joint; rows that are not used are zero
+  VectorXd e;  ///< weighted residual
+};
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+/// Sum over k of a_k . b_(k + lag): of consecutive rows, so one dot product.
+double lagged(const RowMajor& a, const RowMajor& b, Index lag) {
+  const Index count = (a.rows() - lag) * a.cols();
+  if (count <= 0) return 0;
+  return Eigen::Map<const VectorXd>(a.data(), count).dot(Eigen::Map<const VectorXd>(b.row(lag).data(), count));
+}
+
+/// Autocorrelation of one joint's noise over a few periods of the filter's cut-off, and the middle of the sandwich.
+class NoiseOfJoint {
+ public:
+  NoiseOfJoint(std::vector<Stretch> stretches, double weight, double rows, Index lags)
+      : stretches_(std::move(stretches)), weight_(weight), rows_(std::max(rows, 1.0)), residual_(VectorXd::Zero(lags)) {
+    for (const Stretch& s : stretches_) {
+      for (Index lag = 0; lag < std::min(lags, s.e.size()); ++lag)
+        residual_[lag] += s.e.head(s.e.size() - lag).dot(s.e.tail(s.e.size() - lag)) / rows_;
+    }
+    noise_ = residual_;
+  }
+  /// The fit has taken some of the noise, most at the low frequencies where its columns live:
+  ///   E e e^T = (1 - H) R (1 - H)^T,  H = X A^-1 X^T W,
+  /// so R = autocorrelation of e + H R + R H^T - X Cov X^T, solved by iteration.
+  void correct(const MatrixXd& inverse, const MatrixXd& covariance) {
+    VectorXd taken = VectorXd::Zero(noise_.size());
+    for (const Stretch& s : stretches_) {
+      const RowMajor x = s.x, fit = s.x * inverse, spread = s.x * covariance;
+      const RowMajor around = weight_ * correlated(s.x, tapered());
+      for (Index lag = 0; lag < std::min(taken.size(), x.rows()); ++lag)
+        taken[lag] += (lagged(fit, around, lag) + lagged(around, fit, lag) - lagged(spread, x, lag)) / rows_;
+    }
+    noise_ = residual_ + taken;
+  }
+  MatrixXd middle() const {
+    MatrixXd out = MatrixXd::Zero(stretches_[0].x.cols(), stretches_[0].x.cols());
+    for (const Stretch& s : stretches_) out += s.x.transpose() * correlated(s.x, tapered());
+    return weight_ * weight_ * out;
+  }
+
+ private:
+  /// Flat to half of the lags, then down to zero.
+  VectorXd tapered() const {
+    VectorXd out = noise_;
+    const auto lags = static_cast<double>(out.size());
+    for (Index lag = 0; lag < out.size(); ++lag) out[lag] *= std::min(1.0, 2 * (1 - static_cast<double>(lag) / lags));
+    return out;
+  }
+  std::vector<Stretch> stretches_;
+  double weight_, rows_;
+  VectorXd residual_, noise_;  ///< autocorrelation at lags 0, 1, ..
+};
+
+}  // namespace
+
 void Fitter::add_standard_deviations(Solution& solution) const {
   std::vector<MatrixXd> shapes;
   const NormalEquations all = with_shapes(solution, shapes);
   const NormalEquations linear = normal_equations();
   const Index p = all.offset.back();
-  std::vector<MatrixXd> parts(joints());
+  // The filter correlates noise over a few periods of its cut-off.
+  const ProcessedLog& log = logs().front();
+  const double rate = 1 / (log.step_s * static_cast<double>(log.decimation));
+  const auto lags = static_cast<Index>(std::ceil(4 * rate / log.filter.torque_cutoff_hz)) + 1;
+
+  std::vector<std::optional<NoiseOfJoint>> noise(joints());
+  std::vector<std::vector<Index>> columns(joints());  // of each joint, among all unknowns
+  std::vector<MatrixXd> middles(joints());
+  double train_rows = 0;
+  for (std::size_t l = 0; l < logs().size(); ++l)
+    train_rows += logs()[l].role == Role::train ? static_cast<double>(logs()[l].rows()) : 0;
   parallel_for(joints(), [&](std::size_t j) {
     const Index first = data_->first_base[j], nb = solution.beta.size(), own = own_rows_[j].cols();
+    for (Index c = first; c < nb; ++c) columns[j].push_back(c);
+    for (Index c = 0; c < own; ++c) columns[j].push_back(linear.offset[j] + c);
+    for (Index c = 0; c < shapes[j].cols(); ++c) columns[j].push_back(all.offset[j] + c);
     const VectorXd e = residual(j, solution);
-    // Stretches of consecutive rows: the train logs.
-    struct Stretch {
-      Index from, count;
-      double rate;
-    };
     std::vector<Stretch> stretches;
-    for (std::size_t l = 0; l < logs().size(); ++l) {
-      const ProcessedLog& log = logs()[l];
-      if (log.role == Role::train)
-        stretches.push_back({data_->first_row[l], log.rows(), 1 / (log.step_s * static_cast<double>(log.decimation))});
-    }
-    // The filter correlates noise over a few periods of its cut-off.
-    const ProcessedLog& log = logs().front();
-    const auto lags = static_cast<Index>(std::ceil(4 * stretches.front().rate / log.filter.torque_cutoff_hz)) + 1;
-    VectorXd autocorrelation = VectorXd::Zero(lags);
     double rows = 0;
-    for (const Stretch& s : stretches) {
-      const VectorXd we = row_weights_[j].segment(s.from, s.count).cwiseProduct(e.segment(s.from, s.count));
-      for (Index lag = 0; lag < std::min(lags, s.count); ++lag)
-        autocorrelation[lag] += we.head(s.count - lag).dot(we.tail(s.count - lag));
-      rows += data_->usable[j].segment(s.from, s.count).sum();
-    }
-    autocorrelation /= std::max(rows, 1.0);
-    // flat to half of the lags, then down to zero
-    for (Index lag = 0; lag < lags; ++lag)
-      autocorrelation[lag] *= std::min(1.0, 2.0 * static_cast<double>(lags - lag) / static_cast<double>(lags));
-    // Independent rows, and what the fit takes of them.
-    const double spread = autocorrelation[0] > 0 ? 2 * autocorrelation.sum() / autocorrelation[0] - 1 : 1;
-    const double independent = rows / std::max(1.0, spread);
-    const double taken = static_cast<double>(p) / static_cast<double>(joints());
-    if (independent > 2 * taken) autocorrelation *= independent / (independent - taken);
-
-    MatrixXd part = MatrixXd::Zero(p, p);
-    std::vector<Index> columns;
-    for (Index c = first; c < nb; ++c) columns.push_back(c);
-    for (Index c = 0; c < own; ++c) columns.push_back(linear.offset[j] + c);
-    for (Index c = 0; c < shapes[j].cols(); ++c) columns.push_back(all.offset[j] + c);
-    for (const Stretch& s : stretches) {
-      MatrixXd x(s.count, static_cast<Index>(columns.size()));
-      x << data_->base_rows[j].middleRows(s.from, s.count), own_rows_[j].middleRows(s.from, s.count),
-          shapes[j].middleRows(s.from, s.count);
+    for (std::size_t l = 0; l < logs().size(); ++l) {
+      if (logs()[l].role != Role::train) continue;
+      const Index from = data_->first_row[l], count = logs()[l].rows();
+      const auto usable = data_->usable[j].segment(from, count);
+      Stretch s{MatrixXd(count, static_cast<Index>(columns[j].size())),
+                row_weights_[j].segment(from, count).cwiseProduct(e.segment(from, count))};
+      s.x << data_->base_rows[j].middleRows(from, count), own_rows_[j].middleRows(from, count),
+          shapes[j].middleRows(from, count);
       // rows that are not used have no noise; Huber's weights are in the residual already
-      x = data_->usable[j].segment(s.from, s.count).asDiagonal() * x;
-      part(columns, columns) += x.transpose() * correlated(x, autocorrelation);
+      s.x = usable.asDiagonal() * s.x;
+      rows += usable.sum();
+      stretches.push_back(std::move(s));
     }
-    const double w = weights_[static_cast<Index>(j)];
-    parts[j] = w * w * part;
+    noise[j].emplace(std::move(stretches), weights_[static_cast<Index>(j)], rows, lags);
+    middles[j] = noise[j]->middle();
   });
-  MatrixXd middle = MatrixXd::Zero(p, p);
-  for (const MatrixXd& part : parts) middle += part;
   const MatrixXd inverse = SymmetricSolver(all.information).inverse();
-  const MatrixXd covariance = inverse * middle * inverse;
+  const auto sandwich = [&] {
+    MatrixXd middle = MatrixXd::Zero(p, p);
+    for (std::size_t j = 0; j < joints(); ++j) middle(columns[j], columns[j]) += middles[j];
+    return MatrixXd(inverse * middle * inverse);
+  };
+  MatrixXd covariance = sandwich();
+  // What the fit takes does not show where there are a few hundred rows a parameter.
+  for (int round = 0; round < 2 && train_rows < 1000 * static_cast<double>(p); ++round) {
+    parallel_for(joints(), [&](std::size_t j) {
+      noise[j]->correct(inverse(columns[j], columns[j]), covariance(columns[j], columns[j]));
+      middles[j] = noise[j]->middle();
+    });
+    covariance = sandwich();
+  }
   const VectorXd std = covariance.diagonal().cwiseMax(0).cwiseSqrt();
   solution.covariance = covariance.topLeftCorner(linear.offset.back(), linear.offset.back());
   solution.beta_std = std.head(solution.beta.size());
@@ -274,7 +331,6 @@ Fitter::Recursion Fitter::recursive(double forgetting, Index points) const {
   // [R | z]: R x = z, R upper triangular; each row is rotated in (Givens). Columns scaled to like sizes.
   VectorXd scale = shape.information.diagonal().cwiseSqrt();
   for (double& s : scale) s = s > 0 ? 1 / s : 0;
-  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   RowMajor r = RowMajor::Zero(p, p + 1);
   const auto estimate = [&] {
     // directions not seen yet stay zero

@@ -1,3 +1,4 @@
+#include "host_tools/identify/solver.hpp"
 #include "host_tools/identify/physical.hpp"
 
 #include <gtest/gtest.h>
@@ -58,7 +59,7 @@ struct Experiment {
 
   PhysicalProblem problem() const {
     const Index m = theta.size();
-    const VectorXd rest = tau - x * least_squares(x.transpose() * x, x.transpose() * tau);
+    const VectorXd rest = tau - x * SymmetricSolver(x.transpose() * x).solve(x.transpose() * tau);
     // what a fitter's weights allow at most: residuals of 1e-9 of the signal
     const double variance = std::max(rest.squaredNorm(), 1e-18 * tau.squaredNorm()) / static_cast<double>(tau.size());
     return {
@@ -71,7 +72,7 @@ struct Experiment {
     return (tau - x * z).norm() / std::sqrt(static_cast<double>(tau.size()));
   }
   VectorXd least_squares_beta() const {
-    return least_squares(x.transpose() * x, x.transpose() * tau).head(beta.size());
+    return SymmetricSolver(x.transpose() * x).solve(x.transpose() * tau).head(beta.size());
   }
 };
 
@@ -232,7 +233,7 @@ TEST(Physical, CoefficientsKeepTheirBounds) {
   // A coefficient exactly on its bound is not beyond it.
   Experiment zero(e.robot, 0, 9);
   PhysicalProblem problem = zero.problem();
-  problem.lower[0] = least_squares(problem.information, problem.projection)[zero.beta.size()];
+  problem.lower[0] = SymmetricSolver(problem.information).solve(problem.projection)[zero.beta.size()];
   const PhysicalFit on_bound = fit_physical(problem);
   EXPECT_FALSE(on_bound.constrained);
   EXPECT_LT((all_parameters(on_bound) - zero.parameters).norm(), 1e-6 * zero.parameters.norm());
