@@ -15,6 +15,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// Whether the shape can be an unknown of the fit: a width or a distance, not an index or a count.
 bool is_continuous(const ParameterInfo& shape) {
@@ -37,17 +38,6 @@ double median(VectorXd values) {
   const Index middle = values.size() / 2;
   std::nth_element(values.begin(), values.begin() + middle, values.end());
   return values[middle];
-}
-
-/// Sum over lags of the residual's autocorrelation times the column's: X -> R X for one stretch of consecutive rows.
-MatrixXd correlated(const MatrixXd& x, const VectorXd& autocorrelation) {
-  MatrixXd out = autocorrelation[0] * x;
-  for (Index lag = 1; lag < std::min(autocorrelation.size(), x.rows()); ++lag) {
-    const Index rest = x.rows() - lag;
-    out.topRows(rest) += autocorrelation[lag] * x.bottomRows(rest);
-    out.bottomRows(rest) += autocorrelation[lag] * x.topRows(rest);
-  }
-  return out;
 }
 
 }  // namespace
@@ -155,11 +145,21 @@ namespace {
 
 /// One joint's part of the sandwich: rows of one stretch of consecutive samples.
 struct Stretch {
-  MatrixXd x;  ///< all unknowns that act on the joint; rows that are not used are zero
-  VectorXd e;  ///< weighted residual
+  RowMajor x;         ///< all unknowns that act on the joint; rows that are not used are zero
+  VectorXd e;         ///< weighted residual
+  RowMajor around{};  ///< R x
 };
 
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+/// R X for consecutive rows: sum over lags of the autocorrelation times the rows that far before and after.
+RowMajor correlated(const RowMajor& x, const VectorXd& autocorrelation) {
+  RowMajor out = autocorrelation[0] * x;
+  for (Index lag = 1; lag < std::min(autocorrelation.size(), x.rows()); ++lag) {
+    const Index count = (x.rows() - lag) * x.cols();
+    Eigen::Map<VectorXd>(out.data(), count) += autocorrelation[lag] * Eigen::Map<const VectorXd>(x.row(lag).data(), count);
+    Eigen::Map<VectorXd>(out.row(lag).data(), count) += autocorrelation[lag] * Eigen::Map<const VectorXd>(x.data(), count);
+  }
+  return out;
+}
 
 /// Sum over k of a_k . b_(k + lag): of consecutive rows, so one dot product.
 double lagged(const RowMajor& a, const RowMajor& b, Index lag) {
@@ -178,6 +178,7 @@ class NoiseOfJoint {
         residual_[lag] += s.e.head(s.e.size() - lag).dot(s.e.tail(s.e.size() - lag)) / rows_;
     }
     noise_ = residual_;
+    spread_out();
   }
   /// The fit has taken some of the noise, most at the low frequencies where its columns live:
   ///   E e e^T = (1 - H) R (1 - H)^T,  H = X A^-1 X^T W,
@@ -185,26 +186,26 @@ class NoiseOfJoint {
   void correct(const MatrixXd& inverse, const MatrixXd& covariance) {
     VectorXd taken = VectorXd::Zero(noise_.size());
     for (const Stretch& s : stretches_) {
-      const RowMajor x = s.x, fit = s.x * inverse, spread = s.x * covariance;
-      const RowMajor around = weight_ * correlated(s.x, tapered());
-      for (Index lag = 0; lag < std::min(taken.size(), x.rows()); ++lag)
-        taken[lag] += (lagged(fit, around, lag) + lagged(around, fit, lag) - lagged(spread, x, lag)) / rows_;
+      const RowMajor fit = weight_ * (s.x * inverse), spread = s.x * covariance;
+      for (Index lag = 0; lag < std::min(taken.size(), s.x.rows()); ++lag)
+        taken[lag] += (lagged(fit, s.around, lag) + lagged(s.around, fit, lag) - lagged(spread, s.x, lag)) / rows_;
     }
     noise_ = residual_ + taken;
+    spread_out();
   }
   MatrixXd middle() const {
     MatrixXd out = MatrixXd::Zero(stretches_[0].x.cols(), stretches_[0].x.cols());
-    for (const Stretch& s : stretches_) out += s.x.transpose() * correlated(s.x, tapered());
+    for (const Stretch& s : stretches_) out += s.x.transpose() * s.around;
     return weight_ * weight_ * out;
   }
 
  private:
-  /// Flat to half of the lags, then down to zero.
-  VectorXd tapered() const {
-    VectorXd out = noise_;
-    const auto lags = static_cast<double>(out.size());
-    for (Index lag = 0; lag < out.size(); ++lag) out[lag] *= std::min(1.0, 2 * (1 - static_cast<double>(lag) / lags));
-    return out;
+  void spread_out() {
+    VectorXd tapered = noise_;  // flat to half of the lags, then down to zero
+    const auto lags = static_cast<double>(tapered.size());
+    for (Index lag = 0; lag < tapered.size(); ++lag)
+      tapered[lag] *= std::min(1.0, 2 * (1 - static_cast<double>(lag) / lags));
+    for (Stretch& s : stretches_) s.around = correlated(s.x, tapered);
   }
   std::vector<Stretch> stretches_;
   double weight_, rows_;
@@ -241,7 +242,7 @@ void Fitter::add_standard_deviations(Solution& solution) const {
       if (logs()[l].role != Role::train) continue;
       const Index from = data_->first_row[l], count = logs()[l].rows();
       const auto usable = data_->usable[j].segment(from, count);
-      Stretch s{MatrixXd(count, static_cast<Index>(columns[j].size())),
+      Stretch s{RowMajor(count, static_cast<Index>(columns[j].size())),
                 row_weights_[j].segment(from, count).cwiseProduct(e.segment(from, count))};
       s.x << data_->base_rows[j].middleRows(from, count), own_rows_[j].middleRows(from, count),
           shapes[j].middleRows(from, count);
