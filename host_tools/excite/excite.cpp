@@ -201,7 +201,8 @@ std::string excite(const Project& project, const fs::path& directory, Progress& 
   json document = to_json(plan, project);
   document["sight"] = sight_json(sight, nominal.assumptions);
   write_file(directory / "excite.json", document.dump(1) + "\n");
-  return table(plan, project) + "\n" + sight_table(sight, nominal.assumptions) + fmt::format("plan: {}\n", (directory / "excite.json").string());
+  return table(plan, project) + "\n" + sight_table(sight, nominal.assumptions) +
+         fmt::format("plan: {}\n", (directory / "excite.json").string());
 }
 
 }  // namespace fxdyn

@@ -265,8 +265,9 @@ ProcessedLog process(Log log, const FilterFit& filter, const ProcessSettings& se
     }
     if (log.tau.size() > 0) {
       const VectorXd tau = log.tau.col(j);
-      out.torque_noise[j] = noise_floor(tau.segment(out.first, inside), torque.apply(tau).col(0).segment(out.first, inside),
-                                        filter.torque_cutoff_hz, log.step_s);
+      out.torque_noise[j] =
+          noise_floor(tau.segment(out.first, inside), torque.apply(tau).col(0).segment(out.first, inside),
+                      filter.torque_cutoff_hz, log.step_s);
       out.saturated[static_cast<std::size_t>(j)] =
           saturated_runs(tau, settings.torque_limits.empty() ? 0 : settings.torque_limits[static_cast<std::size_t>(j)]);
     }

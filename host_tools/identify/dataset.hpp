@@ -89,8 +89,8 @@ ProcessedLog process(Log log, const FilterFit& filter, const ProcessSettings& se
 /// The model with the log's known load on the flange.
 IdentifiedModel with_load_of(const ProcessedLog& log, IdentifiedModel model);
 
-/// Torques of the model over a log, block by block, with the log's known load and at the times at which the log's torque
-/// column shows them (torque_lead_s of the model's filter): samples x joints [N*m | N].
+/// Torques of the model over a log, block by block, with the log's known load and at the times at which the log's
+/// torque column shows them (torque_lead_s of the model's filter): samples x joints [N*m | N].
 Eigen::MatrixXd predict(const IdentifiedModel& model, const ProcessedLog& log);
 
 }  // namespace fxdyn

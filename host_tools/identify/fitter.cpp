@@ -84,6 +84,7 @@ Fitter::Fitter(const Robot& robot, const std::vector<ProcessedLog>& logs, std::v
   data->robot = robot;
   data->logs = &logs;
   const DhChain chain = to_dh(robot);
+  data->chain = chain;
   data->base = find_base(chain);
   const auto n = static_cast<Eigen::Index>(robot.size());
   const auto& columns = data->base.columns;
@@ -188,7 +189,8 @@ Fitter::Fitter(const Robot& robot, const std::vector<ProcessedLog>& logs, std::v
   for (std::size_t l = 0; l < logs.size(); ++l) {
     const Eigen::Index count = logs[l].rows(), first = data->first_row[l];
     for (int part = 0; part < parts; ++part)
-      blocks.push_back({l, first + count * part / parts, first + count * (part + 1) / parts, logs[l].role == Role::train});
+      blocks.push_back(
+          {l, first + count * part / parts, first + count * (part + 1) / parts, logs[l].role == Role::train});
   }
   const std::size_t folds = split.has_validation ? 1 : blocks.size();
   split.fit.resize(folds);

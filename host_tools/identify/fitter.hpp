@@ -75,6 +75,7 @@ class Fitter {
 
   std::size_t joints() const { return design_.size(); }
   const BaseSet& base() const { return data_->base; }
+  const DhChain& chain() const { return data_->chain; }
   const std::vector<ProcessedLog>& logs() const { return *data_->logs; }
   const JointFit& design(std::size_t joint) const { return design_[joint]; }
   /// What judges, in words.
@@ -147,12 +148,13 @@ class Fitter {
   struct Data {
     Robot robot;
     const std::vector<ProcessedLog>* logs;
+    DhChain chain;
     BaseSet base;
-    std::vector<Eigen::Index> first_base;      ///< per joint: base columns from here on act on it
-    std::vector<Eigen::Index> first_row;       ///< per log
-    std::vector<Eigen::MatrixXd> base_rows;    ///< per joint: rows x base columns that act on it
-    std::vector<Eigen::VectorXd> load_rows;    ///< per joint: torque of the logs' known loads
-    std::vector<Eigen::VectorXd> usable;       ///< per joint and row: 0 where saturated, else 1
+    std::vector<Eigen::Index> first_base;    ///< per joint: base columns from here on act on it
+    std::vector<Eigen::Index> first_row;     ///< per log
+    std::vector<Eigen::MatrixXd> base_rows;  ///< per joint: rows x base columns that act on it
+    std::vector<Eigen::VectorXd> load_rows;  ///< per joint: torque of the logs' known loads
+    std::vector<Eigen::VectorXd> usable;     ///< per joint and row: 0 where saturated, else 1
     std::vector<Block> blocks;
     Split split;
   };
@@ -186,11 +188,11 @@ class Fitter {
   std::shared_ptr<const Data> data_;
   std::vector<JointFit> design_;
   double torque_lead_s_ = 0;
-  std::vector<Eigen::VectorXd> torque_rows_;             ///< per joint, without known loads
-  std::vector<Eigen::VectorXd> row_weights_;             ///< per joint and row
-  std::vector<std::vector<BaseMoments>> base_moments_;   ///< [joint][block]
-  std::vector<Eigen::MatrixXd> own_rows_;                ///< per joint: rows x own columns
-  std::vector<Own> own_moments_;                         ///< [joint][block]
+  std::vector<Eigen::VectorXd> torque_rows_;            ///< per joint, without known loads
+  std::vector<Eigen::VectorXd> row_weights_;            ///< per joint and row
+  std::vector<std::vector<BaseMoments>> base_moments_;  ///< [joint][block]
+  std::vector<Eigen::MatrixXd> own_rows_;               ///< per joint: rows x own columns
+  std::vector<Own> own_moments_;                        ///< [joint][block]
   Eigen::VectorXd weights_;
 };
 

@@ -57,8 +57,8 @@ LeastSquares least_squares(Eigen::MatrixXd x, const Eigen::VectorXd& y, const st
 /// filtered once; the gear's low-pass commutes with the filter.
 class JointData {
  public:
-  JointData(const FlexibleInput& input, const std::vector<MotionRows>& motions, const std::vector<Eigen::MatrixXd>& loads,
-            Eigen::Index joint)
+  JointData(const FlexibleInput& input, const std::vector<MotionRows>& motions,
+            const std::vector<Eigen::MatrixXd>& loads, Eigen::Index joint)
       : joint_(joint), sign_width_(input.model.joints[static_cast<std::size_t>(joint)].sign_width) {
     std::vector<Eigen::VectorXd> deltas;
     for (std::size_t l = 0; l < input.logs.size(); ++l) {
@@ -67,7 +67,8 @@ class JointData {
       logs_.push_back(&log);
       motions_.push_back(&motions[l]);
       MotionRows motor = log.joint_motion(joint);
-      series_.push_back({std::move(motor.q), std::move(motor.dq), std::move(motor.ddq), loads[l].col(joint), log.step_s});
+      series_.push_back(
+          {std::move(motor.q), std::move(motor.dq), std::move(motor.ddq), loads[l].col(joint), log.step_s});
       filtered_load_.emplace_back(log.filter_columns(loads[l].col(joint)));
       filtered_ddq_.emplace_back(log.filter_columns(motions[l].ddq.col(joint)));
       deltas.emplace_back(log.filter_columns(log.q.col(joint) - log.qlink.col(joint)));

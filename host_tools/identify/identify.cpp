@@ -16,6 +16,8 @@ namespace {
 
 /// An effect must lower the joint's held-out error by this share to be kept.
 constexpr double worth_keeping = 0.02;
+/// A standard deviation that stands for this share of rated torque is worth a note.
+constexpr double worrying_error = 0.1;
 /// Of all logs together.
 constexpr Eigen::Index most_rows = 120'000;
 
@@ -115,9 +117,10 @@ double overall(const std::vector<Judgement>& judgements) {
   return sum / static_cast<double>(judgements.size());
 }
 
-/// How far the torque column is ahead of the motion, one number for all joints: a grid within a fifth of a period of the
-/// torque cut-off on either side, then parabolas through the best three. Kept where the mean held-out error falls by the
-/// share that an effect has to bring; one number for all joints does not overfit, so blocks of one log ask for no more.
+/// How far the torque column is ahead of the motion, one number for all joints: a grid within a fifth of a period of
+/// the torque cut-off on either side, then parabolas through the best three. Kept where the mean held-out error falls
+/// by the share that an effect has to bring; one number for all joints does not overfit, so blocks of one log ask for
+/// no more.
 void find_torque_lead(Fitter& fitter, double cutoff_hz) {
   const double before = overall(fitter.held_out()), start = fitter.torque_lead_s();
   const std::vector<Eigen::MatrixXd> torque = fitter.filtered_torque();
@@ -201,9 +204,9 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
       Eigen::Index saturated = 0;
       for (const auto& [from, to] : runs) saturated += to - from;
       if (saturated > 0) {
-        data.notes.push_back(fmt::format(
-            "{}: torque of joint {} ({}) stays at its limit for {} samples: left out of the fit", processed.name, j + 1,
-            project.robot.joints[static_cast<std::size_t>(j)].name, saturated));
+        data.notes.push_back(
+            fmt::format("{}: torque of joint {} ({}) stays at its limit for {} samples: left out of the fit",
+                        processed.name, j + 1, project.robot.joints[static_cast<std::size_t>(j)].name, saturated));
       }
     }
   }
@@ -258,9 +261,10 @@ void weigh(Fitter& fitter, const IdentifySettings& settings) {
 std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progress& progress) {
   const std::vector<std::string> nominal =
       project.identify.effects.value_or(std::vector<std::string>{"viscous", "coulomb", "offset", "rotor_inertia"});
-  const std::vector<std::string_view> optional = project.identify.effects
-                                                     ? std::vector<std::string_view>{}
-                                                     : std::vector<std::string_view>{"motor_coupling", "asymmetric_friction", "presliding", "stribeck"};
+  const std::vector<std::string_view> optional =
+      project.identify.effects
+          ? std::vector<std::string_view>{}
+          : std::vector<std::string_view>{"motor_coupling", "asymmetric_friction", "presliding", "stribeck"};
 
   for (const std::string& effect : nominal) {
     if (const std::string reason = why_not_identified(*find_effect(effect)); !reason.empty())
@@ -317,6 +321,9 @@ std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progres
     if (weighted) fitter->reweight();
   };
   improve("width of the Coulomb sign", true, [&](std::size_t j) { return search_width(*fitter, j, scales[j]); });
+  // A width that is off by the grid's step looks like another effect.
+  fitter->polish();
+  if (weighted) fitter->reweight();
   for (const std::string& effect : nominal) {
     if (find_effect(effect)->shape.empty()) continue;
     improve("shape of " + effect, true, [&](std::size_t j) { return search_effect(*fitter, j, effect, scales[j]); });
@@ -338,7 +345,8 @@ std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progres
                                                          : search_effect(*fitter, j, effect, scales[j]);
       });
     }
-    improve("width of the Coulomb sign", true, [&](std::size_t j) { return search_width(*fitter, j, scales[j]); });
+    fitter->polish();
+    if (weighted) fitter->reweight();
     align();
   }
   progress.stage("widths and distances", 1);
@@ -384,14 +392,22 @@ Estimate finish_model(const Fitter& fitter, const Project& project, const GateDa
     solution.beta = out.recursion->solution.beta;
     solution.theta = out.recursion->solution.theta;
   }
+  out.weak = weak_in_logs(fitter, solution, worrying_error);
+  std::string untold;
+  Eigen::Index to_move = 0;
+  for (const WeakParameter& one : out.weak) {
+    if (one.identifiable) continue;
+    untold += (untold.empty() ? "" : ", ") + one.name;
+    to_move = one.joint;
+  }
+  if (!untold.empty()) {
+    throw DataError(fmt::format("the train logs can't tell {}: record a log in which joint {} ({}) moves more", untold,
+                                to_move + 1, project.robot.joints[static_cast<std::size_t>(to_move)].name));
+  }
   const Solution essential = essential_parameters(solution, equations);
   if (settings.physical) {
     out.physical = fit_physical(fitter, project.robot, variance_of_row(fitter, solution));
-    if (out.physical->constrained && !settings.essential) {
-      const Solution possible = physical_solution(fitter, *out.physical);
-      solution.beta = possible.beta;
-      solution.theta = possible.theta;
-    }
+    if (out.physical->constrained && !settings.essential) solution = physical_solution(solution, *out.physical);
   }
   solution.essential = essential.essential;
   out.model = fitter.to_model(settings.essential ? essential : solution);

@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "host_tools/identify/excitation.hpp"
 #include "host_tools/identify/fitter.hpp"
 #include "host_tools/identify/physical.hpp"
 #include "host_tools/progress.hpp"
@@ -40,9 +41,11 @@ struct Estimate {
   /// The physically possible fit, where the project asks for it; the model has its base parameters unless the project
   /// asks for the essential ones.
   std::optional<PhysicalFit> physical;
-  double condition = 0;                       ///< of the column-normalised weighted regressor, base and own columns
+  std::vector<WeakParameter> weak;             ///< see weak_in_logs()
+  double condition = 0;                        ///< of the column-normalised weighted regressor, base and own columns
   std::optional<Fitter::Recursion> recursion;  ///< method rls
 };
+/// @throws DataError: the train logs tell nothing of some base parameters; names them and the joint to move.
 Estimate finish_model(const Fitter& fitter, const Project& project, const GateData& data);
 
 }  // namespace fxdyn

@@ -354,9 +354,10 @@ Reduced without_theta(const PhysicalProblem& problem) {
   if (m == 0) return out;
   const MatrixXd across = problem.information.bottomLeftCorner(m, nb);
   const MatrixXd own = problem.information.bottomRightCorner(m, m);
-  for (Index i = 0; i < nb; ++i) out.information.col(i) -= across.transpose() * SymmetricSolver(own).solve(across.col(i));
+  const SymmetricSolver nuisance(own);
+  for (Index i = 0; i < nb; ++i) out.information.col(i) -= across.transpose() * nuisance.solve(across.col(i));
   out.information = ((out.information + out.information.transpose()) / 2).eval();
-  out.projection -= across.transpose() * SymmetricSolver(own).solve(problem.projection.tail(m));
+  out.projection -= across.transpose() * nuisance.solve(problem.projection.tail(m));
   return out;
 }
 
@@ -494,8 +495,7 @@ PhysicalFit fit_physical(const Fitter& fitter, const Robot& robot, double varian
                        lower, upper, variance});
 }
 
-Solution physical_solution(const Fitter& fitter, const PhysicalFit& fit) {
-  Solution solution = fitter.fit();
+Solution physical_solution(Solution solution, const PhysicalFit& fit) {
   solution.beta = fit.beta;
   Index at = 0;
   for (VectorXd& theta : solution.theta) {

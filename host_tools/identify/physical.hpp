@@ -83,8 +83,8 @@ PhysicalFit fit_physical(const PhysicalProblem& problem);
 /// The same of a fitter whose weights are one over the residuals' variance; coefficients keep the bounds of the
 /// catalogue (those of a BLS have none).
 PhysicalFit fit_physical(const Fitter& fitter, const Robot& robot, double variance = 1);
-/// The fitter's solution with beta and theta of the physical fit in place of its own.
-Solution physical_solution(const Fitter& fitter, const PhysicalFit& fit);
+/// A fitter's solution with beta and theta of the physical fit in place of its own.
+Solution physical_solution(Solution solution, const PhysicalFit& fit);
 
 /// Masses and centres of the fit beside the URDF's, in the links' URDF frames.
 struct LinkMass {

@@ -39,7 +39,8 @@ template <class Work, std::size_t... p>
     motion = link_motion<Real>(AnyLink{}, chain_.links[i], motion, states_[i]);
     for (std::size_t j = 0; j < i; ++j) {
       Screw& axis = axes_[j];
-      axis.moment = detail::to_child<Real>(AnyLink{}, chain_.links[i], motion, axis.moment + cross(axis.direction, motion.p));
+      axis.moment =
+          detail::to_child<Real>(AnyLink{}, chain_.links[i], motion, axis.moment + cross(axis.direction, motion.p));
       axis.direction = detail::to_child<Real>(AnyLink{}, chain_.links[i], motion, axis.direction);
     }
     const Vector3<double> z{0, 0, 1}, none{0, 0, 0};

@@ -155,8 +155,10 @@ RowMajor correlated(const RowMajor& x, const VectorXd& autocorrelation) {
   RowMajor out = autocorrelation[0] * x;
   for (Index lag = 1; lag < std::min(autocorrelation.size(), x.rows()); ++lag) {
     const Index count = (x.rows() - lag) * x.cols();
-    Eigen::Map<VectorXd>(out.data(), count) += autocorrelation[lag] * Eigen::Map<const VectorXd>(x.row(lag).data(), count);
-    Eigen::Map<VectorXd>(out.row(lag).data(), count) += autocorrelation[lag] * Eigen::Map<const VectorXd>(x.data(), count);
+    Eigen::Map<VectorXd>(out.data(), count) +=
+        autocorrelation[lag] * Eigen::Map<const VectorXd>(x.row(lag).data(), count);
+    Eigen::Map<VectorXd>(out.row(lag).data(), count) +=
+        autocorrelation[lag] * Eigen::Map<const VectorXd>(x.data(), count);
   }
   return out;
 }
@@ -299,8 +301,8 @@ void Fitter::reweight_rows() {
       const VectorXd magnitude = residual(j, solution).cwiseAbs();
       const double scale = 1.4826 * median(magnitude);
       if (!(scale > 0)) return;
-      row_weights_[j] = data_->usable[j].cwiseProduct(
-          (efficient * scale / magnitude.array().max(1e-300)).min(1.0).matrix());
+      row_weights_[j] =
+          data_->usable[j].cwiseProduct((efficient * scale / magnitude.array().max(1e-300)).min(1.0).matrix());
       make_base_moments(j);
       own_moments_[j] = own_moments(j, own_rows_[j]);
       project_torque(j);

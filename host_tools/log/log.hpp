@@ -16,7 +16,7 @@ std::string to_string(Role role);
 
 /// A load on the flange: a point mass at `com` in the last link's URDF frame.
 struct Load {
-  double mass = 0;                                 ///< [kg]
+  double mass = 0;                                ///< [kg]
   Eigen::Vector3d com = Eigen::Vector3d::Zero();  ///< [m]
 };
 

@@ -21,13 +21,13 @@ struct LogEntry {
   std::optional<double> from_s, to_s;
   LogFormat format;
   std::optional<Load> load;  ///< a known load of this run
-  int line = 0;  ///< of the [[log]] in the project file
+  int line = 0;              ///< of the [[log]] in the project file
 };
 
 struct SignalSettings {
   std::optional<double> position_cutoff_hz, torque_cutoff_hz;
   std::optional<double> torque_lead_s;  ///< see FilterFit
-  std::optional<double> edge_s;  ///< dropped at both ends after filtering
+  std::optional<double> edge_s;         ///< dropped at both ends after filtering
 };
 
 struct IdentifySettings {

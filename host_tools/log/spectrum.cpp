@@ -39,7 +39,8 @@ Spectrum welch(const VectorXd& signal, double step_s) {
   const Index segments = std::min<Index>(available, 128);
   VectorXd window(length);
   for (Index k = 0; k < length; ++k)
-    window[k] = 0.5 - 0.5 * std::cos(2 * std::numbers::pi * (static_cast<double>(k) + 0.5) / static_cast<double>(length));
+    window[k] =
+        0.5 - 0.5 * std::cos(2 * std::numbers::pi * (static_cast<double>(k) + 0.5) / static_cast<double>(length));
   const Index bins = length / 2 + 1;
   Spectrum out{1 / (static_cast<double>(length) * step_s), VectorXd::Zero(bins)};
   Eigen::FFT<double> fft;
@@ -48,7 +49,8 @@ Spectrum welch(const VectorXd& signal, double step_s) {
   for (Index s = 0; s < segments; ++s) {
     const Index from = segments == 1 ? 0 : (n - length) * s / (segments - 1);
     const double first = signal.segment(from, std::max<Index>(1, length / 16)).mean();
-    const double last = signal.segment(from + length - std::max<Index>(1, length / 16), std::max<Index>(1, length / 16)).mean();
+    const double last =
+        signal.segment(from + length - std::max<Index>(1, length / 16), std::max<Index>(1, length / 16)).mean();
     for (Index k = 0; k < length; ++k) {
       const double trend = first + (last - first) * static_cast<double>(k) / static_cast<double>(length);
       in[static_cast<std::size_t>(k)] = (signal[from + k] - trend) * window[k];

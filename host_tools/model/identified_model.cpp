@@ -223,11 +223,11 @@ json flexible_json(const FlexibleJoint& flexible, const Robot& robot) {
   const Joint& joint = robot.joints[flexible.joint];
   const bool revolute = joint.type == JointType::revolute;
   json out = {{"joint", joint.name},
-                        {"index", flexible.joint + 1},
-                        {"found", flexible.found},
-                        {"deflection_rms", {{"value", flexible.deflection_rms}, {"unit", joint.position_unit()}}},
-                        {"explained", flexible.explained},
-                        {"note", flexible.note}};
+              {"index", flexible.joint + 1},
+              {"found", flexible.found},
+              {"deflection_rms", {{"value", flexible.deflection_rms}, {"unit", joint.position_unit()}}},
+              {"explained", flexible.explained},
+              {"note", flexible.note}};
   if (!flexible.found) return out;
   out["stiffness"] = quantity_json(flexible.stiffness, flexible.stiffness_std, revolute ? "N*m/rad" : "N/m");
   out["damping"] = quantity_json(flexible.damping, flexible.damping_std, revolute ? "N*m*s/rad" : "N*s/m");
@@ -323,8 +323,8 @@ IdentifiedModel read_model(const std::filesystem::path& file) {
       throw InputError("robot, inertia and joints differ in length");
     }
     for (const json& p : j.at("base_parameters")) {
-      model.base.push_back({p.at("column"), p.at("name"), p.at("value"), p.at("std"), p.value("essential", true),
-                            p.at("expression")});
+      model.base.push_back(
+          {p.at("column"), p.at("name"), p.at("value"), p.at("std"), p.value("essential", true), p.at("expression")});
     }
     const json& filter = j.at("filter");
     model.filter = {filter.at("position_cutoff_hz"),

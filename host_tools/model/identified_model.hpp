@@ -52,7 +52,7 @@ struct JointFit {
   std::vector<EffectFit> effects;
   std::optional<BroadLearningFit> bls;
   std::optional<FlexibleJoint> flexible;  ///< where the joint has a link encoder
-  double rated_torque = 0;  ///< [N*m | N]
+  double rated_torque = 0;                ///< [N*m | N]
   double q_lower = 0, q_upper = 0, dq_limit = 0, ddq_limit = 0, tau_limit = 0;
   const EffectFit* find(std::string_view effect) const;
 };
@@ -68,8 +68,8 @@ struct BaseParameter {
 
 struct FilterFit {
   double position_cutoff_hz = 0, torque_cutoff_hz = 0, edge_s = 0;
-  /// The logs' torque column is this far ahead of the motion: measured tau(t) = torque of the motion at t + lead. A drive
-  /// that answers a command a while later has it, or signals that were sampled at different moments.
+  /// The logs' torque column is this far ahead of the motion: measured tau(t) = torque of the motion at t + lead. A
+  /// drive that answers a command a while later has it, or signals that were sampled at different moments.
   double torque_lead_s = 0;
   // Why: see choose_filter().
   double excited_hz = 0;                             ///< holds 99.9 % of the velocity's power on every joint

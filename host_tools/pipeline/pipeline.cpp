@@ -38,6 +38,17 @@ const LogFormat& format_of(const IdentifiedModel& model, const fs::path& log) {
       log.string()));
 }
 
+std::string weak_note(const std::vector<WeakParameter>& weak, const Robot& robot) {
+  if (weak.empty()) return {};
+  std::string names;
+  for (const WeakParameter& one : weak) names += (names.empty() ? "" : ", ") + one.name;
+  const auto worst =
+      std::max_element(weak.begin(), weak.end(), [](const auto& a, const auto& b) { return a.error < b.error; });
+  return fmt::format(
+      "these logs tell {} poorly (at the limits up to {:.0f} % of rated torque): move joint {} ({}) more and faster",
+      names, 100 * worst->error, worst->joint + 1, robot.joints[static_cast<std::size_t>(worst->joint)].name);
+}
+
 /// Estimates on the way through the logs: one row a moment, base parameters first, then each joint's coefficients.
 json recursion_json(const Fitter::Recursion& recursion, double forgetting) {
   json trace = json::array();
@@ -124,10 +135,16 @@ void Pipeline::finish(const Fitter& fitter, Stage stage, const json& training) {
       {"notes", data().notes},       {"logs", stages.back()["logs"]}, {"stages", stages}};
   metrics["method"] = project_.identify.method;
   metrics["condition_number"] = estimate.condition;
+  metrics["weak_parameters"] = json::array();
+  for (const WeakParameter& one : estimate.weak) {
+    metrics["weak_parameters"].push_back(
+        {{"parameter", one.name},
+         {"share_of_rated", one.error},
+         {"joint_to_move", project_.robot.joints[static_cast<std::size_t>(one.joint)].name}});
+  }
   const std::vector<Eigen::Index> saturated = fitter.saturated_rows();
   metrics["saturated_rows"] = std::vector<std::int64_t>(saturated.begin(), saturated.end());
-  if (estimate.physical)
-    metrics["physical"] = physical_json(project_.robot, to_dh(project_.robot), *estimate.physical);
+  if (estimate.physical) metrics["physical"] = physical_json(project_.robot, to_dh(project_.robot), *estimate.physical);
   if (estimate.recursion) metrics["recursive"] = recursion_json(*estimate.recursion, project_.identify.forgetting);
   if (!training.is_null()) metrics["training"] = training;
   if (estimate.physical) {
@@ -138,6 +155,8 @@ void Pipeline::finish(const Fitter& fitter, Stage stage, const json& training) {
   write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
   if (stage == Stage::identified) {
     for (const std::string& note : data().notes) fmt::print(stderr, "note: {}\n", note);
+    if (const std::string weak = weak_note(estimate.weak, project_.robot); !weak.empty())
+      fmt::print(stderr, "note: {}\n", weak);
   }
 }
 

@@ -14,8 +14,8 @@ namespace fs = std::filesystem;
 
 void identify_6_joints_60_s_500_hz(benchmark::State& state) {
   const fs::path folder = fs::temp_directory_path() / "fxdyn_bench_identify";
-  const std::string robot = "[robot]\nurdf = \"" + test::puma560.string() +
-                            "\"\nrated_torque = [97.6, 186.4, 89.4, 24.2, 20.1, 21.3]\n";
+  const std::string robot =
+      "[robot]\nurdf = \"" + test::puma560.string() + "\"\nrated_torque = [97.6, 186.4, 89.4, 24.2, 20.1, 21.3]\n";
   std::string scenario = "seed = 1\n[sensors]\nencoder_bits = 19\ntorque_noise = 0.01\n";
   for (int j = 1; j <= 6; ++j) {
     const std::string head = "[[effect]]\njoint = " + std::to_string(j) + "\nname = ";

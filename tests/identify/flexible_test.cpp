@@ -191,8 +191,7 @@ TEST(Flexible, ALinkEncoderTheWrongWayRoundIsSaid) {
   Log turned = log;
   turned.q = log.qlink.array().isNaN().select(log.q, log.qlink);
   turned.qlink = log.q;
-  const std::vector<FlexibleJoint> joints =
-      identify_flexible({truth(), {process(turned, filter)}});
+  const std::vector<FlexibleJoint> joints = identify_flexible({truth(), {process(turned, filter)}});
   EXPECT_FALSE(joints[1].found);
   EXPECT_NE(joints[1].note.find("wrong way"), std::string::npos) << joints[1].note;
 }

@@ -11,8 +11,8 @@
 #include "host_tools/pipeline/pipeline.hpp"
 #include "host_tools/random.hpp"
 #include "tests/support/chains.hpp"
-#include "tests/support/filter.hpp"
 #include "tests/support/files.hpp"
+#include "tests/support/filter.hpp"
 
 namespace fxdyn {
 namespace {

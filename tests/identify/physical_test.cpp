@@ -1,5 +1,5 @@
-#include "host_tools/identify/solver.hpp"
 #include "host_tools/identify/physical.hpp"
+#include "host_tools/identify/solver.hpp"
 
 #include <gtest/gtest.h>
 

@@ -35,8 +35,7 @@ IdentifiedModel plant() {
   model.robot = read_urdf(test::puma560);
   const DhChain chain = to_dh(model.robot);
   for (std::size_t j = 0; j < model.robot.size(); ++j) {
-    model.inertia.push_back(
-        to_link_inertia(model.robot.joints[j].inertial.value_or(Inertial{}), chain.urdf_in_dh[j]));
+    model.inertia.push_back(to_link_inertia(model.robot.joints[j].inertial.value_or(Inertial{}), chain.urdf_in_dh[j]));
     JointFit joint;
     joint.rated_torque = model.robot.joints[j].limits->effort;
     joint.sign_width = width;
@@ -179,8 +178,7 @@ TEST(Statistics, ForgettingFollowsAChange) {
   IdentifiedModel after = before;
   after.joints[0].effects[1].linear[0] *= 1.5;
   Log log = record(before);
-  log.tau.bottomRows(2500) =
-      predict(after, log.q, log.dq, log.ddq, log.step_s).bottomRows(2500);
+  log.tau.bottomRows(2500) = predict(after, log.q, log.dq, log.ddq, log.step_s).bottomRows(2500);
   add_noise(log, before, 0.005, 8);
   const std::vector<ProcessedLog> logs{process(log, filter)};
   Fitter fitter(before.robot, logs, before.joints);

@@ -47,7 +47,8 @@ TEST_P(RealPhysical, HeldOutErrorStaysWithinTwoPercentOfTheUnconstrainedFit) {
   const auto start = std::chrono::steady_clock::now();
   const PhysicalFit fit = fit_physical(*fitter, project.robot);
   const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-  const IdentifiedModel models[] = {fitter->to_model(fitter->fit()), fitter->to_model(physical_solution(*fitter, fit))};
+  const IdentifiedModel models[] = {fitter->to_model(fitter->fit()),
+                                    fitter->to_model(physical_solution(fitter->fit(), fit))};
 
   double sum = 0;
   fmt::print("{}: {} ms, {}, {:.1f} kg, prior: {}\n", set, static_cast<int>(ms),
@@ -55,8 +56,7 @@ TEST_P(RealPhysical, HeldOutErrorStaysWithinTwoPercentOfTheUnconstrainedFit) {
   for (const Log& log : read_logs(project, Role::test, out)) {
     const ProcessedLog processed = process(log, data.filter);
     std::vector<JointMetrics> metrics[2];
-    for (int k = 0; k < 2; ++k)
-      metrics[k] = judge(processed, predict(models[k], processed));
+    for (int k = 0; k < 2; ++k) metrics[k] = judge(processed, predict(models[k], processed));
     for (std::size_t j = 0; j < project.robot.size(); ++j) {
       const double ratio = metrics[1][j].rmse / metrics[0][j].rmse;
       fmt::print("  joint {}: {:.4g} -> {:.4g} (x{:.3f})\n", j + 1, metrics[0][j].rmse, metrics[1][j].rmse, ratio);

@@ -16,7 +16,8 @@ inline KDL::Chain to_kdl(const Robot& robot) {
     const auto& i = body.tensor;
     const auto type = joint.type == JointType::revolute ? KDL::Joint::RotAxis : KDL::Joint::TransAxis;
     chain.addSegment(KDL::Segment(
-        joint.name, KDL::Joint(joint.name, to_kdl(joint.origin.translation()), to_kdl(Eigen::Vector3d(r * joint.axis)), type),
+        joint.name,
+        KDL::Joint(joint.name, to_kdl(joint.origin.translation()), to_kdl(Eigen::Vector3d(r * joint.axis)), type),
         KDL::Frame(KDL::Rotation(r(0, 0), r(0, 1), r(0, 2), r(1, 0), r(1, 1), r(1, 2), r(2, 0), r(2, 1), r(2, 2)),
                    to_kdl(joint.origin.translation())),
         KDL::RigidBodyInertia(body.mass, to_kdl(body.centre),

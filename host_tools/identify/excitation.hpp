@@ -1,0 +1,13 @@
+#pragma once
+
+#include "host_tools/excite/information.hpp"
+#include "host_tools/identify/fitter.hpp"
+
+namespace fxdyn {
+
+/// Base parameters that the train logs tell poorly, by the torque that their standard deviation stands for: the largest
+/// at random motions within the model's limits, as a share of rated torque. `error`: that share; from `above` on.
+/// Not identifiable: the information has (next to) nothing in a direction that the parameter has part in.
+std::vector<WeakParameter> weak_in_logs(const Fitter& fitter, const Solution& solution, double above);
+
+}  // namespace fxdyn
