@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "host_tools/error.hpp"
 #include "host_tools/excite/nominal.hpp"
 #include "host_tools/excite/sight.hpp"
 #include "host_tools/files.hpp"
@@ -172,13 +173,10 @@ void write_motion(const fs::path& directory, const Motion& motion, const std::ve
 }
 
 std::string excite(const Project& project, const fs::path& directory, Progress& progress) {
+  std::error_code failed;
+  fs::create_directories(directory, failed);  // fails now rather than after the work
+  if (failed) throw InputError(fmt::format("{}: can't be made: {}", directory.string(), failed.message()));
   const Plan plan = make_plan(project, directory, progress);
-  progress.stage("writing", plan.trajectories.size());
-  for (const PlannedTrajectory& one : plan.trajectories) {
-    write_motion(directory, one, joint_names(project.robot), position_unit(project.robot));
-    progress.step();
-  }
-  progress.done();
 
   // What the plan would see, by the model of an earlier log where there is one.
   NominalModel nominal;
@@ -200,6 +198,12 @@ std::string excite(const Project& project, const fs::path& directory, Progress& 
   const Sight sight = see(nominal.model, {plan.trajectories.begin(), plan.trajectories.end()}, settings, progress);
   json document = to_json(plan, project);
   document["sight"] = sight_json(sight, nominal.assumptions);
+  progress.stage("writing", plan.trajectories.size());
+  for (const PlannedTrajectory& one : plan.trajectories) {
+    write_motion(directory, one, joint_names(project.robot), position_unit(project.robot));
+    progress.step();
+  }
+  progress.done();
   write_file(directory / "excite.json", document.dump(1) + "\n");
   return table(plan, project) + "\n" + sight_table(sight, nominal.assumptions) +
          fmt::format("plan: {}\n", (directory / "excite.json").string());

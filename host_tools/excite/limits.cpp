@@ -58,6 +58,16 @@ MotionLimits motion_limits(const Project& project) {
     out.velocity[j] = given.velocity.empty() ? urdf.velocity : given.velocity[i];
     if (!(out.velocity[j] > 0)) fail("no velocity limit", "velocity");
     out.acceleration[j] = given.acceleration.empty() ? out.velocity[j] / ramp_s : given.acceleration[i];
+    // Too slow to go anywhere in a period: the plan would take hours, and tell nothing of the joint.
+    const double least = 0.02 * (out.upper[j] - out.lower[j]), period = project.excite.period_s;
+    const auto too_slow = [&](const char* key, double value, const char* per) {
+      throw InputError(
+          fmt::format("{}: joint '{}': limits.{} of {:.3g} {}{} lets it cover less than 2 % of its range in {} s; "
+                      "raise it or [excite] period_s",
+                      project.file.string(), joint.name, key, value, joint.position_unit(), per, period));
+    };
+    if (out.velocity[j] * period < least) too_slow("velocity", out.velocity[j], "/s");
+    if (out.acceleration[j] * period * period / 16 < least) too_slow("acceleration", out.acceleration[j], "/s^2");
     const double effort = given.torque.empty() ? urdf.effort : given.torque[i];
     out.torque[j] = effort > 0 ? effort : infinity;
   }
@@ -74,9 +84,13 @@ std::optional<IdentifiedModel> torque_model(const Project& project, const std::f
   const std::size_t n = project.robot.size();
   if (const auto file = directory / "model.json"; std::filesystem::exists(file)) {
     IdentifiedModel model = read_model(file);
-    if (model.robot.size() != n) {
-      throw InputError(fmt::format("{}: a model of {} joints, the project's robot has {}; choose another --out",
-                                   file.string(), model.robot.size(), n));
+    bool same = model.robot.size() == n;
+    for (std::size_t i = 0; same && i < n; ++i)
+      same = model.robot.joints[i].name == project.robot.joints[i].name &&
+             model.robot.joints[i].origin.isApprox(project.robot.joints[i].origin, 1e-9);
+    if (!same) {
+      throw InputError(
+          fmt::format("{}: a model of another robot than the project's; choose another --out", file.string()));
     }
     notes.push_back("torques from the identified model.json");
     return model;

@@ -450,13 +450,24 @@ class Planner {
     planned.kind = coordinates.kind().name;
     planned.period_s = coordinates.period_s();
     planned.periods = coordinates.kind().periods;
-    for (;;) {
+    for (int shrunk = 0;; ++shrunk) {
       planned.series = coordinates.decode(x).series;
       static_cast<Motion&>(planned) = play(planned.series, planned.period_s, planned.periods, settings_.step_s);
-      if (check_.violation(planned) == 0) break;
+      if (check_.violation(planned) == 0 || shrunk == most_shrinks) break;  // what remains, check_all() refuses
       coordinates.shrink(x, 0.98);
     }
     plan_.trajectories.push_back(std::move(planned));
+  }
+
+  /// Nothing is written that leaves its limits between the samples that the search looked at.
+  void check_all() const {
+    for (const PlannedTrajectory& planned : plan_.trajectories) {
+      if (check_.violation(planned) == 0) continue;
+      throw DataError(
+          fmt::format("{}: trajectory '{}' does not fit into the limits with a margin of {:.0f} %; widen the limits or "
+                      "choose another [excite] seed",
+                      project_.file.string(), planned.kind, 100 * check_.margin()));
+    }
   }
 
   MatrixXd matrix(const Walk& walk) const {
@@ -468,6 +479,7 @@ class Planner {
     return dwell_and_move(matrix(walk), walk.moves_s, dwell_s, step_s);
   }
   static constexpr double coarse_step_s = 0.1;
+  static constexpr int most_shrinks = 100;
   MatrixXd static_information(const Walk& walk) const {
     return columns_.information(motion(walk, coarse_step_s), plan_.noise);
   }
@@ -536,7 +548,7 @@ class Planner {
     plan_.trajectories.push_back(std::move(planned));
   }
 
-  /// The motion of a robot that moves freely: random states, uniform within +-pi (or the limits of a sliding joint) and
+  /// The motion of a robot that moves freely: random states, uniform within +-pi (sliding joints: +-0.5 m) and
   /// within the velocity and acceleration limits.
   Motion free_motion() const {
     constexpr Index states = 400;
@@ -558,10 +570,16 @@ class Planner {
 
   void judge() {
     progress_.done();
-    plan_.after = conditioning(total_);
-    plan_.trajectory_after = conditioning(chosen_[0].information);
-    plan_.information = total_ / settings_.step_s;
+    check_all();
     const std::vector<Motion> motions(plan_.trajectories.begin(), plan_.trajectories.end());
+    // of what is written, at the rate that it is written with
+    MatrixXd whole = MatrixXd::Zero(columns_.size(), columns_.size());
+    for (const Motion& motion : motions) {
+      whole += columns_.information(motion, plan_.noise);
+      if (&motion == &motions.front()) plan_.trajectory_after = conditioning(whole);
+    }
+    plan_.after = conditioning(whole);
+    plan_.information = whole / settings_.step_s;
     const Motion free = free_motion();
     ParameterSizes sizes{columns_.names(),
                          columns_.joints(),

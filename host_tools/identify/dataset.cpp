@@ -36,17 +36,19 @@ MotionRows slice(const MatrixXd& q, const MatrixXd& dq, const MatrixXd& ddq, Ind
 }
 
 /// Runs in which the torque does not move from its extreme (or stays at the project's limit), four samples or longer,
-/// and into which it jumped: the peak of a coarsely measured torque is entered by a step of its resolution.
+/// and into which it jumped: the peak of a coarsely measured torque is entered by a step of its resolution. A torque
+/// that is logged faster than it is measured stands still everywhere: the run has to be four times as long as usual.
 std::vector<std::array<Index, 2>> saturated_runs(const VectorXd& tau, double limit) {
-  constexpr Index shortest = 4;
   const Index n = tau.size();
   double resolution = 1e300;
+  Index changes = 1;
   for (Index k = 1; k < n; ++k) {
     const double step = std::fabs(tau[k] - tau[k - 1]);
     if (step > 0) resolution = std::min(resolution, step);
+    changes += step > 0;
   }
+  const Index shortest = 4 * std::max<Index>(1, n / changes);
   std::vector<std::array<Index, 2>> runs;
-  bool jumped = false;
   for (const double sign : {1.0, -1.0}) {
     const double extreme = limit > 0 ? std::min(0.995 * limit, (sign * tau).maxCoeff()) : (sign * tau).maxCoeff();
     if (limit > 0 && (sign * tau).maxCoeff() < 0.995 * limit) continue;
@@ -57,14 +59,11 @@ std::vector<std::array<Index, 2>> saturated_runs(const VectorXd& tau, double lim
       }
       Index end = k;
       while (end < n && sign * tau[end] >= extreme * (1 - 1e-12)) ++end;
-      if (end - k >= shortest) {
-        runs.push_back({k, end});
-        jumped |= limit > 0 || (k > 0 && std::fabs(tau[k] - tau[k - 1]) > 3 * resolution);
-      }
+      const bool jumped = limit > 0 || (k > 0 && std::fabs(tau[k] - tau[k - 1]) > 3 * resolution);
+      if (end - k >= shortest && jumped) runs.push_back({k, end});
       k = end;
     }
   }
-  if (!jumped) runs.clear();
   return runs;
 }
 
@@ -102,8 +101,8 @@ double encoder_step(const VectorXd& q) {
   return counted > 20 && static_cast<double>(multiples) > 0.9 * static_cast<double>(counted) ? smallest : 0;
 }
 
-/// Where the motion sinks into the noise: the first frequency from which the density of q stays below twice the level
-/// of its highest octave.
+/// Where the motion sinks into the noise: the first frequency from which the density of q is below twice the level
+/// of its highest octave, for four bins at least.
 double crossing_frequency(const Spectrum& spectrum) {
   const Index n = spectrum.density.size();
   VectorXd high = spectrum.density.tail(n / 2);
@@ -280,7 +279,8 @@ ProcessedLog process(Log log, const FilterFit& filter, const ProcessSettings& se
   out.tau = std::move(log.tau);
   // Eight samples a period of the cut-off lose nothing and spare work.
   out.decimation = std::max<Index>(1, static_cast<Index>(1 / (log.step_s * 8 * filter.torque_cutoff_hz)));
-  while (out.rows() > settings.most_rows) ++out.decimation;
+  out.decimation =
+      std::max(out.decimation, static_cast<Index>(std::ceil(settings.shortest_interval_s / log.step_s - 1e-9)));
   return out;
 }
 

@@ -80,7 +80,7 @@ FilterFit choose_filter(const std::vector<Log>& logs, const SignalSettings& sett
 /// What fits need to know beside the filter.
 struct ProcessSettings {
   std::vector<double> torque_limits;  ///< the project's, may be empty: torque that stays there is saturated
-  Eigen::Index most_rows = 1 << 30;   ///< for fitting; longer logs are decimated more
+  double shortest_interval_s = 0;     ///< between the rows for fitting
 };
 
 /// @throws DataError where the log is shorter than the edges that the filter needs.

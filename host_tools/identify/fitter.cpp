@@ -211,7 +211,7 @@ Fitter::Fitter(const Robot& robot, const std::vector<ProcessedLog>& logs, std::v
   torque_rows_.resize(joints());
   parallel_for(joints(), [&](std::size_t j) { make_base_moments(j); });
   set_torque_lead(logs.front().filter.torque_lead_s, filtered_torque());
-  for (std::size_t j = 0; j < joints(); ++j) set_design(j, design_[j]);
+  set_designs(design_);
 }
 
 std::vector<Eigen::MatrixXd> Fitter::filtered_torque() const {
@@ -249,18 +249,20 @@ void Fitter::project_torque(std::size_t joint) {
   }
 }
 
-Eigen::MatrixXd Fitter::own_rows(std::size_t joint, const JointFit& design) const {
-  std::vector<JointFit> designs = design_;
-  designs[joint] = design;
+Eigen::MatrixXd Fitter::own_rows(std::size_t joint, const std::vector<JointFit>& designs) const {
+  const JointFit& design = designs[joint];
   // Columns of effects that are as in the current design need not be made again.
   std::vector<Eigen::Index> kept(design.effects.size(), -1);
-  const JointFit& now = design_[joint];
   if (own_rows_[joint].size() > 0) {
+    const auto same_width = [&](std::size_t j) { return designs[j].sign_width == design_[j].sign_width; };
     for (std::size_t e = 0; e < design.effects.size(); ++e) {
-      if (now.sign_width != design.sign_width && find_effect(design.effects[e].effect)->uses_sign) continue;
+      const EffectFit& wanted = design.effects[e];
+      const EffectInfo& info = *find_effect(wanted.effect);
+      if (info.uses_sign && !same_width(joint)) continue;
+      if (info.needs_peers && !same_width(static_cast<std::size_t>(wanted.shape[0]) - 1)) continue;
       Eigen::Index at = 0;
-      for (const EffectFit& fit : now.effects) {
-        if (fit.effect == design.effects[e].effect && fit.shape == design.effects[e].shape) kept[e] = at;
+      for (const EffectFit& fit : design_[joint].effects) {
+        if (fit.effect == wanted.effect && fit.shape == wanted.shape) kept[e] = at;
         at += static_cast<Eigen::Index>(find_effect(fit.effect)->linear.size());
       }
     }
@@ -366,9 +368,19 @@ std::vector<Fitter::Dependent> Fitter::dependent_effects() const {
 }
 
 void Fitter::set_design(std::size_t joint, JointFit design) {
-  own_rows_[joint] = own_rows(joint, design);
-  design_[joint] = std::move(design);
+  std::vector<JointFit> designs = design_;
+  designs[joint] = std::move(design);
+  own_rows_[joint] = own_rows(joint, designs);
+  design_[joint] = std::move(designs[joint]);
   own_moments_[joint] = own_moments(joint, own_rows_[joint]);
+}
+
+void Fitter::set_designs(std::vector<JointFit> designs) {
+  std::vector<Eigen::MatrixXd> rows(joints());
+  parallel_for(joints(), [&](std::size_t j) { rows[j] = own_rows(j, designs); });
+  own_rows_ = std::move(rows);
+  design_ = std::move(designs);
+  parallel_for(joints(), [&](std::size_t j) { own_moments_[j] = own_moments(j, own_rows_[j]); });
 }
 
 Eigen::VectorXd Fitter::ridge_of(const JointFit& design, double ridge, Eigen::Index count) {
@@ -512,7 +524,9 @@ std::vector<Judgement> Fitter::held_out() const { return judged(0, joints(), cur
 
 std::vector<Judgement> Fitter::held_out_with(std::size_t joint, const JointFit& candidate,
                                              const std::vector<double>& ridges) const {
-  const Own own = own_moments(joint, own_rows(joint, candidate));
+  std::vector<JointFit> designs_with = design_;
+  designs_with[joint] = candidate;
+  const Own own = own_moments(joint, own_rows(joint, designs_with));
   JointFit design = candidate;
   std::vector<const Own*> all = current();
   std::vector<const JointFit*> used = designs();

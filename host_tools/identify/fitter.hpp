@@ -72,6 +72,7 @@ class Fitter {
   /// `logs` must outlive the fitter and its copies.
   /// @throws DataError: a joint that never moves, fewer rows than parameters.
   Fitter(const Robot& robot, const std::vector<ProcessedLog>& logs, std::vector<JointFit> design);
+  Fitter(const Robot& robot, std::vector<ProcessedLog>&& logs, std::vector<JointFit> design) = delete;
 
   std::size_t joints() const { return design_.size(); }
   const BaseSet& base() const { return data_->base; }
@@ -82,11 +83,15 @@ class Fitter {
   const std::string& gate() const { return data_->split.kind; }
 
   void set_design(std::size_t joint, JointFit design);
+  /// Of all joints, in parallel.
+  void set_designs(std::vector<JointFit> designs);
   /// The torque columns are this far ahead of the motion (FilterFit::torque_lead_s).
   /// `filtered`: filtered_torque(), which does not change with the lead.
   void set_torque_lead(double seconds, const std::vector<Eigen::MatrixXd>& filtered);
   std::vector<Eigen::MatrixXd> filtered_torque() const;
   double torque_lead_s() const { return torque_lead_s_; }
+  /// Of all logs.
+  Eigen::Index rows() const { return data_->load_rows.front().size(); }
 
   /// Effects whose columns are, on the train rows, sums of base columns and of the effects before them (relative 1e-5):
   /// these logs can't tell them apart.
@@ -160,7 +165,7 @@ class Fitter {
   };
   using Own = std::vector<OwnMoments>;  ///< by block
 
-  Eigen::MatrixXd own_rows(std::size_t joint, const JointFit& design) const;
+  Eigen::MatrixXd own_rows(std::size_t joint, const std::vector<JointFit>& designs) const;
   /// But for what the torque enters.
   void make_base_moments(std::size_t joint);
   void project_torque(std::size_t joint);
@@ -188,6 +193,7 @@ class Fitter {
   std::shared_ptr<const Data> data_;
   std::vector<JointFit> design_;
   double torque_lead_s_ = 0;
+  bool robust_ = false;                                 ///< row weights are Huber's
   std::vector<Eigen::VectorXd> torque_rows_;            ///< per joint, without known loads
   std::vector<Eigen::VectorXd> row_weights_;            ///< per joint and row
   std::vector<std::vector<BaseMoments>> base_moments_;  ///< [joint][block]

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -322,6 +323,10 @@ FlexibleJoint identify_joint(const JointData& data, const IdentifiedModel& model
 }  // namespace
 
 std::vector<FlexibleJoint> identify_flexible(const FlexibleInput& input) {
+  const bool any = std::any_of(input.logs.begin(), input.logs.end(), [](const ProcessedLog& log) {
+    return std::find(log.has_link.begin(), log.has_link.end(), true) != log.has_link.end();
+  });
+  if (!any) return {};
   IdentifiedModel rigid = input.model;
   for (JointFit& joint : rigid.joints) {
     joint.effects.clear();

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 
 #include "host_tools/error.hpp"
 #include "host_tools/files.hpp"
@@ -18,8 +19,10 @@ namespace {
 constexpr double worth_keeping = 0.02;
 /// A standard deviation that stands for this share of rated torque is worth a note.
 constexpr double worrying_error = 0.1;
+/// Of the rows at the drive's limit there is nothing to learn from.
+constexpr double most_saturated = 0.5;
 /// Of all logs together.
-constexpr Eigen::Index most_rows = 120'000;
+constexpr double most_rows = 60'000;
 
 std::vector<double> geometric(double from, double to, int count) {
   std::vector<double> values;
@@ -63,6 +66,7 @@ struct Scales {
 
 /// The joint's design with the motor that it shares with a neighbour, at the best of neighbours, directions and widths.
 Candidate search_coupling(const Fitter& fitter, std::size_t joint, std::string_view effect, const Scales& scales) {
+  if (fitter.joints() < 2) throw InputError(fmt::format("effect '{}' needs a second joint", effect));
   const bool motor = effect == MotorCoupling::name;
   const double now = fitter.held_out()[joint].rmse;
   Candidate best{fitter.design(joint), {}};
@@ -110,43 +114,60 @@ Candidate search_effect(const Fitter& fitter, std::size_t joint, std::string_vie
   return search(fitter, joint, design, from, to, [](JointFit& d, double value) { d.effects.back().shape[0] = value; });
 }
 
-/// Sum over the joints of the logarithm of the held-out error: what all joints share is judged by.
-double overall(const std::vector<Judgement>& judgements) {
-  double sum = 0;
-  for (const Judgement& j : judgements) sum += std::log(std::max(j.rmse, 1e-300));
-  return sum / static_cast<double>(judgements.size());
+/// Logarithm of each joint's held-out error.
+Eigen::VectorXd logarithms(const std::vector<Judgement>& judgements) {
+  Eigen::VectorXd out(static_cast<Eigen::Index>(judgements.size()));
+  for (std::size_t j = 0; j < judgements.size(); ++j)
+    out[static_cast<Eigen::Index>(j)] = std::log(std::max(judgements[j].rmse, 1e-300));
+  return out;
 }
 
 /// How far the torque column is ahead of the motion, one number for all joints: a grid within a fifth of a period of
-/// the torque cut-off on either side, then parabolas through the best three. Kept where the mean held-out error falls
-/// by the share that an effect has to bring; one number for all joints does not overfit, so blocks of one log ask for
-/// no more.
+/// the torque cut-off on either side, at most 10 ms, then parabolas through the best three, by the mean logarithm of
+/// the held-out error. Hysteresis and other missing physics look like a lag too, but like another one on every joint,
+/// so a lead is kept only where, against none, the mean falls by the share that an effect has to bring, the best point
+/// is not at the end of the grid, and at least four joints in five gain that much and would choose nearly the same lead
+/// (within a fifth) for themselves. One number for all joints does not overfit, so blocks of one log ask for no more.
 void find_torque_lead(Fitter& fitter, double cutoff_hz) {
-  const double before = overall(fitter.held_out()), start = fitter.torque_lead_s();
+  constexpr int half = 6;
   const std::vector<Eigen::MatrixXd> torque = fitter.filtered_torque();
   const auto judge = [&](double lead) {
     fitter.set_torque_lead(lead, torque);
-    return overall(fitter.held_out());
+    return logarithms(fitter.held_out());
   };
-  constexpr int half = 6;
-  double step = 0.2 / cutoff_hz / half, best_lead = start, best = before;
+  const Eigen::VectorXd none = judge(0);
+  const double grid = std::min(0.2 / cutoff_hz, 0.010) / half;
+  Eigen::VectorXd best = none, own = none, own_lead = Eigen::VectorXd::Zero(none.size());
+  double best_lead = 0;
+  const auto attempt = [&](double lead) {
+    const Eigen::VectorXd value = judge(lead);
+    for (Eigen::Index j = 0; j < value.size(); ++j) {
+      if (value[j] >= own[j]) continue;
+      own[j] = value[j];
+      own_lead[j] = lead;
+    }
+    if (value.mean() < best.mean()) {
+      best = value;
+      best_lead = lead;
+    }
+    return value.mean();
+  };
   for (int k = -half; k <= half; ++k) {
-    const double lead = k * step, value = judge(lead);
-    if (value < best) {
-      best = value;
-      best_lead = lead;
-    }
+    if (k != 0) attempt(k * grid);
   }
-  for (int round = 0; round < 4; ++round, step /= 3) {
-    const double below = judge(best_lead - step), above = judge(best_lead + step);
-    const double bend = below - 2 * best + above;
-    const double lead = best_lead + (bend > 0 ? std::clamp(0.5 * (below - above) / bend, -1.0, 1.0) * step : 0);
-    if (const double value = judge(lead); value < best) {
-      best = value;
-      best_lead = lead;
-    }
+  const bool at_end = std::fabs(best_lead) > (half - 0.5) * grid;
+  double step = grid;
+  for (int round = 0; round < 4 && !at_end; ++round, step /= 3) {
+    const double centre = best_lead, middle = best.mean();
+    const double below = attempt(centre - step), above = attempt(centre + step), bend = below - 2 * middle + above;
+    if (bend > 0) attempt(centre + std::clamp(0.5 * (below - above) / bend, -1.0, 1.0) * step);
   }
-  fitter.set_torque_lead(best < before + std::log(1 - worth_keeping) ? best_lead : start, torque);
+  const double worth = -std::log(1 - worth_keeping);
+  Eigen::Index agree = 0;
+  for (Eigen::Index j = 0; j < none.size(); ++j)
+    agree += none[j] - best[j] > worth && std::fabs(own_lead[j] - best_lead) < 0.2 * std::fabs(best_lead) + 0.1 * grid;
+  const bool keep = !at_end && (none - best).mean() > worth && 5 * agree >= 4 * none.size();
+  fitter.set_torque_lead(keep ? best_lead : 0, torque);
 }
 
 }  // namespace
@@ -175,7 +196,10 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
   ProcessSettings settings;
   settings.torque_limits = project.limits.torque;
   // Enough rows for any fit of a few hundred unknowns; a long log is decimated more.
-  settings.most_rows = most_rows / static_cast<Eigen::Index>(logs.size());
+  // At one interval for all logs, so that their noise is alike from row to row.
+  double seconds = 0;
+  for (const Log& log : logs) seconds += log.step_s * static_cast<double>(log.samples());
+  settings.shortest_interval_s = seconds / most_rows;
   for (Log& log : logs) {
     if (log.resampled) {
       data.notes.push_back(
@@ -290,6 +314,15 @@ std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progres
   }
   progress.stage("building the regressor", 1);
   auto fitter = std::make_unique<Fitter>(project.robot, data.logs, design);
+  const std::vector<Eigen::Index> saturated = fitter->saturated_rows();
+  for (std::size_t j = 0; j < n; ++j) {
+    const double share = static_cast<double>(saturated[j]) / static_cast<double>(fitter->rows());
+    if (share < most_saturated) continue;
+    throw DataError(fmt::format(
+        "torque of joint {} ({}) is at its limit for {:.0f} % of the logs: record with less load or speed, or "
+        "check torque_gain",
+        j + 1, project.robot.joints[j].name, 100 * share));
+  }
   for (const Suspicion& suspicion : check_plausible(project.robot, data.logs, design)) {
     if (suspicion.severity == Severity::error) throw DataError(suspicion.text);
     data.notes.push_back(suspicion.text);
@@ -328,18 +361,25 @@ std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progres
     if (find_effect(effect)->shape.empty()) continue;
     improve("shape of " + effect, true, [&](std::size_t j) { return search_effect(*fitter, j, effect, scales[j]); });
   }
-  // A torque that is not aligned hides effects, and missing effects hide that it is not: twice where it was found late.
-  for (double lead = 1e300; !optional.empty() && fitter->torque_lead_s() != lead;) {
-    const auto align = [&] {
-      if (project.signals.torque_lead_s) return;
-      progress.stage("is the torque ahead of the motion?", 1);
-      find_torque_lead(*fitter, data.filter.torque_cutoff_hz);
-      if (weighted) fitter->reweight();
-      progress.step();
-    };
-    if (lead == 1e300) align();
-    lead = fitter->torque_lead_s();
+  // A torque that is not aligned hides effects, and missing effects look like one that is not: effects first, then
+  // again where that changed something.
+  const auto align = [&] {
+    if (project.signals.torque_lead_s) return;
+    progress.stage("is the torque ahead of the motion?", 1);
+    find_torque_lead(*fitter, data.filter.torque_cutoff_hz);
+    if (weighted) fitter->reweight();
+    progress.step();
+  };
+  const auto applies = [&](std::string_view effect) { return n > 1 || !find_effect(effect)->needs_peers; };
+  const auto effects = [&] {
+    std::size_t count = 0;
+    for (std::size_t j = 0; j < n; ++j) count += fitter->design(j).effects.size();
+    return count;
+  };
+  for (int round = 0; round < 2; ++round) {
+    const std::size_t before = effects();
     for (const std::string_view effect : optional) {
+      if (!applies(effect)) continue;
       improve("is there " + std::string(effect) + "?", false, [&](std::size_t j) {
         return fitter->design(j).find(effect) != nullptr ? Candidate{fitter->design(j), {}}
                                                          : search_effect(*fitter, j, effect, scales[j]);
@@ -347,17 +387,27 @@ std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progres
     }
     fitter->polish();
     if (weighted) fitter->reweight();
+    const bool was_aligned = fitter->torque_lead_s() != 0;
     align();
+    if (effects() == before && was_aligned == (fitter->torque_lead_s() != 0)) break;
   }
   progress.stage("widths and distances", 1);
   fitter->polish();
   weigh(*fitter, project.identify);
   progress.step();
   progress.done();
+  for (std::size_t j = 0; j < n; ++j) {
+    std::string found;
+    for (const std::string_view effect : optional) {
+      if (fitter->design(j).find(effect) != nullptr) found += (found.empty() ? "" : ", ") + std::string(effect);
+    }
+    if (!found.empty())
+      data.notes.push_back(fmt::format("joint {} ({}): found {}", j + 1, project.robot.joints[j].name, found));
+  }
   if (fitter->torque_lead_s() != 0) {
     data.notes.push_back(fmt::format(
-        "the torque column is {:.2f} ms ahead of the motion: taken into account ([signals] torque_lead_s overrides)",
-        1e3 * fitter->torque_lead_s()));
+        "the torque column is {:.2f} ms {} the motion: taken into account ([signals] torque_lead_s overrides)",
+        1e3 * std::fabs(fitter->torque_lead_s()), fitter->torque_lead_s() > 0 ? "ahead of" : "behind"));
   }
   return fitter;
 }
@@ -371,7 +421,9 @@ double condition_number(const Eigen::MatrixXd& information) {
   const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scale.asDiagonal() * information * scale.asDiagonal(),
                                                               Eigen::EigenvaluesOnly);
-  return std::sqrt(solver.eigenvalues().maxCoeff() / std::max(solver.eigenvalues().minCoeff(), 1e-300));
+  return solver.eigenvalues().minCoeff() > 1e-15
+             ? std::sqrt(solver.eigenvalues().maxCoeff() / solver.eigenvalues().minCoeff())
+             : std::numeric_limits<double>::infinity();
 }
 
 /// The weighted squared residual of a row: 1 for weights of one over the variance.
@@ -387,7 +439,10 @@ Estimate finish_model(const Fitter& fitter, const Project& project, const GateDa
   Solution solution = fitter.fit();
   const NormalEquations equations = fitter.normal_equations();
   out.condition = condition_number(equations.information);
-  if (settings.method == "rls") {
+  // A BLS's ridge has no place in the recursion.
+  bool trained = false;
+  for (std::size_t j = 0; j < fitter.joints(); ++j) trained |= fitter.design(j).bls.has_value();
+  if (settings.method == "rls" && !trained) {
     out.recursion = fitter.recursive(settings.forgetting, 200);
     solution.beta = out.recursion->solution.beta;
     solution.theta = out.recursion->solution.theta;
@@ -427,8 +482,19 @@ Estimate finish_model(const Fitter& fitter, const Project& project, const GateDa
   model.project = project.file.filename().string();
   model.project_hash = fxdyn::project_hash(project);
   model.logs = data.references;
-  for (const FlexibleJoint& joint : identify_flexible({model, data.logs})) {
+  model.notes = data.notes;
+  // on the logs that fit
+  std::vector<ProcessedLog> train;
+  for (const ProcessedLog& log : data.logs) {
+    if (log.role == Role::train && log.qlink.size() > 0) train.push_back(log);
+  }
+  for (const FlexibleJoint& joint : identify_flexible({model, train})) {
     model.joints[joint.joint].flexible = joint;
+    const Joint& place = project.robot.joints[joint.joint];
+    model.notes.push_back(joint.found ? fmt::format("joint {} ({}): stiffness {:.4g} +- {:.2g} {}/{}", joint.joint + 1,
+                                                    place.name, joint.stiffness, joint.stiffness_std,
+                                                    place.torque_unit(), place.position_unit())
+                                      : fmt::format("joint {} ({}): {}", joint.joint + 1, place.name, joint.note));
     if (joint.found) model.joints[joint.joint].effects.push_back(elasticity_effect(joint));
   }
   return out;

@@ -77,7 +77,8 @@ Rows build_rows(const IdentifiedModel& model, const DhChain& chain, const Proces
     const JointSeries series{motion.q.col(j), motion.dq.col(j), motion.ddq.col(j), {}, log.step_s};
     full[at].col(ten) = effect_columns(Coulomb::name, {}, model.joints[at].sign_width, series);
     full[at].col(ten + 1) = effect_columns(Offset::name, {}, model.joints[at].sign_width, series);
-    rows.columns.push_back(log.decimate(log.filter_columns(full[at])));
+    rows.columns.push_back(
+        log.decimate(log.filter_columns(at_other_times(full[at], model.filter.torque_lead_s / log.step_s))));
     full[at].resize(0, 0);
     rows.missing.emplace_back(missing.col(j));
   }

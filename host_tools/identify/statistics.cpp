@@ -17,6 +17,9 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+/// Widths and distances that no joint has: what the catalogue's bounds leave.
+constexpr double smallest_shape = 1e-8, largest_shape = 1e3;
+
 /// Whether the shape can be an unknown of the fit: a width or a distance, not an index or a count.
 bool is_continuous(const ParameterInfo& shape) {
   return shape.quantity == Quantity::inverse_velocity || shape.quantity == Quantity::inverse_path;
@@ -44,16 +47,17 @@ double median(VectorXd values) {
 
 MatrixXd Fitter::shape_rows(std::size_t joint, const VectorXd& theta) const {
   constexpr double step = 1e-3;
-  JointFit design = design_[joint];
+  std::vector<JointFit> designs = design_;
+  JointFit& design = designs[joint];
   if (design.bls) return MatrixXd(torque_rows_[joint].size(), 0);
   const auto shapes = unknown_shapes(design);
   MatrixXd out(torque_rows_[joint].size(), static_cast<Index>(shapes.size()));
   for (std::size_t s = 0; s < shapes.size(); ++s) {
     const double value = *shapes[s];
     *shapes[s] = value * (1 + step);
-    const VectorXd more = own_rows(joint, design) * theta;
+    const VectorXd more = own_rows(joint, designs) * theta;
     *shapes[s] = value * (1 - step);
-    out.col(static_cast<Index>(s)) = (more - own_rows(joint, design) * theta) / (2 * step);
+    out.col(static_cast<Index>(s)) = (more - own_rows(joint, designs) * theta) / (2 * step);
     *shapes[s] = value;
   }
   return out;
@@ -126,15 +130,16 @@ void Fitter::polish() {
         if (designs[j].bls) continue;
         const auto shapes = unknown_shapes(designs[j]);
         for (std::size_t s = 0; s < shapes.size(); ++s)
-          *shapes[s] *= std::exp(step[all.offset[j] - all.offset[0] + static_cast<Index>(s)]);
+          *shapes[s] = std::clamp(*shapes[s] * std::exp(step[all.offset[j] - all.offset[0] + static_cast<Index>(s)]),
+                                  smallest_shape, largest_shape);
       }
-      parallel_for(joints(), [&](std::size_t j) { set_design(j, designs[j]); });
+      set_designs(std::move(designs));
       solution = solve(normal_equations());
       square = weighted_square(solution);
       better = square < old;
     }
     if (!better) {
-      parallel_for(joints(), [&](std::size_t j) { set_design(j, before[j]); });
+      set_designs(before);
       return;
     }
     if (square > 0.999 * old) return;
@@ -229,9 +234,12 @@ void Fitter::add_standard_deviations(Solution& solution) const {
   std::vector<std::optional<NoiseOfJoint>> noise(joints());
   std::vector<std::vector<Index>> columns(joints());  // of each joint, among all unknowns
   std::vector<MatrixXd> middles(joints());
+  std::vector<double> bread(joints(), 1.0);
   double train_rows = 0;
   for (std::size_t l = 0; l < logs().size(); ++l)
     train_rows += logs()[l].role == Role::train ? static_cast<double>(logs()[l].rows()) : 0;
+  // What the fit takes does not show where there are a few hundred rows a parameter.
+  const bool correcting = train_rows < 300 * static_cast<double>(p);
   parallel_for(joints(), [&](std::size_t j) {
     const Index first = data_->first_base[j], nb = solution.beta.size(), own = own_rows_[j].cols();
     for (Index c = first; c < nb; ++c) columns[j].push_back(c);
@@ -239,39 +247,49 @@ void Fitter::add_standard_deviations(Solution& solution) const {
     for (Index c = 0; c < shapes[j].cols(); ++c) columns[j].push_back(all.offset[j] + c);
     const VectorXd e = residual(j, solution);
     std::vector<Stretch> stretches;
-    double rows = 0;
+    double rows = 0, weights = 0;
+    Index untouched = 0;
     for (std::size_t l = 0; l < logs().size(); ++l) {
       if (logs()[l].role != Role::train) continue;
       const Index from = data_->first_row[l], count = logs()[l].rows();
-      const auto usable = data_->usable[j].segment(from, count);
+      const auto usable = data_->usable[j].segment(from, count), weight = row_weights_[j].segment(from, count);
+      // Huber's weights belong to the residual (psi = w e), those of age to the rows; rows that are not used have no
+      // noise.
       Stretch s{RowMajor(count, static_cast<Index>(columns[j].size())),
-                row_weights_[j].segment(from, count).cwiseProduct(e.segment(from, count))};
+                (robust_ ? weight : usable).cwiseProduct(e.segment(from, count))};
       s.x << data_->base_rows[j].middleRows(from, count), own_rows_[j].middleRows(from, count),
           shapes[j].middleRows(from, count);
-      // rows that are not used have no noise; Huber's weights are in the residual already
-      s.x = usable.asDiagonal() * s.x;
+      s.x = (robust_ ? usable : weight).asDiagonal() * s.x;
       rows += usable.sum();
+      weights += weight.sum();
+      untouched += (weight.array() >= 1).count();
       stretches.push_back(std::move(s));
     }
+    // The bread of Huber's sandwich is psi' (1 for rows that are not cut, else 0) where the information has w.
+    if (robust_ && untouched > 0) bread[j] = weights / static_cast<double>(untouched);
     noise[j].emplace(std::move(stretches), weights_[static_cast<Index>(j)], rows, lags);
     middles[j] = noise[j]->middle();
+    if (!correcting) noise[j].reset();  // a long log's rows are not held for all joints
   });
   const MatrixXd inverse = SymmetricSolver(all.information).inverse();
   const auto sandwich = [&] {
     MatrixXd middle = MatrixXd::Zero(p, p);
-    for (std::size_t j = 0; j < joints(); ++j) middle(columns[j], columns[j]) += middles[j];
+    for (std::size_t j = 0; j < joints(); ++j) middle(columns[j], columns[j]) += bread[j] * bread[j] * middles[j];
     return MatrixXd(inverse * middle * inverse);
   };
   MatrixXd covariance = sandwich();
-  // What the fit takes does not show where there are a few hundred rows a parameter.
-  for (int round = 0; round < 2 && train_rows < 1000 * static_cast<double>(p); ++round) {
+  for (int round = 0; round < 2 && correcting; ++round) {
     parallel_for(joints(), [&](std::size_t j) {
       noise[j]->correct(inverse(columns[j], columns[j]), covariance(columns[j], columns[j]));
       middles[j] = noise[j]->middle();
     });
     covariance = sandwich();
   }
-  const VectorXd std = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  // The taper may leave a variance that is next to nothing below zero: then that of independent rows.
+  VectorXd std = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  for (Index k = 0; k < p; ++k) {
+    if (!(covariance(k, k) > 0)) std[k] = std::sqrt(std::max(0.0, inverse(k, k)));
+  }
   solution.covariance = covariance.topLeftCorner(linear.offset.back(), linear.offset.back());
   solution.beta_std = std.head(solution.beta.size());
   solution.theta_std.clear();
@@ -294,15 +312,27 @@ void Fitter::add_standard_deviations(Solution& solution) const {
 
 void Fitter::reweight_rows() {
   constexpr double efficient = 1.345;  // Huber 1964: 95 % efficiency
+  robust_ = true;
   reweight();
   for (int round = 0; round < 8; ++round) {
     const Solution solution = solve(normal_equations());
     parallel_for(joints(), [&](std::size_t j) {
       const VectorXd magnitude = residual(j, solution).cwiseAbs();
-      const double scale = 1.4826 * median(magnitude);
+      std::vector<double> judged;
+      for (std::size_t l = 0; l < logs().size(); ++l) {
+        for (Index k = data_->first_row[l]; k < data_->first_row[l] + logs()[l].rows(); ++k)
+          if (logs()[l].role == Role::train && data_->usable[j][k] > 0) judged.push_back(magnitude[k]);
+      }
+      if (judged.empty()) return;
+      const double scale =
+          1.4826 * median(Eigen::Map<const VectorXd>(judged.data(), static_cast<Index>(judged.size())));
       if (!(scale > 0)) return;
-      row_weights_[j] =
-          data_->usable[j].cwiseProduct((efficient * scale / magnitude.array().max(1e-300)).min(1.0).matrix());
+      row_weights_[j] = data_->usable[j];
+      for (std::size_t l = 0; l < logs().size(); ++l) {
+        if (logs()[l].role != Role::train) continue;  // what judges is not touched
+        for (Index k = data_->first_row[l]; k < data_->first_row[l] + logs()[l].rows(); ++k)
+          row_weights_[j][k] *= std::min(1.0, efficient * scale / std::max(magnitude[k], 1e-300));
+      }
       make_base_moments(j);
       own_moments_[j] = own_moments(j, own_rows_[j]);
       project_torque(j);

@@ -210,7 +210,9 @@ class Rows {
     table.columns.resize(layout_.names.size());
     // Columns that grow are held twice for a moment: room for as many rows as the first one says, and some more.
     const std::string_view rest = lines.rest();
-    const std::size_t row = std::max<std::size_t>(1, std::min(rest.find('\n'), rest.size()));
+    LineReader ahead(rest);
+    std::string_view first;
+    const std::size_t row = ahead.next(first) ? first.size() + 1 : rest.size() + 1;
     for (auto& column : table.columns) column.reserve(rest.size() / row * 21 / 20 + 16);
     double previous = -std::numeric_limits<double>::infinity();
     std::string_view line;
@@ -224,9 +226,9 @@ class Rows {
       }
       if (count++ == 0) table.first_t = t;
       previous = table.last_t = t;
+      file.release(line.data());
       if (t < from || t >= to) continue;
       for (std::size_t c = 0; c < values_.size(); ++c) table.columns[c].push_back(values_[c]);
-      file.release(line.data());
     }
     if (count < 2) throw InputError(fmt::format("{}:{}: fewer than 2 rows of data", file_, lines.number()));
     return table;

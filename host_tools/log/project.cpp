@@ -237,7 +237,7 @@ class ProjectReader {
   void read_excite(Table& table) {
     ExciteSettings& excite = project_.excite;
     set(excite.period_s, table.find("period_s"), as_positive);
-    set(excite.order, table.find("order"), between(2, 50));
+    set(excite.order, table.find("order"), between(2, 20));
     set(excite.trajectories, table.find("trajectories"), between(1, 100));
     if (const auto noise = table.find("noise")) {
       excite.noise =
@@ -259,6 +259,7 @@ class ProjectReader {
                                      excite.period_s / (10 * excite.order)));
     }
     const double samples = excite.period_s / excite.step_s;
+    if (samples > 1e6) table.place().fail(fmt::format("{:.3g} samples a period: expected at most a million", samples));
     if (std::fabs(samples - std::round(samples)) > 1e-6 * samples) {
       table.place().fail(
           fmt::format("period_s of {} s is no multiple of step_s, {} s", excite.period_s, excite.step_s));

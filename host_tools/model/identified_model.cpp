@@ -294,7 +294,8 @@ json to_json(const IdentifiedModel& model) {
                 {"encoder_step", model.filter.encoder_step},
                 {"position_noise", model.filter.position_noise}}},
               {"log_formats", log_formats},
-              {"logs", logs}};
+              {"logs", logs},
+              {"notes", model.notes}};
   if (model.formats) {
     out["formats"] = formats_json(*model.formats);
     out["tables_crc"] = model.tables_crc;
@@ -340,6 +341,7 @@ IdentifiedModel read_model(const std::filesystem::path& file) {
                                  format.at("torque_gain").get<std::vector<double>>()};
     }
     model.stage = j.at("stage");
+    model.notes = j.value("notes", std::vector<std::string>{});
     if (j.contains("formats")) {
       model.formats = to_formats(j.at("formats"));
       model.tables_crc = j.at("tables_crc");

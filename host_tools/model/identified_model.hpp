@@ -96,6 +96,7 @@ struct IdentifiedModel {
   std::uint64_t seed = 1;
   std::string project, project_hash;
   std::vector<LogReference> logs;
+  std::vector<std::string> notes;    ///< what a reader should know of data and fit
   std::string stage = "identified";  ///< or "trained"
   /// Of the exported tables; a stage that changes the model drops them.
   std::optional<Formats> formats;

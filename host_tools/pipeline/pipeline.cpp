@@ -105,6 +105,11 @@ void Pipeline::finish(const Fitter& fitter, Stage stage, const json& training) {
   Estimate estimate = finish_model(fitter, project_, data());
   progress_.step();
   IdentifiedModel& model = estimate.model;
+  if (stage == Stage::identified) data().notes = model.notes;
+  if (const std::string weak = weak_note(estimate.weak, project_.robot); stage == Stage::identified && !weak.empty()) {
+    data().notes.push_back(weak);
+    model.notes.push_back(weak);
+  }
   model.stage = stage == Stage::trained ? "trained" : "identified";
   // The same structure with less: what friction and BLS are worth is seen on the same logs.
   const auto reduced = [&](bool friction) {
@@ -134,7 +139,7 @@ void Pipeline::finish(const Fitter& fitter, Stage stage, const json& training) {
       {"schema", "fxdyn.metrics/1"}, {"gate", fitter.gate()},         {"base_parameters", fitter.base().columns.size()},
       {"notes", data().notes},       {"logs", stages.back()["logs"]}, {"stages", stages}};
   metrics["method"] = project_.identify.method;
-  metrics["condition_number"] = estimate.condition;
+  metrics["condition_number"] = std::isfinite(estimate.condition) ? json(estimate.condition) : json(nullptr);
   metrics["weak_parameters"] = json::array();
   for (const WeakParameter& one : estimate.weak) {
     metrics["weak_parameters"].push_back(
@@ -155,8 +160,6 @@ void Pipeline::finish(const Fitter& fitter, Stage stage, const json& training) {
   write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
   if (stage == Stage::identified) {
     for (const std::string& note : data().notes) fmt::print(stderr, "note: {}\n", note);
-    if (const std::string weak = weak_note(estimate.weak, project_.robot); !weak.empty())
-      fmt::print(stderr, "note: {}\n", weak);
   }
 }
 
@@ -188,6 +191,7 @@ void Pipeline::train() {
   // Always from the file: `fxdyn run` gives the same bytes as the verbs one by one.
   IdentifiedModel identified = read_model(file);
   for (JointFit& joint : identified.joints) joint.bls.reset();
+  data().notes = identified.notes;
   const auto fitter = fitter_from(identified);
   json training = json::array();
   if (project_.train.enabled) {

@@ -16,6 +16,7 @@
 #include "host_tools/model/effects.hpp"
 #include "host_tools/model/evaluator.hpp"
 #include "host_tools/random.hpp"
+#include "tests/support/sanitizers.hpp"
 
 namespace fxdyn {
 namespace {
@@ -212,6 +213,7 @@ std::vector<MatrixXd> noisy(std::uint64_t seed, std::vector<MatrixXd> torques) {
 }
 
 TEST(Sight, TheDetectionLimitIsWhatSimulatedExperimentsShow) {
+  if (test::sanitized) GTEST_SKIP() << "statistics of many runs";
   constexpr double step = 0.005;
   const std::vector<Motion> motions{fourier(1, 10, 1, step), fourier(3, 10, 0.15, step)};
   const Sight sight = judge(motions);
@@ -271,6 +273,7 @@ TEST(Sight, TheDetectionLimitIsWhatSimulatedExperimentsShow) {
 }
 
 TEST(Sight, TheLimitWithABaselineIsThatOfTwoSessionsFittedTogether) {
+  if (test::sanitized) GTEST_SKIP() << "statistics of many runs";
   constexpr double step = 0.005;
   const std::vector<Motion> motions{fourier(1, 10, 1, step), fourier(3, 10, 0.15, step)};
   const Sight sight = judge(motions);

@@ -14,6 +14,7 @@
 #include "host_tools/simulate/simulate.hpp"
 #include "tests/support/files.hpp"
 #include "tests/support/filter.hpp"
+#include "tests/support/sanitizers.hpp"
 
 namespace fxdyn {
 namespace {
@@ -78,7 +79,8 @@ IdentifiedModel identified(const Robot& robot, const ProcessedLog& log) {
       design[j].effects.push_back(fit);
     }
   }
-  Fitter fitter(robot, {log}, design);
+  const std::vector<ProcessedLog> logs{log};
+  Fitter fitter(robot, logs, design);
   fitter.reweight();
   return fitter.to_model(fitter.fit());
 }
@@ -107,6 +109,7 @@ Log noisy(const Log& exact, const IdentifiedModel& plant, int bits, std::uint64_
 constexpr const char* exact_sensors = "link_encoders = [1, 2, 3, 4, 5]";
 
 TEST(Flexible, StiffnessDampingAndRotorOfASimulatedRobotOverThirtySeeds) {
+  if (test::sanitized) GTEST_SKIP() << "statistics of many runs";
   // 40 s, 20-bit encoders, torque noise of 1 %, everything identified from the log.
   const Log exact = read(play("seeds", exact_sensors));
   const IdentifiedModel plant = truth();
