@@ -303,6 +303,7 @@ MatrixXd predict(const IdentifiedModel& model, const ProcessedLog& log) {
     const MotionRows motion = log.motion(from, count);
     predictor(motion.q, motion.dq, motion.ddq, tau.middleRows(from, count));
   }
+  if (model.filter.torque_lead_s == 0) return tau;
   return at_other_times(tau, model.filter.torque_lead_s / log.step_s);
 }
 

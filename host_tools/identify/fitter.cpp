@@ -46,37 +46,31 @@ Eigen::Index own_count(const JointFit& design) {
 
 }  // namespace
 
-Eigen::MatrixXd design_columns(const JointFit& design, const JointSeries& series) {
-  Eigen::MatrixXd columns(series.q.size(), own_count(design));
-  Eigen::Index at = 0;
-  const auto append = [&](const Eigen::MatrixXd& part) {
-    columns.middleCols(at, part.cols()) = part;
-    at += part.cols();
-  };
-  for (const EffectFit& fit : design.effects) append(effect_columns(fit.effect, fit.shape, design.sign_width, series));
-  if (design.bls) append(bls_columns(*design.bls, design.sign_width, series));
-  return columns;
+namespace {
+
+/// Effects that need other joints' motion, without memory of their own: in blocks, as those motions are large.
+Eigen::MatrixXd rows_with_peers(const ProcessedLog& log, std::size_t joint, const EffectFit& fit,
+                                const std::vector<JointFit>& designs) {
+  const EffectInfo& info = *find_effect(fit.effect);
+  Eigen::MatrixXd out(log.rows(), static_cast<Eigen::Index>(info.linear.size()));
+  for (const RowBlock& block : row_blocks(log)) {
+    MotionRows motion = log.motion(block.begin, block.samples);
+    const auto j = static_cast<Eigen::Index>(joint);
+    JointSeries series{motion.q.col(j), motion.dq.col(j), motion.ddq.col(j), {}, log.step_s};
+    series.peers_sign.resize(motion.dq.rows(), motion.dq.cols());
+    for (std::size_t k = 0; k < designs.size(); ++k) {
+      const auto peer = static_cast<Eigen::Index>(k);
+      series.peers_sign.col(peer) = (motion.dq.col(peer) / designs[k].sign_width).array().tanh();
+    }
+    series.peers_dq = std::move(motion.dq);
+    series.peers_ddq = std::move(motion.ddq);
+    out.middleRows(block.row, block.rows) =
+        block.filter_and_keep(log, effect_columns(fit.effect, fit.shape, designs[joint].sign_width, series));
+  }
+  return out;
 }
 
-JointSeries joint_series(const ProcessedLog& log, std::size_t joint, const std::vector<JointFit>& designs) {
-  const auto j = static_cast<Eigen::Index>(joint);
-  MotionRows motion = log.joint_motion(j);
-  JointSeries series{motion.q, motion.dq, motion.ddq, {}, log.step_s};
-  for (const EffectFit& fit : designs[joint].effects) {
-    if (!find_effect(fit.effect)->needs_peers) continue;
-    // the one that its first shape names; nobody looks at the others
-    const auto peer = static_cast<std::size_t>(fit.shape[0]) - 1;
-    const auto k = static_cast<Eigen::Index>(peer);
-    for (Eigen::MatrixXd* all : {&series.peers_dq, &series.peers_sign, &series.peers_ddq}) {
-      if (all->size() == 0) all->setZero(log.samples(), log.q.cols());
-    }
-    const MotionRows other = log.joint_motion(k);
-    series.peers_sign.col(k) = (other.dq / designs[peer].sign_width).array().tanh();
-    series.peers_dq.col(k) = other.dq;
-    series.peers_ddq.col(k) = other.ddq;
-  }
-  return series;
-}
+}  // namespace
 
 Fitter::Fitter(const Robot& robot, const std::vector<ProcessedLog>& logs, std::vector<JointFit> design)
     : design_(std::move(design)) {
@@ -210,7 +204,7 @@ Fitter::Fitter(const Robot& robot, const std::vector<ProcessedLog>& logs, std::v
   own_moments_.resize(joints());
   torque_rows_.resize(joints());
   parallel_for(joints(), [&](std::size_t j) { make_base_moments(j); });
-  set_torque_lead(logs.front().filter.torque_lead_s, filtered_torque());
+  set_torque_lead(logs.front().filter.torque_lead_s);
   set_designs(design_);
 }
 
@@ -223,10 +217,12 @@ std::vector<Eigen::MatrixXd> Fitter::filtered_torque() const {
 void Fitter::set_torque_lead(double seconds, const std::vector<Eigen::MatrixXd>& filtered) {
   torque_lead_s_ = seconds;
   parallel_for(joints(), [&](std::size_t j) {
+    const auto k = static_cast<Eigen::Index>(j);
     torque_rows_[j].resize(data_->load_rows[j].size());
     for (std::size_t l = 0; l < logs().size(); ++l) {
       const ProcessedLog& log = logs()[l];
-      const auto tau = filtered[l].col(static_cast<Eigen::Index>(j));
+      const Eigen::MatrixXd tau =
+          filtered.empty() ? log.filter_columns(log.tau.col(k)) : Eigen::MatrixXd(filtered[l].col(k));
       torque_rows_[j].segment(data_->first_row[l], log.rows()) =
           log.decimate(at_other_times(tau, -seconds / log.step_s));
     }
@@ -270,7 +266,8 @@ Eigen::MatrixXd Fitter::own_rows(std::size_t joint, const std::vector<JointFit>&
   Eigen::MatrixXd out(data_->load_rows[joint].size(), own_count(design));
   for (std::size_t l = 0; l < logs().size(); ++l) {
     const ProcessedLog& log = logs()[l];
-    const JointSeries series = joint_series(log, joint, designs);
+    MotionRows motion = log.joint_motion(static_cast<Eigen::Index>(joint));
+    const JointSeries series{std::move(motion.q), std::move(motion.dq), std::move(motion.ddq), {}, log.step_s};
     Eigen::Index at = 0;
     const auto fill = [&](Eigen::Index count, auto&& rows) {
       out.block(data_->first_row[l], at, log.rows(), count) = rows();
@@ -283,6 +280,7 @@ Eigen::MatrixXd Fitter::own_rows(std::size_t joint, const std::vector<JointFit>&
         fill(count, [&] { return own_rows_[joint].block(data_->first_row[l], kept[e], log.rows(), count); });
       } else {
         fill(count, [&] {
+          if (find_effect(fit.effect)->needs_peers) return rows_with_peers(log, joint, fit, designs);
           return log.decimate(log.filter_columns(effect_columns(fit.effect, fit.shape, design.sign_width, series)));
         });
       }

@@ -86,8 +86,8 @@ class Fitter {
   /// Of all joints, in parallel.
   void set_designs(std::vector<JointFit> designs);
   /// The torque columns are this far ahead of the motion (FilterFit::torque_lead_s).
-  /// `filtered`: filtered_torque(), which does not change with the lead.
-  void set_torque_lead(double seconds, const std::vector<Eigen::MatrixXd>& filtered);
+  /// `filtered`: filtered_torque(), which does not change with the lead; made here if it is empty.
+  void set_torque_lead(double seconds, const std::vector<Eigen::MatrixXd>& filtered = {});
   std::vector<Eigen::MatrixXd> filtered_torque() const;
   double torque_lead_s() const { return torque_lead_s_; }
   /// Of all logs.
@@ -201,11 +201,5 @@ class Fitter {
   std::vector<Own> own_moments_;                        ///< [joint][block]
   Eigen::VectorXd weights_;
 };
-
-/// phi of all a joint's columns at full rate: its effects in order, then the BLS.
-Eigen::MatrixXd design_columns(const JointFit& design, const JointSeries& series);
-
-/// One joint's inputs over a log, with its peers' motion where an effect of the design needs it.
-JointSeries joint_series(const ProcessedLog& log, std::size_t joint, const std::vector<JointFit>& designs);
 
 }  // namespace fxdyn

@@ -23,6 +23,8 @@ constexpr double worrying_error = 0.1;
 constexpr double most_saturated = 0.5;
 /// Of all logs together.
 constexpr double most_rows = 60'000;
+/// Samples from which on memory counts more than time.
+constexpr Eigen::Index long_logs = 1'500'000;
 
 std::vector<double> geometric(double from, double to, int count) {
   std::vector<double> values;
@@ -200,6 +202,9 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
   double seconds = 0;
   for (const Log& log : logs) seconds += log.step_s * static_cast<double>(log.samples());
   settings.shortest_interval_s = seconds / most_rows;
+  Eigen::Index samples = 0;
+  for (const Log& log : logs) samples += log.samples();
+  most_threads = samples > long_logs ? 1 : ~std::size_t{0};
   for (Log& log : logs) {
     if (log.resampled) {
       data.notes.push_back(

@@ -169,7 +169,7 @@ std::unique_ptr<Fitter> Pipeline::fitter_from(const IdentifiedModel& model) {
   for (JointFit& joint : design)
     std::erase_if(joint.effects, [](const EffectFit& fit) { return fit.effect == Elasticity::name; });
   auto fitter = std::make_unique<Fitter>(project_.robot, data().logs, design);
-  fitter->set_torque_lead(model.filter.torque_lead_s, fitter->filtered_torque());
+  fitter->set_torque_lead(model.filter.torque_lead_s);
   weigh(*fitter, project_.identify);
   return fitter;
 }
