@@ -99,6 +99,8 @@ class JointData {
   /// load, and so the fit. Their correlations are not known here.
   Eigen::MatrixXd from_load(const LeastSquares& fit, const IdentifiedModel& model, Regressor regressor) const {
     const auto count = static_cast<Eigen::Index>(model.base.size());
+    // A model that was not identified (a simulated plant) has no deviations.
+    if (count == 0) return Eigen::MatrixXd::Zero(fit.x.cols(), fit.x.cols());
     Eigen::MatrixXd moved = Eigen::MatrixXd::Zero(fit.x.cols(), count);
     Eigen::RowVectorXd load(count);
     Eigen::Index row = 0;
