@@ -79,7 +79,7 @@ TEST(ClosedLoop, AppliedTorqueIsThatOfTheModelOnItsMotion) {
   const MatrixXd applied = filter.apply(run.tau), expected = filter.apply(model);
   for (Eigen::Index j = 0; j < 6; ++j) {
     const double error = test::rms(applied.col(j) - expected.col(j));
-    EXPECT_LT(error, 0.02 * test::rms(expected.col(j))) << "joint " << j + 1;
+    EXPECT_LT(error, 0.01 * test::rms(expected.col(j))) << "joint " << j + 1;
   }
 }
 
@@ -97,7 +97,7 @@ TEST(ClosedLoop, RigidBodyMovesAsMuJoCos) {
     const MatrixXd theirs = closed_loop_on_mujoco(plant, reference, settings).q;
     EXPECT_GT(test::rms(ours - reference.q), 0.02) << "the controller holds the robot, so nothing is compared";
     // theirs is of first order in its step of 0.125 ms
-    EXPECT_LT(test::rms(ours - theirs), 0.01 * test::rms(ours - reference.q)) << "seed " << seed;
+    EXPECT_LT(test::rms(ours - theirs), 0.001 * test::rms(ours - reference.q)) << "seed " << seed;
   }
 }
 
@@ -107,7 +107,7 @@ TEST(ClosedLoop, StepSizeDoesNotMatter) {
   ClosedLoopSettings coarse, fine;
   fine.substeps = 32;
   const ClosedLoopRun a = run_closed_loop(plant, reference, coarse), b = run_closed_loop(plant, reference, fine);
-  EXPECT_LT(test::rms(a.q - b.q), 0.02 * test::rms(b.q - reference.q));
+  EXPECT_LT(test::rms(a.q - b.q), 0.005 * test::rms(b.q - reference.q));
 }
 
 TEST(ClosedLoop, AModelThatCantMoveIsRefused) {
