@@ -15,25 +15,9 @@ using Eigen::MatrixXd;
 
 constexpr double smallest_gap = 5e-4;  ///< share of rated torque
 
-bool drifts(const IdentifiedModel& model) {
-  for (const JointFit& joint : model.joints) {
-    if (joint.find("friction_drift") != nullptr) return true;
-  }
-  return false;
-}
-
-/// The model's torque over a log that begins `before_s` after the session did. The robot stands still until then: drift
-/// runs on, and everything else stays at rest.
-MatrixXd torque_of(const IdentifiedModel& model, const Log& log, double before_s) {
-  Predictor predictor(model, log.step_s);
-  if (drifts(model)) {
-    const auto rows = static_cast<Index>(std::llround(before_s / log.step_s));
-    const MatrixXd still = MatrixXd::Zero(rows, log.q.cols());
-    MatrixXd ignored(rows, log.q.cols());
-    predictor(log.q.row(0).replicate(rows, 1), still, still, ignored);
-  }
-  MatrixXd torque(log.q.rows(), log.q.cols());
-  predictor(log.q, log.dq, log.ddq, torque);
+/// The model's torque over a log that begins `age_s` after the session did: drift has run on until then.
+MatrixXd torque_of(const IdentifiedModel& model, const Log& log, double age_s) {
+  const MatrixXd torque = predict(model, log.q, log.dq, log.ddq, log.step_s, nullptr, age_s);
   if (model.filter.torque_lead_s == 0) return torque;
   return at_other_times(torque, model.filter.torque_lead_s / log.step_s);
 }

@@ -72,21 +72,18 @@ Session healthy_session(const Case& wanted) {
   return session;
 }
 
-/// Keys of `fxdyn simulate` that this version has.
-constexpr bool extended = false;
-
 std::string to_toml(const Session& s) {
   std::string text = fmt::format("seed = {}\nplant = \"{}\"\n", s.seed, s.mujoco ? "mujoco" : "internal");
-  if (extended) text += fmt::format("motion = \"{}\"\n", s.closed_loop ? "closed_loop" : "prescribed");
+  text += fmt::format("motion = \"{}\"\n", s.closed_loop ? "closed_loop" : "prescribed");
   text += fmt::format(
       "[robot]\nurdf = \"{}\"\ngravity = [0.0, 0.0, -9.81]\nrated_torque = [{:.6f}]\nacceleration = [{:.6f}]\n\n",
       s.urdf, fmt::join(s.robot->rated_torque, ", "), fmt::join(s.robot->acceleration, ", "));
   text += fmt::format("[sensors]\nsample_s = {}\n", s.sample_s);
-  if (extended) text += fmt::format("start_s = {:.6f}\n", s.clock_s);
+  text += fmt::format("start_s = {:.6f}\n", s.clock_s);
   if (s.exact_motion) text += "exact_motion = true\n";
   if (s.noise) {
     text += "encoder_bits = 17\ntorque_noise = 0.01\n";
-    if (extended) text += fmt::format("ar_noise = 0.003\nar_pole = {:.6f}\n", s.ar_pole);
+    text += fmt::format("ar_noise = 0.003\nar_pole = {:.6f}\n", s.ar_pole);
     if (s.link_encoders) text += "link_encoders = \"all\"\nlink_encoder_bits = 19\n";
   }
   for (std::size_t j = 0; j < s.viscous.size(); ++j) {
@@ -100,7 +97,7 @@ std::string to_toml(const Session& s) {
     text += fmt::format(
         "\n[[log]]\nname = \"{}\"\nduration_s = {:.6f}\nperiod_s = {:.6f}\nspeed = {:.6f}\norder = {}\nseed = {}\n",
         log.name, log_duration_s, log.period_s, log.speed, log.order, log.seed);
-    if (extended) text += fmt::format("start_s = {:.6f}\n", log.start_s);
+    text += fmt::format("start_s = {:.6f}\n", log.start_s);
   }
   return text;
 }
