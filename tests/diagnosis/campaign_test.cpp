@@ -108,16 +108,22 @@ TEST(Campaign, WhatIsOutsideTheCatalogueIsAddedToLogAndTruth) {
 // A change that friction can take entirely is hidden; one of its own kind of torque is not.
 TEST(Campaign, VisibilityIsToldBeforehand) {
   const Plan plan = plan_case(case_of("stribeck", 0.006), test::folder() / "visible").plan;
-  const Motion& motion = plan.motions.front();
   const double rated = plan.healthy.joints[0].rated_torque;
-  MatrixXd change = MatrixXd::Zero(motion.q.rows(), motion.q.cols());
-  change.col(0) = 0.01 * rated / plan.largest_velocity[0] * motion.dq.col(0);
-  EXPECT_EQ(to_string(expect(plan, {change}, {}, 0, true, {})), "hidden");
-  change.col(0) = 0.01 * rated * (20 * motion.q.col(0).array()).sin();
-  EXPECT_EQ(to_string(expect(plan, {change}, {"ripple"}, 0, true, {})), "visible");
-  // tau = q: a spring, and nothing else of the catalogue; under another name the spring is the rival
-  change.col(0) = 0.01 * rated * motion.q.col(0);
-  const Expected unnamed = expect(plan, {change}, {}, 0, true, {});
+  const auto expected = [&](auto&& torque, const std::vector<std::string>& names) {
+    std::vector<MatrixXd> change;
+    for (const Motion& motion : plan.motions) {
+      change.emplace_back(MatrixXd::Zero(motion.q.rows(), motion.q.cols()));
+      change.back().col(0) = 0.01 * rated * torque(motion).matrix();
+    }
+    return expect(plan, change, names, 0, true, {});
+  };
+  const auto viscous = [&](const Motion& m) { return (m.dq.col(0) / plan.largest_velocity[0]).array().eval(); };
+  EXPECT_EQ(to_string(expected(viscous, {})), "hidden");
+  const auto ripple = [](const Motion& m) { return (20 * m.q.col(0).array()).sin().eval(); };
+  EXPECT_EQ(to_string(expected(ripple, {"ripple"})), "visible");
+  // a spring, and nothing else of the catalogue; under another name the spring is the rival
+  const auto spring = [](const Motion& m) { return m.q.col(0).array().eval(); };
+  const Expected unnamed = expected(spring, {});
   EXPECT_EQ(to_string(unnamed), "ambiguous");
   EXPECT_EQ(unnamed.rival, "spring");
 }

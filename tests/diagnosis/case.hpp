@@ -21,11 +21,11 @@ const std::vector<TestRobot>& test_robots();
 
 /// An effect that a case asks for. What is not given is drawn from the case's seed.
 struct Wanted {
-  std::string effect;                ///< of the catalogue, or of outside_effects()
-  double share = 0;                  ///< RMS of the torque change at the joint that feels it most, share of rated
+  std::string effect;                  ///< of the catalogue, or of outside_effects()
+  double share = 0;                    ///< RMS of the torque change at the joint that feels it most, share of rated
   std::optional<std::size_t> joint{};  ///< from 0
-  bool same_joint_as_first = false;  ///< second of a pair
-  double deflection = 0;             ///< > 0: scaled to this RMS deflection [rad | m] instead of to `share`
+  bool same_joint_as_first = false;    ///< second of a pair
+  double deflection = 0;               ///< > 0: scaled to this RMS deflection [rad | m] instead of to `share`
 };
 
 enum class Group {

@@ -5,7 +5,6 @@
 
 #include "host_tools/error.hpp"
 #include "host_tools/model/effects.hpp"
-#include "host_tools/model/evaluator.hpp"
 
 namespace fxdyn::campaign {
 namespace {
@@ -46,7 +45,7 @@ std::vector<MatrixXd> deflections(const Plan& plan, const IdentifiedModel& model
   std::vector<MatrixXd> all;
   for (const Motion& motion : plan.motions) {
     MatrixXd deflection;
-    predict(model, motion.q, motion.dq, motion.ddq, motion.step_s, &deflection);
+    torque_of(model, motion, &deflection);
     all.push_back(deflection);
   }
   return all;

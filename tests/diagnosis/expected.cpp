@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "host_tools/excite/effect_information.hpp"
 #include "host_tools/identify/regressor.hpp"
@@ -15,24 +16,42 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index stride = 2;  ///< rows of the plan that are used
+constexpr double row_s = 0.01;  ///< one row of these stands for so much of the plan
 
-/// Columns of all joints one above the other, each joint in its noise.
+/// Columns of all joints and motions one above the other, each joint in its noise.
 class Stack {
  public:
-  Stack(Index samples, VectorXd sigma) : samples_(samples), sigma_(std::move(sigma)) {}
-  Index rows() const { return samples_ * sigma_.size(); }
-  void put(Eigen::Ref<MatrixXd> to, Index joint, const MatrixXd& columns) const {
-    to.middleRows(joint * samples_, samples_) = columns(Eigen::seqN(0, samples_, stride), Eigen::all) / sigma_[joint];
+  Stack(const Plan& plan, const NoiseLevel& noise) : stride_(stride(plan)) {
+    for (const Motion& motion : plan.motions) samples_.push_back((motion.q.rows() - 1) / stride_ + 1);
+    // One row stands for so many samples of the log.
+    const double weight = std::sqrt(plan.motions.front().step_s * static_cast<double>(stride_) / noise.step_s);
+    sigma_.resize(static_cast<Index>(plan.joints()));
+    for (Index j = 0; j < sigma_.size(); ++j)
+      sigma_[j] = noise.per_sample() * plan.healthy.joints[static_cast<std::size_t>(j)].rated_torque / weight;
+  }
+  Index rows() const { return std::accumulate(samples_.begin(), samples_.end(), Index{0}) * sigma_.size(); }
+  void put(Eigen::Ref<MatrixXd> to, std::size_t motion, Index joint, const MatrixXd& columns) const {
+    const Index before =
+        std::accumulate(samples_.begin(), samples_.begin() + static_cast<std::ptrdiff_t>(motion), Index{0});
+    to.middleRows(before * sigma_.size() + joint * samples_[motion], samples_[motion]) =
+        columns(Eigen::seqN(0, samples_[motion], stride_), Eigen::all) / sigma_[joint];
   }
 
  private:
-  Index samples_;
+  static Index stride(const Plan& plan) {
+    return std::max<Index>(1, static_cast<Index>(std::llround(row_s / plan.motions.front().step_s)));
+  }
+  Index stride_;
+  std::vector<Index> samples_;
   VectorXd sigma_;
 };
 
 std::vector<std::pair<EffectCandidate, std::string>> rivals(const Plan& plan, const std::vector<std::string>& names,
-                                                            std::size_t joint, const RobotColumns& columns) {
+                                                            std::size_t joint) {
+  std::vector<MatrixXd> structural;
+  IdentifiedModel rigid = plan.healthy;
+  for (JointFit& fit : rigid.joints) fit.effects.clear();
+  for (const Motion& motion : plan.motions) structural.push_back(torque_of(rigid, motion));
   std::vector<std::pair<EffectCandidate, std::string>> list;
   for (const EffectInfo& info : effect_infos()) {
     const std::string name(info.name);
@@ -40,41 +59,41 @@ std::vector<std::pair<EffectCandidate, std::string>> rivals(const Plan& plan, co
     if (nominal || std::find(names.begin(), names.end(), name) != names.end()) continue;
     // A sine of one chosen wavenumber explains no other effect; free ones would have to be searched.
     if (name == "ripple") continue;
-    for (const auto& shape :
-         typical_shapes(name, joint, plan.healthy.robot, plan.motions, {columns.torque()}, {columns.structural()}))
+    for (const auto& shape : typical_shapes(name, joint, plan.healthy.robot, plan.motions, plan.torque, structural))
       list.push_back({{name, joint, shape}, name});
   }
   return list;
 }
 
 /// All that identification is free to move.
-MatrixXd nuisance(const Plan& plan, const Motion& motion, bool baseline, const Stack& stack) {
+MatrixXd nuisance(const Plan& plan, bool baseline, const Stack& stack) {
   const auto n = static_cast<Index>(plan.joints());
   const DhChain chain = to_dh(plan.healthy.robot);
   const BaseSet base = baseline ? BaseSet{} : find_base(chain);
   const auto base_size = static_cast<Index>(base.columns.size());
   const Index own = baseline ? 3 : 4;
   MatrixXd all = MatrixXd::Zero(stack.rows(), base_size + own * n);
-  if (!baseline) {
-    Regressor regressor(chain);
+  Regressor regressor(chain);
+  for (std::size_t m = 0; m < plan.motions.size(); ++m) {
+    const Motion& motion = plan.motions[m];
     std::vector<MatrixXd> rows(plan.joints(), MatrixXd(motion.q.rows(), base_size));
-    for (Index k = 0; k < motion.q.rows(); ++k) {
+    for (Index k = 0; k < motion.q.rows() && base_size > 0; ++k) {
       const MatrixXd& y = regressor(motion.q.row(k), motion.dq.row(k), motion.ddq.row(k));
       for (Index j = 0; j < n; ++j) {
         for (Index c = 0; c < base_size; ++c)
           rows[static_cast<std::size_t>(j)](k, c) = y(j, base.columns[static_cast<std::size_t>(c)]);
       }
     }
-    for (Index j = 0; j < n; ++j) stack.put(all.leftCols(base_size), j, rows[static_cast<std::size_t>(j)]);
-  }
-  for (Index j = 0; j < n; ++j) {
-    MatrixXd friction(motion.q.rows(), own);
-    const double width = plan.healthy.joints[static_cast<std::size_t>(j)].sign_width;
-    friction.col(0) = motion.dq.col(j);
-    friction.col(1) = (motion.dq.col(j).array() / width).tanh();
-    friction.col(2).setOnes();
-    if (!baseline) friction.col(3) = motion.ddq.col(j);
-    stack.put(all.middleCols(base_size + own * j, own), j, friction);
+    for (Index j = 0; j < n; ++j) {
+      if (base_size > 0) stack.put(all.leftCols(base_size), m, j, rows[static_cast<std::size_t>(j)]);
+      MatrixXd friction(motion.q.rows(), own);
+      const double width = plan.healthy.joints[static_cast<std::size_t>(j)].sign_width;
+      friction.col(0) = motion.dq.col(j);
+      friction.col(1) = (motion.dq.col(j).array() / width).tanh();
+      friction.col(2).setOnes();
+      if (!baseline) friction.col(3) = motion.ddq.col(j);
+      stack.put(all.middleCols(base_size + own * j, own), m, j, friction);
+    }
   }
   return all;
 }
@@ -100,47 +119,31 @@ double NoiseLevel::per_sample() const {
 
 Expected expect(const Plan& plan, const std::vector<MatrixXd>& change, const std::vector<std::string>& names,
                 std::size_t joint, bool baseline, const NoiseLevel& noise) {
-  const Motion& motion = plan.motions.front();
-  const Index samples = (motion.q.rows() - 1) / stride + 1;
+  const Stack stack(plan, noise);
   const auto n = static_cast<Index>(plan.joints());
-  VectorXd sigma(n);
-  // One row stands for so many samples of the log.
-  const double weight = std::sqrt(motion.step_s * static_cast<double>(stride) / noise.step_s);
-  for (Index j = 0; j < n; ++j)
-    sigma[j] = noise.per_sample() * plan.healthy.joints[static_cast<std::size_t>(j)].rated_torque / weight;
-  const Stack stack(samples, sigma);
-
-  const RobotColumns columns(plan.healthy, motion);
-  const auto candidates = rivals(plan, names, joint, columns);
-  std::vector<EffectColumns> full;
-  std::vector<Index> first;
-  Index width = 1;
-  for (const auto& [candidate, name] : candidates) {
-    full.push_back(columns(candidate));
-    first.push_back(width);
-    for (const MatrixXd& c : full.back().joints) {
-      if (c.size() == 0) continue;
-      width += c.cols();
-      break;
-    }
-  }
-  first.push_back(width);
-  MatrixXd all = MatrixXd::Zero(stack.rows(), width);
-  for (Index j = 0; j < n; ++j) stack.put(all.leftCols(1), j, change.front().col(j));
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    for (Index j = 0; j < n; ++j) {
-      const MatrixXd& c = full[i].joints[static_cast<std::size_t>(j)];
-      if (c.size() > 0) stack.put(all.middleCols(first[i], c.cols()), j, c);
+  const auto candidates = rivals(plan, names, joint);
+  std::vector<Index> first{1};
+  for (const auto& [candidate, name] : candidates)
+    first.push_back(first.back() + static_cast<Index>(column_names(name, JointType::revolute).size()));
+  MatrixXd all = MatrixXd::Zero(stack.rows(), first.back());
+  for (std::size_t m = 0; m < plan.motions.size(); ++m) {
+    for (Index j = 0; j < n; ++j) stack.put(all.leftCols(1), m, j, change[m].col(j));
+    const RobotColumns columns(plan.healthy, plan.motions[m]);
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      const EffectColumns full = columns(candidates[i].first);
+      for (Index j = 0; j < n; ++j) {
+        const MatrixXd& c = full.joints[static_cast<std::size_t>(j)];
+        if (c.size() > 0) stack.put(all.middleCols(first[i], c.cols()), m, j, c);
+      }
     }
   }
   const double before = all.col(0).norm();
-  project_out(nuisance(plan, motion, baseline, stack), all);
+  project_out(nuisance(plan, baseline, stack), all);
 
   Expected expected;
   expected.chi = expected.rival_chi = all.col(0).norm();
   expected.share = before > 0 ? expected.chi / before : 0;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
-    if (first[i + 1] == first[i]) continue;
     MatrixXd left = all.leftCols(1);
     project_out(all.middleCols(first[i], first[i + 1] - first[i]), left);
     if (left.norm() >= expected.rival_chi) continue;

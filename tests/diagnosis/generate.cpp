@@ -37,29 +37,13 @@ std::vector<SessionLog> measured_logs(const Case& wanted) {
   return logs;
 }
 
-/// All logs one after the other: effects with a memory of the session keep it.
-Motion joined(const std::vector<fs::path>& files, const Robot& robot) {
-  Motion motion;
-  std::vector<Log> logs;
-  Index rows = 0;
+std::vector<Motion> motions_of(const std::vector<fs::path>& files, const Robot& robot) {
+  std::vector<Motion> motions;
   for (const fs::path& file : files) {
-    logs.push_back(read_exact(file, robot));
-    rows += logs.back().samples();
+    Log log = read_exact(file, robot);
+    motions.push_back({file.stem().string(), log.step_s, log.t, log.q, log.dq, log.ddq});
   }
-  motion.name = "train";
-  motion.step_s = logs.front().step_s;
-  const auto n = static_cast<Index>(robot.size());
-  motion.t.resize(rows);
-  motion.q = motion.dq = motion.ddq = Eigen::MatrixXd(rows, n);
-  Index at = 0;
-  for (const Log& log : logs) {
-    motion.t.segment(at, log.samples()) = log.t;
-    motion.q.middleRows(at, log.samples()) = log.q;
-    motion.dq.middleRows(at, log.samples()) = log.dq;
-    motion.ddq.middleRows(at, log.samples()) = log.ddq;
-    at += log.samples();
-  }
-  return motion;
+  return motions;
 }
 
 /// Joints in random order, those asked for first.
@@ -76,13 +60,15 @@ std::vector<std::size_t> joints_to_try(const Wanted& wanted, std::optional<std::
 bool load_reverses(const Plan& plan, std::size_t joint) {
   IdentifiedModel rigid = plan.healthy;
   for (JointFit& fit : rigid.joints) fit.effects.clear();
-  Plan of_rigid = plan;
-  for (Eigen::MatrixXd& torque : of_rigid.torque) torque.setZero();
   const auto j = static_cast<Index>(joint);
-  const Eigen::ArrayXd torque = torque_change(of_rigid, rigid).front().col(j);
-  const double positive = (torque > 0.1 * plan.largest_structural[j]).cast<double>().mean();
-  const double negative = (torque < -0.1 * plan.largest_structural[j]).cast<double>().mean();
-  return std::min(positive, negative) > 0.1;
+  double positive = 0, negative = 0, samples = 0;
+  for (const Motion& motion : plan.motions) {
+    const Eigen::ArrayXd torque = torque_of(rigid, motion).col(j);
+    positive += static_cast<double>((torque > 0.1 * plan.largest_structural[j]).count());
+    negative += static_cast<double>((torque < -0.1 * plan.largest_structural[j]).count());
+    samples += static_cast<double>(torque.size());
+  }
+  return std::min(positive, negative) > 0.1 * samples;
 }
 
 std::pair<std::optional<std::size_t>, EffectFit> find(const Wanted& wanted, std::optional<std::size_t> first,
@@ -164,13 +150,16 @@ Session measured_session(const Case& wanted, const Ground& ground) {
   return session;
 }
 
-/// Logs into `data`, everything that tells how they were made into `truth`.
-void part(const fs::path& made, const fs::path& data, const fs::path& truth) {
+/// Logs into `data`, everything that tells how they were made into `truth`; the plant as SESSION.json.
+void part(const std::string& session, const fs::path& made, const fs::path& data, const fs::path& truth) {
   fs::create_directories(data);
   for (const auto& entry : fs::directory_iterator(made)) {
     const std::string name = entry.path().filename().string();
     const bool log = name.ends_with(".csv") && !name.ends_with(".truth.csv");
-    fs::rename(entry.path(), (log ? data : truth) / name);
+    if (log)
+      fs::rename(entry.path(), data / name);
+    else
+      fs::rename(entry.path(), truth / (name == "truth.json" ? session + ".json" : name));
   }
   fs::remove_all(made);
 }
@@ -221,11 +210,13 @@ json truth_json(const Case& wanted, const Ground& ground) {
     ++at;
   }
   for (const Outside& outside : ground.outside) {
-    Eigen::MatrixXd change =
-        Eigen::MatrixXd::Zero(ground.plan.torque.front().rows(), ground.plan.torque.front().cols());
-    change.col(static_cast<Index>(outside.joint)) = outside_torque(outside, ground.plan.motions.front());
+    std::vector<Eigen::MatrixXd> change;
+    for (const Motion& motion : ground.plan.motions) {
+      change.emplace_back(Eigen::MatrixXd::Zero(motion.q.rows(), motion.q.cols()));
+      change.back().col(static_cast<Index>(outside.joint)) = outside_torque(outside, motion);
+    }
     add({{"effect", outside.effect}, {"joint", outside.joint + 1}, {"outside", true}, {"other", outside.other + 1}},
-        {change}, outside.joint, "", wanted.effects[at]);
+        change, outside.joint, "", wanted.effects[at]);
     ++at;
   }
   return out;
@@ -242,13 +233,19 @@ Ground plan_case(const Case& wanted, const fs::path& folder) {
   session.exact_motion = true;
   session.mujoco = session.closed_loop = session.link_encoders = false;
   session.clock_s = 0;
-  session.sample_s = 0.005;
+  // Torques of gears that bend are second derivatives: they need the log's own steps.
+  bool bends = false;
+  for (const Wanted& one : wanted.effects) {
+    const EffectInfo* info = find_effect(one.effect);
+    bends |= info != nullptr && info->acts_on == ActsOn::position;
+  }
+  session.sample_s = bends ? 0.002 : 0.005;
   session.logs = recording("train", motion_seed(wanted, 1), 0);
   const auto files = play(session, folder / "plan.toml", folder / "plan");
   const IdentifiedModel healthy = read_model(folder / "plan" / "truth.json");
 
   Ground ground;
-  ground.plan = make_plan(healthy, {joined(files, healthy.robot)});
+  ground.plan = make_plan(healthy, motions_of(files, healthy.robot));
   fs::remove_all(folder / "plan");
   Random random(wanted.seed * 7919 + 11);
   for (const Wanted& one : wanted.background) {
@@ -291,7 +288,7 @@ void generate(const Case& wanted, const fs::path& data, const fs::path& truth) {
     session.logs = recording("baseline", motion_seed(wanted, 0), 0);
     for (const fs::path& file : play(session, truth / "baseline.toml", made))
       logs.emplace_back(file.filename().string(), "baseline");
-    part(made, data, truth);
+    part("baseline", made, data, truth);
   }
   Session session = measured_session(wanted, ground);
   session.exact_motion = !ground.outside.empty();  // their torque needs it
@@ -300,7 +297,7 @@ void generate(const Case& wanted, const fs::path& data, const fs::path& truth) {
     const std::string name = file.filename().string();
     logs.emplace_back(name, name.substr(0, name.find('_')));
   }
-  part(made, data, truth);
+  part("measured", made, data, truth);
 
   if (!ground.effects.empty() && ground.outside.empty()) {
     session.noise = false;

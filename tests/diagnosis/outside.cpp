@@ -35,7 +35,8 @@ Outside draw_outside(const std::string& effect, std::size_t joint, const Plan& p
   const auto j = static_cast<Index>(joint), k = static_cast<Index>(outside.other);
   outside.velocity = plan.largest_velocity[j];
   outside.other_velocity = plan.largest_velocity[k];
-  outside.acceleration = plan.motions.front().ddq.col(j).cwiseAbs().maxCoeff();
+  for (const Motion& motion : plan.motions)
+    outside.acceleration = std::max(outside.acceleration, motion.ddq.col(j).cwiseAbs().maxCoeff());
   outside.low = plan.range(j, 0);
   outside.high = plan.range(j, 1);
   outside.other_low = plan.range(k, 0);

@@ -9,6 +9,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+MatrixXd torque_of(const IdentifiedModel& model, const Motion& motion, MatrixXd* deflections) {
+  return predict(model, motion.q, motion.dq, motion.ddq, motion.step_s, deflections, motion.t[0]);
+}
+
 Plan make_plan(const IdentifiedModel& healthy, std::vector<Motion> motions) {
   Plan plan;
   plan.healthy = healthy;
@@ -20,8 +24,8 @@ Plan make_plan(const IdentifiedModel& healthy, std::vector<Motion> motions) {
   plan.range = MatrixXd(n, 2);
   for (std::size_t m = 0; m < plan.motions.size(); ++m) {
     const Motion& motion = plan.motions[m];
-    plan.torque.push_back(predict(healthy, motion.q, motion.dq, motion.ddq, motion.step_s));
-    const MatrixXd structural = predict(rigid, motion.q, motion.dq, motion.ddq, motion.step_s);
+    plan.torque.push_back(torque_of(healthy, motion));
+    const MatrixXd structural = torque_of(rigid, motion);
     const auto raise = [](VectorXd& largest, const MatrixXd& columns) {
       largest = largest.cwiseMax(columns.cwiseAbs().colwise().maxCoeff().transpose());
     };
@@ -43,8 +47,7 @@ IdentifiedModel with_effect(IdentifiedModel model, std::optional<std::size_t> jo
 std::vector<MatrixXd> torque_change(const Plan& plan, const IdentifiedModel& changed) {
   std::vector<MatrixXd> change;
   for (std::size_t m = 0; m < plan.motions.size(); ++m) {
-    const Motion& motion = plan.motions[m];
-    change.emplace_back(predict(changed, motion.q, motion.dq, motion.ddq, motion.step_s) - plan.torque[m]);
+    change.emplace_back(torque_of(changed, plan.motions[m]) - plan.torque[m]);
   }
   return change;
 }

@@ -15,6 +15,9 @@ struct Plan {
 
   std::size_t joints() const { return healthy.joints.size(); }
 };
+/// Torque over a motion that is part of a session: drift has run on until it begins.
+Eigen::MatrixXd torque_of(const IdentifiedModel& model, const Motion& motion, Eigen::MatrixXd* deflections = nullptr);
+
 Plan make_plan(const IdentifiedModel& healthy, std::vector<Motion> motions);
 
 /// The model with one effect more, at a joint or on the body.
