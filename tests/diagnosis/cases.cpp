@@ -76,7 +76,9 @@ void add_mujoco(List& list) {
       const double share = (e + robot) % 3 == 2 ? 0.02 : 0.006;
       Case& one = list.add(Group::mujoco, robot, {{effects[e], share}}, label(effects[e], share));
       one.mujoco = true;
-      one.closed_loop = (e + robot) % 3 == 1;
+      // MuJoCo has these two in prescribed motion only.
+      const bool prescribed_only = effects[e] == "backlash" || effects[e] == "motor_coupling";
+      one.closed_loop = (e + robot) % 3 == 1 && !prescribed_only;
     }
   }
 }

@@ -13,7 +13,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 
 /// A gear that gives more than this is broken in another way, and its column is far from linear.
-constexpr double largest_deflection = 0.02;  // rad, a tenth of it in m
+constexpr double largest_deflection = 0.05;  // rad, a tenth of it in m
 
 double log_uniform(Random& random, double lower, double upper) {
   return lower * std::pow(upper / lower, random.uniform());

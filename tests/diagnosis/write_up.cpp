@@ -285,6 +285,10 @@ std::string write_up(const std::vector<json>& results, const std::string& comman
     const Filter with_effect = [&](const json& r) { return in(r, group) && first_effect(r) != nullptr; };
     text += fmt::format("\n## {}\n\n{}\n{}", title, summary_line(results, with_effect), confusion(results, of_group));
   }
+  text +=
+      "\nSizes on the MuJoCo plant are those of the internal one; its gears and friction differ a little, so that the "
+      "gap "
+      "before holds more than the effect.\n";
   text += "\n## What this recording can't tell apart in principle\n\n" + ambiguous_cases(results);
   text += "\n## Every case that failed\n\n" + failed_cases(results);
   return text;
