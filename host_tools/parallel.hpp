@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
+#include <cstdlib>
 #include <exception>
 #include <mutex>
 #include <thread>
@@ -10,8 +11,16 @@
 
 namespace fxdyn {
 
+/// FXDYN_THREADS: the most threads that a program takes, for users who run several side by side. Anything but a positive
+/// number leaves it open.
+inline std::size_t threads_allowed() {
+  const char* text = std::getenv("FXDYN_THREADS");
+  const unsigned long threads = text != nullptr ? std::strtoul(text, nullptr, 10) : 0;
+  return threads > 0 ? threads : ~std::size_t{0};
+}
+
 /// Long logs are worked on by one thread: each takes memory for its own columns.
-inline std::atomic<std::size_t> most_threads{~std::size_t{0}};
+inline std::atomic<std::size_t> most_threads{threads_allowed()};
 
 /// work(i) for i = 0 .. count-1 on all cores. Each i writes its own result, so the outcome does not depend on the
 /// number of threads. The first exception is thrown again here.

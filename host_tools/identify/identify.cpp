@@ -204,7 +204,7 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
   settings.shortest_interval_s = seconds / most_rows;
   Eigen::Index samples = 0;
   for (const Log& log : logs) samples += log.samples();
-  most_threads = samples > long_logs ? 1 : ~std::size_t{0};
+  most_threads = samples > long_logs ? 1 : threads_allowed();
   for (Log& log : logs) {
     if (log.resampled) {
       data.notes.push_back(

@@ -1,0 +1,314 @@
+#include "tests/diagnosis/generate.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <nlohmann/json.hpp>
+
+#include "host_tools/files.hpp"
+#include "host_tools/log/log.hpp"
+#include "host_tools/model/effects.hpp"
+#include "host_tools/simulate/simulate.hpp"
+#include "tests/diagnosis/truth.hpp"
+
+namespace fxdyn::campaign {
+namespace {
+
+namespace fs = std::filesystem;
+using Eigen::Index;
+using nlohmann::json;
+
+const fs::path source_dir = FXDYN_SOURCE_DIR;
+constexpr double role_duration_s = 4 * log_duration_s;
+
+/// Seeds of the trajectories: no two roles and no two cases share one.
+std::uint64_t motion_seed(const Case& wanted, std::uint64_t role) { return (wanted.seed * 10 + role) * 10; }
+
+/// The session's measured roles, one after the other.
+std::vector<SessionLog> measured_logs(const Case& wanted) {
+  std::vector<SessionLog> logs;
+  double start = 0;
+  std::uint64_t role = 1;
+  for (const char* name : {"train", "validate", "test"}) {
+    for (const SessionLog& log : recording(name, motion_seed(wanted, role), start)) logs.push_back(log);
+    start += role_duration_s;
+    ++role;
+  }
+  return logs;
+}
+
+std::vector<Motion> motions_of(const std::vector<fs::path>& files, const Robot& robot) {
+  std::vector<Motion> motions;
+  for (const fs::path& file : files) {
+    Log log = read_exact(file, robot);
+    motions.push_back({file.stem().string(), log.step_s, log.t, log.q, log.dq, log.ddq});
+  }
+  return motions;
+}
+
+/// Joints in random order, those asked for first.
+std::vector<std::size_t> joints_to_try(const Wanted& wanted, std::optional<std::size_t> first, std::size_t n,
+                                       Random& random) {
+  if (wanted.joint) return {*wanted.joint};
+  if (wanted.same_joint_as_first && first) return {*first};
+  std::vector<std::size_t> joints(n);
+  for (std::size_t j = 0; j < n; ++j) joints[j] = j;
+  for (std::size_t j = n; j > 1; --j) std::swap(joints[j - 1], joints[random.next() % j]);
+  return joints;
+}
+
+bool load_reverses(const Plan& plan, std::size_t joint) {
+  IdentifiedModel rigid = plan.healthy;
+  for (JointFit& fit : rigid.joints) fit.effects.clear();
+  const auto j = static_cast<Index>(joint);
+  double positive = 0, negative = 0, samples = 0;
+  for (const Motion& motion : plan.motions) {
+    const Eigen::ArrayXd torque = torque_of(rigid, motion).col(j);
+    positive += static_cast<double>((torque > 0.1 * plan.largest_structural[j]).count());
+    negative += static_cast<double>((torque < -0.1 * plan.largest_structural[j]).count());
+    samples += static_cast<double>(torque.size());
+  }
+  return std::min(positive, negative) > 0.1 * samples;
+}
+
+std::pair<std::optional<std::size_t>, EffectFit> find(const Wanted& wanted, std::optional<std::size_t> first,
+                                                      const Plan& plan, Random& random) {
+  for (const std::size_t joint : joints_to_try(wanted, first, plan.joints(), random)) {
+    if (plan.healthy.joints[joint].find(wanted.effect) != nullptr) continue;  // the background has it
+    // The play of a gear is seen where the load takes the link from one flank to the other.
+    if (wanted.effect == "backlash" && !load_reverses(plan, joint)) continue;
+    for (int attempt = 0; attempt < 3; ++attempt) {  // another shape may do what this one can't
+      const auto drawn = draw(wanted.effect, joint, plan, random);
+      if (!drawn) break;
+      const auto fit = wanted.deflection > 0 ? scaled_to_deflection(*drawn, wanted.deflection, plan)
+                                             : scaled(*drawn, wanted.share, plan);
+      if (fit) return {drawn->joint, *fit};
+    }
+  }
+  throw NotPossible(fmt::format("no joint of {} gives {} of {}", plan.healthy.robot.name,
+                                wanted.deflection > 0 ? wanted.deflection : wanted.share, wanted.effect));
+}
+
+void change_friction(Session& session, double by, std::uint64_t seed) {
+  Random random(seed * 977 + 5);
+  for (auto* values : {&session.viscous, &session.coulomb}) {
+    for (double& value : *values) value *= 1 + (random.uniform() < 0.5 ? -by : by);
+  }
+}
+
+std::vector<fs::path> play(const Session& session, const fs::path& scenario, const fs::path& out) {
+  write_file(scenario, to_toml(session));
+  return simulate(scenario, out);
+}
+
+json effect_json(std::optional<std::size_t> joint, const EffectFit& fit) {
+  const EffectInfo& info = *find_effect(fit.effect);
+  json parameters;
+  for (std::size_t i = 0; i < info.shape.size(); ++i) parameters[std::string(info.shape[i].name)] = fit.shape[i];
+  for (std::size_t i = 0; i < info.linear.size(); ++i) parameters[std::string(info.linear[i].name)] = fit.linear[i];
+  json out{{"effect", fit.effect}, {"parameters", parameters}};
+  if (joint) out["joint"] = *joint + 1;
+  return out;
+}
+
+/// Adds what the simulator has no name for to the torques of a log, and takes the exact motion out of the file again.
+void add_outside(const std::vector<Outside>& outside, const fs::path& file, const Robot& robot, double clock_s) {
+  Log log = read_exact(file, robot);
+  fs::path truth_file = file;
+  truth_file.replace_extension(".truth.csv");
+  Motion motion{"", log.step_s, log.t.array() - clock_s, log.q, log.dq, log.ddq};
+  Log truth;
+  truth.t = log.t;
+  truth.tau = read_truth(truth_file, robot.size());
+  for (const Outside& effect : outside) {
+    const Eigen::VectorXd torque = outside_torque(effect, motion);
+    log.tau.col(static_cast<Index>(effect.joint)) += torque;
+    truth.tau.col(static_cast<Index>(effect.joint)) += torque;
+  }
+  log.dq.resize(0, 0);
+  log.ddq.resize(0, 0);
+  write_log(file, log);
+  write_log(truth_file, truth);
+}
+
+std::string project_toml(const Case& wanted, const std::vector<std::pair<std::string, std::string>>& logs) {
+  const TestRobot& robot = test_robots()[wanted.robot];
+  std::string text =
+      fmt::format("[robot]\nurdf = \"robot.urdf\"\ngravity = [0.0, 0.0, -9.81]\nrated_torque = [{:.6f}]\n",
+                  fmt::join(robot.rated_torque, ", "));
+  for (const auto& [file, role] : logs) text += fmt::format("\n[[log]]\nfile = \"{}\"\nrole = \"{}\"\n", file, role);
+  return text;
+}
+
+Session measured_session(const Case& wanted, const Ground& ground) {
+  Session session = healthy_session(wanted);
+  session.effects = ground.background;
+  session.effects.insert(session.effects.end(), ground.effects.begin(), ground.effects.end());
+  if (wanted.friction_change > 0) change_friction(session, wanted.friction_change, wanted.seed);
+  session.seed = wanted.seed * 2 + 1;
+  session.logs = measured_logs(wanted);
+  return session;
+}
+
+/// Logs into `data`, everything that tells how they were made into `truth`; the plant as SESSION.json.
+void part(const std::string& session, const fs::path& made, const fs::path& data, const fs::path& truth) {
+  fs::create_directories(data);
+  for (const auto& entry : fs::directory_iterator(made)) {
+    const std::string name = entry.path().filename().string();
+    const bool log = name.ends_with(".csv") && !name.ends_with(".truth.csv");
+    if (log)
+      fs::rename(entry.path(), data / name);
+    else
+      fs::rename(entry.path(), truth / (name == "truth.json" ? session + ".json" : name));
+  }
+  fs::remove_all(made);
+}
+
+json expected_json(const Expected& expected) {
+  return {{"verdict", to_string(expected)},
+          {"chi", expected.chi},
+          {"share", expected.share},
+          {"rival", expected.rival},
+          {"rival_chi", expected.rival_chi}};
+}
+
+/// What the scorer compares with.
+json truth_json(const Case& wanted, const Ground& ground) {
+  const TestRobot& robot = test_robots()[wanted.robot];
+  json out{{"name", wanted.name},
+           {"group", to_string(wanted.group)},
+           {"robot", robot.name},
+           {"plant", wanted.mujoco ? "mujoco" : "internal"},
+           {"seed", wanted.seed},
+           {"closed_loop", wanted.closed_loop},
+           {"baseline", wanted.baseline},
+           {"link_encoders", wanted.link_encoders},
+           {"clock_s", wanted.clock_s},
+           {"friction_change", wanted.friction_change},
+           {"effects", json::array()},
+           {"background", json::array()},
+           {"rated_torque", robot.rated_torque}};
+  for (const auto& [joint, fit] : ground.background) out["background"].push_back(effect_json(joint, fit));
+  const NoiseLevel noise{.pole = healthy_session(wanted).ar_pole};
+  const auto add = [&](json entry, const std::vector<Eigen::MatrixXd>& change, std::optional<std::size_t> joint,
+                       const std::string& name, const Wanted& asked) {
+    Index feels = 0;
+    const Eigen::VectorXd shares = shares_of_rated(ground.plan, change);
+    entry["share"] = shares.maxCoeff(&feels);
+    entry["shares"] = std::vector<double>(shares.data(), shares.data() + shares.size());
+    entry["wanted_share"] = asked.share;
+    if (asked.deflection > 0) entry["wanted_deflection"] = asked.deflection;
+    entry["feels"] = feels + 1;
+    const std::size_t where = joint ? *joint : static_cast<std::size_t>(feels);
+    entry["expected"] = expected_json(expect(ground.plan, change, {name}, where, wanted.baseline, noise));
+    out["effects"].push_back(entry);
+  };
+  std::size_t at = 0;
+  for (const auto& [joint, fit] : ground.effects) {
+    add(effect_json(joint, fit), torque_change(ground.plan, with_effect(ground.plan.healthy, joint, fit)), joint,
+        fit.effect, wanted.effects[at]);
+    ++at;
+  }
+  for (const Outside& outside : ground.outside) {
+    std::vector<Eigen::MatrixXd> change;
+    for (const Motion& motion : ground.plan.motions) {
+      change.emplace_back(Eigen::MatrixXd::Zero(motion.q.rows(), motion.q.cols()));
+      change.back().col(static_cast<Index>(outside.joint)) = outside_torque(outside, motion);
+    }
+    add({{"effect", outside.effect}, {"joint", outside.joint + 1}, {"outside", true}, {"other", outside.other + 1}},
+        change, outside.joint, "", wanted.effects[at]);
+    ++at;
+  }
+  return out;
+}
+
+}  // namespace
+
+Ground plan_case(const Case& wanted, const fs::path& folder) {
+  fs::create_directories(folder);
+  fs::copy_file(source_dir / test_robots()[wanted.robot].urdf, folder / "robot.urdf",
+                fs::copy_options::overwrite_existing);
+  Session session = healthy_session(wanted);
+  session.noise = false;
+  session.exact_motion = true;
+  session.mujoco = session.closed_loop = session.link_encoders = false;
+  session.clock_s = 0;
+  // Torques of gears that bend are second derivatives: they need the log's own steps.
+  bool bends = false;
+  for (const Wanted& one : wanted.effects) {
+    const EffectInfo* info = find_effect(one.effect);
+    bends |= info != nullptr && info->acts_on == ActsOn::position;
+  }
+  session.sample_s = bends ? 0.002 : 0.005;
+  session.logs = recording("train", motion_seed(wanted, 1), 0);
+  const auto files = play(session, folder / "plan.toml", folder / "plan");
+  const IdentifiedModel healthy = read_model(folder / "plan" / "truth.json");
+
+  Ground ground;
+  ground.plan = make_plan(healthy, motions_of(files, healthy.robot));
+  fs::remove_all(folder / "plan");
+  Random random(wanted.seed * 7919 + 11);
+  for (const Wanted& one : wanted.background) {
+    ground.background.push_back(find(one, {}, ground.plan, random));
+    ground.plan =
+        make_plan(with_effect(ground.plan.healthy, ground.background.back().first, ground.background.back().second),
+                  std::move(ground.plan.motions));
+  }
+  ground.measured = ground.plan.healthy;
+  std::optional<std::size_t> first;
+  for (const Wanted& one : wanted.effects) {
+    const auto& names = outside_effects();
+    if (std::find(names.begin(), names.end(), one.effect) != names.end()) {
+      const std::size_t joint = one.joint ? *one.joint : random.next() % ground.plan.joints();
+      Outside outside = draw_outside(one.effect, joint, ground.plan, random.next());
+      scale(outside, one.share, ground.plan);
+      ground.outside.push_back(outside);
+      continue;
+    }
+    const auto [joint, fit] = find(one, first, ground.plan, random);
+    if (!first) first = joint;
+    ground.effects.emplace_back(joint, fit);
+    ground.measured = with_effect(ground.measured, joint, fit);
+  }
+  return ground;
+}
+
+void generate(const Case& wanted, const fs::path& data, const fs::path& truth) {
+  fs::remove_all(data);
+  fs::remove_all(truth);
+  fs::create_directories(data);
+  const Ground ground = plan_case(wanted, truth);
+  std::vector<std::pair<std::string, std::string>> logs;
+  const fs::path made = truth / "made";
+
+  if (wanted.baseline) {
+    Session session = healthy_session(wanted);
+    session.effects = ground.background;
+    session.seed = wanted.seed * 2;
+    session.logs = recording("baseline", motion_seed(wanted, 0), 0);
+    for (const fs::path& file : play(session, truth / "baseline.toml", made))
+      logs.emplace_back(file.filename().string(), "baseline");
+    part("baseline", made, data, truth);
+  }
+  Session session = measured_session(wanted, ground);
+  session.exact_motion = !ground.outside.empty();  // their torque needs it
+  for (const fs::path& file : play(session, truth / "measured.toml", made)) {
+    if (!ground.outside.empty()) add_outside(ground.outside, file, ground.plan.healthy.robot, wanted.clock_s);
+    const std::string name = file.filename().string();
+    logs.emplace_back(name, name.substr(0, name.find('_')));
+  }
+  part("measured", made, data, truth);
+
+  if (!ground.effects.empty() && ground.outside.empty()) {
+    session.noise = false;
+    session.exact_motion = true;
+    session.link_encoders = false;
+    session.logs = recording("test", motion_seed(wanted, 3), 2 * role_duration_s);
+    play(session, truth / "exact.toml", truth / "exact");
+  }
+  fs::copy_file(truth / "robot.urdf", data / "robot.urdf");
+  write_file(data / "project.toml", project_toml(wanted, logs));
+  write_file(truth / "truth.json", truth_json(wanted, ground).dump(1) + "\n");
+}
+
+}  // namespace fxdyn::campaign

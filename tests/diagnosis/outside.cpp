@@ -1,0 +1,96 @@
+#include "tests/diagnosis/outside.hpp"
+
+#include <cmath>
+#include <numbers>
+
+#include "host_tools/error.hpp"
+#include "host_tools/log/log.hpp"
+#include "host_tools/random.hpp"
+
+namespace fxdyn::campaign {
+
+using Eigen::ArrayXd;
+using Eigen::Index;
+using Eigen::VectorXd;
+
+const std::vector<std::string>& outside_effects() {
+  static const std::vector<std::string> names{
+      "other_position",         // sin of another joint's position: a cable pulled along
+      "square_wave",            // of time: a pump, a brake that sticks now and then
+      "slow_wave",              // of time, without an edge
+      "product_of_velocities",  // dq_j dq_k
+      "tight_spot",             // friction higher around one position
+      "jerk",                   // d(ddq)/dt
+      "acceleration_squared",   // ddq |ddq|
+      "wandering_friction",     // Coulomb friction that follows a random temperature
+  };
+  return names;
+}
+
+Outside draw_outside(const std::string& effect, std::size_t joint, const Plan& plan, std::uint64_t seed) {
+  Outside outside{effect, joint, 0, seed};
+  Random random(seed);
+  const std::size_t n = plan.joints();
+  outside.other = (joint + 1 + random.next() % (n - 1)) % n;
+  const auto j = static_cast<Index>(joint), k = static_cast<Index>(outside.other);
+  outside.velocity = plan.largest_velocity[j];
+  outside.other_velocity = plan.largest_velocity[k];
+  for (const Motion& motion : plan.motions)
+    outside.acceleration = std::max(outside.acceleration, motion.ddq.col(j).cwiseAbs().maxCoeff());
+  outside.low = plan.range(j, 0);
+  outside.high = plan.range(j, 1);
+  outside.other_low = plan.range(k, 0);
+  outside.other_high = plan.range(k, 1);
+  return outside;
+}
+
+VectorXd outside_torque(const Outside& o, const Motion& motion) {
+  Random random(o.seed ^ 0x5EED);
+  const auto j = static_cast<Index>(o.joint), k = static_cast<Index>(o.other);
+  const ArrayXd q = motion.q.col(j), dq = motion.dq.col(j), ddq = motion.ddq.col(j);
+  const ArrayXd sign = (dq / (0.01 * o.velocity)).tanh();
+  const double phase = random.uniform(0, 2 * std::numbers::pi);
+  ArrayXd column;
+  if (o.effect == "other_position") {
+    const double waves = random.uniform(1.2, 3) * 2 * std::numbers::pi / (o.other_high - o.other_low);
+    column = (waves * motion.q.col(k).array() + phase).sin();
+  } else if (o.effect == "square_wave") {
+    const double period = random.uniform(3, 12);
+    column = (2 * std::numbers::pi / period * motion.t.array() + phase).sin().sign();
+  } else if (o.effect == "slow_wave") {
+    const double period = random.uniform(6, 25);
+    column = (2 * std::numbers::pi / period * motion.t.array() + phase).sin();
+  } else if (o.effect == "product_of_velocities") {
+    column = dq / o.velocity * motion.dq.col(k).array() / o.other_velocity;
+  } else if (o.effect == "tight_spot") {
+    const double range = o.high - o.low;
+    const double centre = o.low + range * random.uniform(0.3, 0.7), width = range * random.uniform(0.04, 0.1);
+    column = sign * (-((q - centre) / width).square()).exp();
+  } else if (o.effect == "jerk") {
+    column = differentiate(motion.ddq.col(j), motion.step_s) / o.acceleration;
+  } else if (o.effect == "acceleration_squared") {
+    column = ddq * ddq.abs() / (o.acceleration * o.acceleration);
+  } else if (o.effect == "wandering_friction") {
+    ArrayXd temperature = ArrayXd::Zero(motion.t.size());
+    for (int i = 0; i < 5; ++i) {
+      const double period = 8 * std::pow(2.0, i) * random.uniform(0.8, 1.2);
+      temperature += (2 * std::numbers::pi / period * motion.t.array() + random.uniform(0, 6.28)).sin();
+    }
+    column = temperature * sign;
+  } else {
+    throw InputError("no effect outside the catalogue is called " + o.effect);
+  }
+  return o.amplitude * column.matrix();
+}
+
+void scale(Outside& outside, double share, const Plan& plan) {
+  outside.amplitude = 1;
+  double power = 0, samples = 0;
+  for (const Motion& motion : plan.motions) {
+    power += outside_torque(outside, motion).squaredNorm();
+    samples += static_cast<double>(motion.t.size());
+  }
+  outside.amplitude = share * plan.healthy.joints[outside.joint].rated_torque / std::sqrt(power / samples);
+}
+
+}  // namespace fxdyn::campaign

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tests/diagnosis/plan.hpp"
+
+namespace fxdyn::campaign {
+
+/// Torques that the catalogue has no name for.
+const std::vector<std::string>& outside_effects();
+
+/// One of them with everything drawn that it needs.
+struct Outside {
+  std::string effect;
+  std::size_t joint = 0, other = 0;  ///< from 0; other: whose motion it takes, where it takes one
+  std::uint64_t seed = 0;            ///< of its constants
+  double amplitude = 1;              ///< [N*m | N], for columns of RMS near one
+  double velocity = 1, other_velocity = 1, acceleration = 1;  ///< scales of the joints' motion
+  double low = 0, high = 1, other_low = 0, other_high = 1;    ///< ranges of their positions
+};
+Outside draw_outside(const std::string& effect, std::size_t joint, const Plan& plan, std::uint64_t seed);
+
+/// Its torque over a motion; motion.t is the time since the session's start.
+Eigen::VectorXd outside_torque(const Outside& outside, const Motion& motion);
+
+/// The amplitude that makes it the share of rated torque (RMS over the plan's motions).
+void scale(Outside& outside, double share, const Plan& plan);
+
+}  // namespace fxdyn::campaign

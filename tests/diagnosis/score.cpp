@@ -1,0 +1,142 @@
+#include "tests/diagnosis/score.hpp"
+
+#include <algorithm>
+#include <set>
+
+namespace fxdyn::campaign {
+namespace {
+
+using nlohmann::json;
+
+std::size_t true_joint(const json& effect) { return effect.value("joint", std::size_t{0}); }
+
+std::vector<Named> of(const json& list, std::size_t joint) {
+  std::vector<Named> named;
+  for (const json& entry : list) {
+    Named one;
+    one.effect = entry.at("effect");
+    one.joint = joint;
+    if (entry.contains("score") && entry.at("score").is_number()) one.score = entry.at("score");
+    if (entry.contains("alternatives")) {
+      for (const json& alternative : entry.at("alternatives")) {
+        // a name, or an object with one
+        one.alternatives.push_back(alternative.is_string() ? alternative.get<std::string>()
+                                                           : alternative.value("effect", std::string()));
+      }
+    }
+    named.push_back(one);
+  }
+  return named;
+}
+
+bool is_right(const Named& named, const json& effect) {
+  return named.effect == effect.at("effect").get<std::string>() && named.joint == true_joint(effect);
+}
+
+/// Among the name and its first two alternatives, at the right joint. An alternative on the body counts whatever the
+/// joint that it is stated at, since it has none of its own.
+bool is_among(const Named& named, const json& effect) {
+  if (is_right(named, effect)) return true;
+  const std::size_t joint = true_joint(effect);
+  if (joint != 0 && named.joint != joint) return false;
+  const auto end =
+      named.alternatives.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(2, named.alternatives.size()));
+  return std::find(named.alternatives.begin(), end, effect.at("effect").get<std::string>()) != end;
+}
+
+json as_json(const std::vector<Named>& named) {
+  json list = json::array();
+  for (const Named& one : named) {
+    list.push_back({{"effect", one.effect}, {"joint", one.joint}, {"alternatives", one.alternatives}});
+  }
+  return list;
+}
+
+}  // namespace
+
+std::vector<Named> named_effects(const json& diagnosis) {
+  std::vector<Named> named;
+  std::size_t joint = 0;
+  for (const json& entry : diagnosis.at("joints")) {
+    ++joint;
+    for (Named& one : of(entry.at("effects"), entry.value("index", joint))) named.push_back(std::move(one));
+  }
+  for (Named& one : of(diagnosis.at("robot_effects"), 0)) named.push_back(std::move(one));
+  std::stable_sort(named.begin(), named.end(), [](const Named& a, const Named& b) { return a.score > b.score; });
+  return named;
+}
+
+json score(const json& truth, const json& diagnosis, std::optional<double> closure) {
+  const std::string verdict = diagnosis.at("verdict");
+  std::vector<Named> named = named_effects(diagnosis);
+  json out{{"verdict", verdict}, {"named", as_json(named)}};
+  std::set<std::size_t> unexplained;
+  std::size_t index = 0;
+  for (const json& entry : diagnosis.at("joints")) {
+    ++index;
+    if (entry.at("verdict") == "unexplained") unexplained.insert(entry.value("index", index));
+  }
+  out["unexplained_joints"] = unexplained;
+  if (closure) out["closure"] = *closure;
+
+  // What a healthy robot has anyway may be named: it is there.
+  std::erase_if(named, [&](const Named& one) {
+    return std::any_of(truth.at("background").begin(), truth.at("background").end(),
+                       [&](const json& effect) { return is_right(one, effect); });
+  });
+  const json& effects = truth.at("effects");
+  if (effects.empty()) {
+    out["false_alarm"] = !named.empty() || verdict == "unexplained" || verdict == "not_excited";
+    out["passed"] = !out["false_alarm"];
+    return out;
+  }
+
+  std::size_t found = 0, found_among = 0, joints = 0;
+  for (const json& effect : effects) {
+    const std::size_t joint = true_joint(effect);
+    const auto any = [&](auto&& test) { return std::any_of(named.begin(), named.end(), test); };
+    found += static_cast<std::size_t>(any([&](const Named& one) { return is_right(one, effect); }));
+    found_among += static_cast<std::size_t>(any([&](const Named& one) { return is_among(one, effect); }));
+    joints += static_cast<std::size_t>(any([&](const Named& one) { return one.joint == joint; }) ||
+                                       unexplained.contains(joint));
+  }
+  std::size_t spurious = 0;
+  for (const Named& one : named) {
+    spurious += static_cast<std::size_t>(
+        std::none_of(effects.begin(), effects.end(), [&](const json& effect) { return is_right(one, effect); }));
+  }
+  out["spurious"] = spurious;
+  out["detected"] = verdict == "effects_found" || verdict == "unexplained";
+
+  const json& first = effects.front();
+  if (first.value("outside", false)) {
+    const std::size_t joint = true_joint(first);
+    const bool flagged = unexplained.contains(joint);
+    const bool taken = any_of(named.begin(), named.end(), [&](const Named& one) { return one.joint == joint; });
+    out["flagged"] = flagged;
+    out["accepted"] = !named.empty() && !flagged;
+    out["named_beside"] = taken && flagged;
+    out["right_joint"] = flagged || taken;
+    out["passed"] = flagged;
+    return out;
+  }
+  if (effects.size() > 1) {
+    out["both"] = found == effects.size();
+    out["passed"] = found == effects.size();
+    out["right_joint"] = joints == effects.size();
+    return out;
+  }
+  // The strongest finding alone counts: a name that stands second beside a wrong one is no answer.
+  out["top1"] = !named.empty() && is_right(named.front(), first);
+  out["top3"] = !named.empty() && is_among(named.front(), first);
+  out["found"] = found == 1;
+  out["found_among"] = found_among == 1;
+  out["named_as"] = named.empty() ? verdict : named.front().effect;
+  const std::size_t joint = true_joint(first);
+  out["right_joint"] = named.empty() ? unexplained.contains(joint) : named.front().joint == joint;
+  out["wrong_name"] = !named.empty() && !is_among(named.front(), first);
+  out["passed"] = out["top1"];
+  return out;
+}
+
+}  // namespace fxdyn::campaign

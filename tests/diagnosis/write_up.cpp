@@ -1,0 +1,297 @@
+#include "tests/diagnosis/write_up.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <functional>
+#include <limits>
+#include <map>
+
+#include "host_tools/version.hpp"
+
+namespace fxdyn::campaign {
+namespace {
+
+using nlohmann::json;
+using Filter = std::function<bool(const json&)>;
+
+bool done(const json& r) { return r.at("status") == "done"; }
+bool ran(const json& r) { return r.at("status") != "not_generated"; }
+bool in(const json& r, const char* group) { return r.at("group") == group; }
+
+const json* first_effect(const json& r) {
+  if (!r.contains("truth") || r.at("truth").at("effects").empty()) return nullptr;
+  return &r.at("truth").at("effects").front();
+}
+/// Beforehand, from motion and noise alone: visible, ambiguous, hidden.
+std::string expected(const json& r) {
+  const json* effect = first_effect(r);
+  return effect == nullptr ? "" : effect->at("expected").at("verdict").get<std::string>();
+}
+double share(const json& r) {
+  const json* effect = first_effect(r);
+  return effect == nullptr ? 0 : effect->value("wanted_share", 0.0);
+}
+bool has(const json& r, const char* key) { return r.contains("score") && r.at("score").value(key, false); }
+
+std::vector<const json*> where(const std::vector<json>& results, const Filter& filter) {
+  std::vector<const json*> list;
+  for (const json& r : results) {
+    if (ran(r) && filter(r)) list.push_back(&r);
+  }
+  return list;
+}
+
+/// A diagnosis that failed counts as a miss.
+Rate rate(const std::vector<json>& results, const Filter& filter, const char* key) {
+  Rate rate;
+  for (const json* r : where(results, filter)) {
+    ++rate.of;
+    rate.hit += static_cast<std::size_t>(has(*r, key));
+  }
+  return rate;
+}
+
+double median(std::vector<double> values) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  std::sort(values.begin(), values.end());
+  const std::size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+}
+std::vector<double> values_of(const std::vector<json>& results, const Filter& filter, const char* key) {
+  std::vector<double> values;
+  for (const json* r : where(results, filter)) {
+    if (r->contains("score") && r->at("score").contains(key)) values.push_back(r->at("score").at(key));
+    if (r->contains(key)) values.push_back(r->at(key));
+  }
+  return values;
+}
+
+Figure at_least(const std::string& what, Rate rate, double goal) {
+  return {what, fmt::format(">= {:.2f}", goal), rate.value(), rate.of, rate.of > 0 && rate.value() >= goal};
+}
+Figure at_most(const std::string& what, Rate rate, double goal) {
+  return {what, fmt::format("<= {:.2f}", goal), rate.value(), rate.of, rate.of > 0 && rate.value() <= goal};
+}
+
+bool single(const json& r, double size) { return in(r, "single") && share(r) == size; }
+
+std::string named_text(const json& r) {
+  if (!r.contains("score")) return r.value("message", "");
+  std::vector<std::string> names;
+  for (const json& one : r.at("score").at("named")) {
+    std::string text = fmt::format("{} @{}", one.at("effect").get<std::string>(), one.at("joint").get<int>());
+    if (!one.at("alternatives").empty())
+      text += fmt::format(" (or {})", fmt::join(one.at("alternatives").get<std::vector<std::string>>(), ", "));
+    names.push_back(text);
+  }
+  std::string text = r.at("score").at("verdict").get<std::string>();
+  if (!names.empty()) text += fmt::format(": {}", fmt::join(names, "; "));
+  const auto unexplained = r.at("score").at("unexplained_joints").get<std::vector<int>>();
+  if (!unexplained.empty()) text += fmt::format(" [unexplained: joint {}]", fmt::join(unexplained, ", "));
+  return text;
+}
+
+std::string truth_text(const json& r) {
+  std::vector<std::string> parts;
+  if (!r.contains("truth")) return "";
+  for (const json& effect : r.at("truth").at("effects")) {
+    const std::size_t joint = effect.value("joint", std::size_t{0});
+    const json& expected = effect.at("expected");
+    parts.push_back(fmt::format(
+        "{} @{} {:.2g} % ({}{})", effect.at("effect").get<std::string>(), joint, 100 * effect.at("share").get<double>(),
+        expected.at("verdict").get<std::string>(),
+        expected.at("verdict") == "ambiguous" ? " with " + expected.at("rival").get<std::string>() : std::string()));
+  }
+  return parts.empty() ? "nothing" : fmt::format("{}", fmt::join(parts, "; "));
+}
+
+/// Rows: what it is; columns: what came first in the diagnosis.
+std::string confusion(const std::vector<json>& results, const Filter& filter) {
+  std::map<std::string, std::map<std::string, int>> table;
+  std::map<std::string, int> total;
+  std::map<std::string, int> right, visible, visible_right;
+  for (const json* r : where(results, filter)) {
+    if (first_effect(*r) == nullptr) continue;
+    const std::string name = first_effect(*r)->at("effect");
+    ++total[name];
+    const bool top1 = has(*r, "top1");
+    right[name] += top1;
+    if (expected(*r) == "visible") {
+      ++visible[name];
+      visible_right[name] += top1;
+    }
+    if (top1) continue;
+    std::string as = done(*r) ? r->at("score").value("named_as", "") : "failed";
+    if (as == name) as += " at another joint";
+    ++table[name][as];
+  }
+  std::string text = "| effect | cases | right | visible: right | else named as |\n|---|---|---|---|---|\n";
+  for (const auto& [name, count] : total) {
+    std::vector<std::string> others;
+    for (const auto& [as, times] : table[name]) others.push_back(fmt::format("{} x{}", as, times));
+    text += fmt::format("| {} | {} | {} | {} of {} | {} |\n", name, count, right[name], visible_right[name],
+                        visible[name], fmt::join(others, ", "));
+  }
+  return text;
+}
+
+std::string summary_line(const std::vector<json>& results, const Filter& filter) {
+  const std::size_t cases = where(results, filter).size();
+  if (cases == 0) return "no case\n";
+  const auto part = [&](const char* key) { return rate(results, filter, key).value(); };
+  return fmt::format("{} cases: top-1 {:.2f}, among the stated {:.2f}, joint {:.2f}, gap closed (median) {:.2f}\n",
+                     cases, part("top1"), part("top3"), part("right_joint"),
+                     median(values_of(results, filter, "closure")));
+}
+
+std::string failed_cases(const std::vector<json>& results) {
+  std::string text = "| case | what it is | what was said |\n|---|---|---|\n";
+  for (const json& r : results) {
+    if (ran(r) && !r.at("passed").get<bool>())
+      text += fmt::format("| `{}` | {} | {} |\n", r.at("name").get<std::string>(), truth_text(r), named_text(r));
+  }
+  return text;
+}
+
+std::string ambiguous_cases(const std::vector<json>& results) {
+  std::map<std::string, std::map<std::string, int>> rivals;
+  std::map<std::string, int> hidden;
+  for (const json* r : where(results, [](const json& x) { return first_effect(x) != nullptr; })) {
+    const json& effect = *first_effect(*r);
+    const json& one = effect.at("expected");
+    const std::string name = effect.at("effect");
+    if (one.at("verdict") == "ambiguous") ++rivals[name][one.at("rival")];
+    if (one.at("verdict") == "hidden") ++hidden[name];
+  }
+  std::string text;
+  for (const auto& [name, others] : rivals) {
+    std::vector<std::string> list;
+    for (const auto& [rival, times] : others) list.push_back(fmt::format("{} x{}", rival, times));
+    text += fmt::format("- {}: looks like {}\n", name, fmt::join(list, ", "));
+  }
+  for (const auto& [name, times] : hidden) text += fmt::format("- {}: hidden x{}\n", name, times);
+  return text.empty() ? "none\n" : text;
+}
+
+}  // namespace
+
+std::vector<Figure> figures(const std::vector<json>& results) {
+  const auto visible = [](double size) {
+    return [size](const json& r) { return single(r, size) && expected(r) == "visible"; };
+  };
+  const auto any_single = [](const json& r) { return in(r, "single"); };
+  const Filter healthy = [](const json& r) {
+    return in(r, "clean") || in(r, "changed_friction") || (in(r, "background") && first_effect(r) == nullptr);
+  };
+  const Filter outside = [](const json& r) { return in(r, "outside") && share(r) >= 0.006; };
+  std::vector<Figure> list{
+      at_least("top-1 name, visible effects, 0.6 %", rate(results, visible(0.006), "top1"), 0.95),
+      at_least("top-1 name, visible effects, 0.2 %", rate(results, visible(0.002), "top1"), 0.85),
+      at_least("top-3, visible effects, 0.6 %", rate(results, visible(0.006), "top3"), 0.99),
+      at_least("right joint, visible effects",
+               rate(
+                   results, [&](const json& r) { return any_single(r) && expected(r) == "visible"; }, "right_joint"),
+               0.98)};
+  Rate alarms;
+  for (const json* r : where(results, healthy)) {
+    ++alarms.of;
+    alarms.hit += static_cast<std::size_t>(!done(*r) || has(*r, "false_alarm"));
+  }
+  list.push_back(at_most("false alarms (clean, friction changed, quiet background)", alarms, 0.01));
+  list.push_back(at_least("outside the catalogue, >= 0.6 %: flagged", rate(results, outside, "flagged"), 0.95));
+  list.push_back(at_most("outside the catalogue, >= 0.6 %: accepted under a wrong name",
+                         rate(results, outside, "accepted"), 0.03));
+  for (const auto& [size, goal] : {std::pair{0.006, 0.90}, std::pair{0.02, 0.95}}) {
+    auto closures = values_of(results, visible(size), "closure");
+    const double value = median(closures);
+    list.push_back({fmt::format("gap closed in truth, visible effects, {:g} %, median", 100 * size),
+                    fmt::format(">= {:.2f}", goal), value, closures.size(), value >= goal});
+  }
+  for (const auto& [size, goal] : {std::pair{0.006, 0.75}, std::pair{0.02, 0.90}}) {
+    list.push_back(at_least(fmt::format("pairs, both named, {:g} %", 100 * size),
+                            rate(
+                                results, [size](const json& r) { return in(r, "pair") && share(r) == size; }, "both"),
+                            goal));
+  }
+  list.push_back(
+      at_least("no baseline, detectable: top-1",
+               rate(
+                   results, [](const json& r) { return in(r, "no_baseline") && expected(r) == "visible"; }, "top1"),
+               0.80));
+  list.push_back(at_most(
+      "no baseline, unidentifiable: wrong name",
+      rate(
+          results, [](const json& r) { return in(r, "no_baseline") && expected(r) != "visible"; }, "wrong_name"),
+      0));
+  for (const char* effect : {"elasticity", "eccentricity", "backlash"}) {
+    list.push_back(at_least(fmt::format("link encoder: {}", effect),
+                            rate(
+                                results,
+                                [&](const json& r) {
+                                  return in(r, "dual_encoder") && first_effect(r) != nullptr &&
+                                         first_effect(r)->at("effect") == effect;
+                                },
+                                "top1"),
+                            0.95));
+  }
+  return list;
+}
+
+std::string write_up(const std::vector<json>& results, const std::string& command) {
+  std::string text = "# Diagnosis campaign\n\n";
+  text += fmt::format("Version {}. `{}`\n\n", version, command);
+  const Filter all = [](const json&) { return true; };
+  const auto times = values_of(results, all, "diagnosis_s"), generation = values_of(results, all, "generation_s");
+  std::size_t missing = 0, failed = 0;
+  for (const json& r : results) {
+    missing += static_cast<std::size_t>(!ran(r));
+    failed += static_cast<std::size_t>(r.at("status") == "failed");
+  }
+  text += fmt::format(
+      "{} cases, {} of them could not be had (no joint reaches the size), {} ended without a diagnosis. "
+      "Time of one diagnosis on one thread: median {:.1f} s, longest {:.1f} s; of generating a case: "
+      "median {:.1f} s.\n\n",
+      results.size(), missing, failed, median(times),
+      times.empty() ? 0.0 : *std::max_element(times.begin(), times.end()), median(generation));
+  text +=
+      "Recording: 40 s a role (10 s fast, 10 s up to 3.5 Hz, 10 s slow, 10 s of reversals), roles baseline, train, "
+      "validate, test, all of different trajectories; 500 Hz, 17-bit encoders, 1 % white and 0.3 % coloured torque "
+      "noise. Sizes: RMS of the noise-free torque change over the train logs at the joint that feels it most, share of "
+      "rated torque. *Visible*: beforehand, from motion and noise alone, the effect stands out by 8 standard "
+      "deviations "
+      "once nominal friction (without a baseline: the whole nominal model) has taken its part, and by 5 from the best "
+      "other effect of the catalogue.\n\n## Figures\n\n| what | goal | reached | cases |\n|---|---|---|---|\n";
+  for (const Figure& figure : figures(results)) {
+    if (figure.cases == 0) continue;
+    text += fmt::format("| {} | {} | {}{:.3f}{} | {} |\n", figure.what, figure.goal, figure.met ? "" : "**",
+                        figure.value, figure.met ? "" : "**", figure.cases);
+  }
+  text += "\n## Which effect is named as what\n";
+  for (const double size : {0.002, 0.006, 0.02}) {
+    const Filter of_size = [size](const json& r) { return single(r, size); };
+    if (where(results, of_size).empty()) continue;
+    text += fmt::format("\n### {:g} % of rated torque\n\n{}\n{}", 100 * size, summary_line(results, of_size),
+                        confusion(results, of_size));
+  }
+  const std::vector<std::pair<const char*, const char*>> groups{{"mujoco", "The MuJoCo plant"},
+                                                                {"no_baseline", "Without a baseline"},
+                                                                {"background", "With a background"},
+                                                                {"dual_encoder", "Link encoders"}};
+  for (const auto& [group, title] : groups) {
+    const Filter of_group = [&](const json& r) { return in(r, group); };
+    if (where(results, of_group).empty()) continue;
+    const Filter with_effect = [&](const json& r) { return in(r, group) && first_effect(r) != nullptr; };
+    text += fmt::format("\n## {}\n\n{}\n{}", title, summary_line(results, with_effect), confusion(results, of_group));
+  }
+  text +=
+      "\nSizes on the MuJoCo plant are those of the internal one; its gears and friction differ a little, so that the "
+      "gap "
+      "before holds more than the effect.\n";
+  text += "\n## What this recording can't tell apart in principle\n\n" + ambiguous_cases(results);
+  text += "\n## Every case that failed\n\n" + failed_cases(results);
+  return text;
+}
+
+}  // namespace fxdyn::campaign
