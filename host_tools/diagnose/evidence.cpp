@@ -1,0 +1,95 @@
+#include "host_tools/diagnose/evidence.hpp"
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "host_tools/error.hpp"
+#include "host_tools/export/export.hpp"
+#include "host_tools/report/metrics.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+using nlohmann::json;
+
+/// Sums of squares over the logs, one a joint.
+struct Pooled {
+  VectorXd squares;
+  Index logs = 0;
+  void add(const std::vector<JointMetrics>& metrics, double JointMetrics::*of) {
+    if (squares.size() == 0) squares.setZero(static_cast<Index>(metrics.size()));
+    for (std::size_t j = 0; j < metrics.size(); ++j) squares[static_cast<Index>(j)] += metrics[j].*of * metrics[j].*of;
+    ++logs;
+  }
+  /// null where a log is missing or a figure is not finite.
+  json rms(std::size_t joint, std::size_t of_logs) const {
+    if (logs == 0 || static_cast<std::size_t>(logs) != of_logs) return nullptr;
+    const double value = std::sqrt(squares[static_cast<Index>(joint)] / static_cast<double>(logs));
+    return std::isfinite(value) ? json(value) : json(nullptr);
+  }
+};
+
+json log_json(const ProcessedLog& log) {
+  return {{"file", log.name}, {"role", to_string(log.role)}, {"from_s", log.from_s}, {"to_s", log.to_s}};
+}
+
+}  // namespace
+
+Eigen::MatrixXd predict_as_firmware(const IdentifiedModel& plain, const ProcessedLog& log) {
+  const IdentifiedModel model = with_load_of(log, plain);
+  const Formats formats = choose_formats(model);
+  const TickStates ticks = at_ticks(log, model.tick_s, true);
+  return at_other_times(interpolate(predict_fixed(model, formats, ticks), ticks.t, log.t),
+                        model.filter.torque_lead_s / log.step_s);
+}
+
+json evidence_json(const IdentifiedModel& nominal, const IdentifiedModel& diagnosed,
+                   const std::vector<ProcessedLog>& held_out) {
+  json logs = json::array(), joints = json::array();
+  Pooled before, after, fixed, noise;
+  std::vector<const ProcessedLog*> judged;
+  std::optional<std::string> why_not_fixed;
+  for (const ProcessedLog& log : held_out) {
+    if (log.tau.size() == 0) continue;
+    judged.push_back(&log);
+    logs.push_back(log_json(log));
+    before.add(judge(log, predict(nominal, log)), &JointMetrics::rmse);
+    const auto with_effects = judge(log, predict(diagnosed, log));
+    after.add(with_effects, &JointMetrics::rmse);
+    noise.add(with_effects, &JointMetrics::noise_floor);
+    if (why_not_fixed) continue;
+    // A model that fixed point can't hold is still a diagnosis.
+    try {
+      fixed.add(judge(log, predict_as_firmware(diagnosed, log)), &JointMetrics::rmse);
+    } catch (const DataError& error) {
+      why_not_fixed = error.what();
+    } catch (const InputError& error) {
+      why_not_fixed = error.what();
+    }
+  }
+  for (std::size_t j = 0; j < diagnosed.robot.size() && !judged.empty(); ++j) {
+    joints.push_back({{"joint", diagnosed.robot.joints[j].name},
+                      {"index", j + 1},
+                      {"unit", diagnosed.robot.joints[j].torque_unit()},
+                      {"rms_before", before.rms(j, judged.size())},
+                      {"rms_after", after.rms(j, judged.size())},
+                      {"rms_after_fixed", fixed.rms(j, judged.size())},
+                      {"noise_floor", noise.rms(j, judged.size())}});
+  }
+  json out = {{"held_out", logs}, {"joints", joints}, {"fixed_point", {{"computed", !why_not_fixed}}}};
+  if (why_not_fixed) out["fixed_point"]["why_not"] = *why_not_fixed;
+  if (judged.empty()) {
+    out["note"] = "no log was held out: nothing that the search has not seen";
+    out["fixed_point"] = {{"computed", false}, {"why_not", "no log was held out"}};
+    out["forward"] = nullptr;
+  } else {
+    out["forward"] = nullptr;
+  }
+  return out;
+}
+
+}  // namespace fxdyn
