@@ -1,10 +1,10 @@
 #include "host_tools/diagnose/evidence.hpp"
 
 #include <cmath>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "host_tools/diagnose/forward.hpp"
 #include "host_tools/error.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/report/metrics.hpp"
@@ -33,24 +33,37 @@ struct Pooled {
   }
 };
 
+/// Torque over logs as the fixed-point firmware computes it: at the drive's ticks, back to the log's samples, with the
+/// log's known load and at the times at which its torque column shows it, samples x joints [N*m | N].
+class Firmware {
+ public:
+  explicit Firmware(const IdentifiedModel& model) : model_(model) {}
+  /// @throws DataError where no formats can be chosen for the model.
+  Eigen::MatrixXd operator()(const ProcessedLog& log) {
+    const IdentifiedModel model = with_load_of(log, model_);
+    if (!log.load && !unloaded_) unloaded_ = choose_formats(model);
+    const Formats formats = log.load ? choose_formats(model) : *unloaded_;
+    const TickStates ticks = at_ticks(log, model.tick_s, true);
+    return at_other_times(interpolate(predict_fixed(model, formats, ticks), ticks.t, log.t),
+                          model.filter.torque_lead_s / log.step_s);
+  }
+
+ private:
+  const IdentifiedModel& model_;
+  std::optional<Formats> unloaded_;
+};
+
 json log_json(const ProcessedLog& log) {
   return {{"file", log.name}, {"role", to_string(log.role)}, {"from_s", log.from_s}, {"to_s", log.to_s}};
 }
 
 }  // namespace
 
-Eigen::MatrixXd predict_as_firmware(const IdentifiedModel& plain, const ProcessedLog& log) {
-  const IdentifiedModel model = with_load_of(log, plain);
-  const Formats formats = choose_formats(model);
-  const TickStates ticks = at_ticks(log, model.tick_s, true);
-  return at_other_times(interpolate(predict_fixed(model, formats, ticks), ticks.t, log.t),
-                        model.filter.torque_lead_s / log.step_s);
-}
-
 json evidence_json(const IdentifiedModel& nominal, const IdentifiedModel& diagnosed,
                    const std::vector<ProcessedLog>& held_out) {
   json logs = json::array(), joints = json::array();
   Pooled before, after, fixed, noise;
+  Firmware firmware(diagnosed);
   std::vector<const ProcessedLog*> judged;
   std::optional<std::string> why_not_fixed;
   for (const ProcessedLog& log : held_out) {
@@ -64,7 +77,7 @@ json evidence_json(const IdentifiedModel& nominal, const IdentifiedModel& diagno
     if (why_not_fixed) continue;
     // A model that fixed point can't hold is still a diagnosis.
     try {
-      fixed.add(judge(log, predict_as_firmware(diagnosed, log)), &JointMetrics::rmse);
+      fixed.add(judge(log, firmware(log)), &JointMetrics::rmse);
     } catch (const DataError& error) {
       why_not_fixed = error.what();
     } catch (const InputError& error) {
@@ -87,7 +100,7 @@ json evidence_json(const IdentifiedModel& nominal, const IdentifiedModel& diagno
     out["fixed_point"] = {{"computed", false}, {"why_not", "no log was held out"}};
     out["forward"] = nullptr;
   } else {
-    out["forward"] = nullptr;
+    out["forward"] = forward_json(nominal, diagnosed, judged);
   }
   return out;
 }

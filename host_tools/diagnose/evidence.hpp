@@ -20,9 +20,4 @@ namespace fxdyn {
 nlohmann::json evidence_json(const IdentifiedModel& nominal, const IdentifiedModel& diagnosed,
                              const std::vector<ProcessedLog>& held_out);
 
-/// Torque of the model over a log as the fixed-point firmware computes it: at the drive's ticks, back to the log's
-/// samples, with the log's known load and at the times at which its torque column shows it, samples x joints [N*m | N].
-/// @throws DataError where no formats can be chosen for the model.
-Eigen::MatrixXd predict_as_firmware(const IdentifiedModel& model, const ProcessedLog& log);
-
 }  // namespace fxdyn

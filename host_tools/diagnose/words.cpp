@@ -87,9 +87,10 @@ std::string where(const json& of, const std::string& torque_unit) {
   const std::string name = found ? std::string(known->title) : key;
   std::string unit = text(of, "unit");
   if (unit.empty() && found) unit = unit_for(known->unit, torque_unit);
-  std::string out =
-      has_number(of, "share_of_gap") ? share(of, "share_of_gap") + " of the gap at " + name : "at " + name;
-  // A direction or a joint has no range.
+  std::string out = has_number(of, "share_of_gap") ? share(of, "share_of_gap") + " of the gap at " : "at ";
+  if (key == "direction")
+    return out + (has_number(of, "to") && of.at("to") > 0 ? "positive" : "negative") + " velocity";
+  out += name;
   if (has_number(of, "from") && has_number(of, "to"))
     out += fmt::format(" {} .. {}{}", figure(of, "from"), figure(of, "to"), unit.empty() ? "" : " " + unit);
   else if (of.contains("value"))

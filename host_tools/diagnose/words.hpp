@@ -17,7 +17,8 @@ std::string share(const nlohmann::json& of, const char* key);
 std::string effect(const nlohmann::json& of, const char* plus_minus);
 /// "amplitude 2.1+-0.05 N*m, ..": the effect's parameters alone.
 std::string parameters(const nlohmann::json& of, const char* plus_minus);
-/// "61 % of the gap at velocity -0.05 .. 0.05 rad/s"; torque_unit: of the joint, N*m or N.
+/// "61 % of the gap at velocity -0.05 .. 0.05 rad/s", "90 % of the gap at negative velocity"; torque_unit: of the
+/// joint, N*m or N.
 std::string where(const nlohmann::json& of, const std::string& torque_unit);
 /// Items "a, b" of a list of names (or of objects with "effect").
 std::string list(const nlohmann::json& of);

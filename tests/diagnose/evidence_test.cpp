@@ -33,6 +33,45 @@ TEST(Evidence, TheGapShrinksInDoubleInFixedPointAndForward) {
   EXPECT_EQ(evidence.at("joints")[1].at("rms_before"), evidence.at("joints")[1].at("rms_after"));
 }
 
+TEST(Evidence, ThePlantThatLacksNothingFollowsTheRecordedMotionByItself) {
+  const test::Arm arm("forward");
+  const std::vector<ProcessedLog> logs{arm.log(0)};
+  const IdentifiedModel truth = arm.truth(logs[0]);
+  const json forward = evidence_json(test::without(truth, "stribeck"), truth, logs).at("forward");
+  EXPECT_EQ(forward.at("log"), "a.csv");
+  EXPECT_NEAR(forward.at("seconds").get<double>(), 8 - 2 * 0.3, 0.02);
+  EXPECT_FALSE(forward.contains("failed")) << forward.dump(1);
+  const json& shoulder = forward.at("joints")[0];
+  EXPECT_EQ(shoulder.at("tracking_unit"), "rad");
+  EXPECT_LT(shoulder.at("tracking_after").get<double>(), 0.5 * shoulder.at("tracking_before").get<double>());
+  EXPECT_LT(shoulder.at("torque_after").get<double>(), 0.5 * shoulder.at("torque_before").get<double>());
+}
+
+TEST(Evidence, WhatChangesTheMeasuredTorqueIsTakenOutOfItBeforeItDrivesThePlant) {
+  const test::Arm arm("gain");
+  std::vector<ProcessedLog> logs{arm.log(0)};
+  logs[0].tau *= 1.2;
+  const IdentifiedModel nominal = arm.truth(logs[0]);
+  IdentifiedModel truth = nominal;
+  for (JointFit& joint : truth.joints) joint.effects.push_back({"torque_gain", {}, {0.2}, {}, {}, true});
+  const json shoulder = evidence_json(nominal, truth, logs).at("forward").at("joints").at(0);
+  EXPECT_LT(shoulder.at("tracking_after").get<double>(), 0.5 * shoulder.at("tracking_before").get<double>());
+  EXPECT_LT(shoulder.at("torque_after").get<double>(), 0.5 * shoulder.at("torque_before").get<double>());
+}
+
+TEST(Evidence, APlantThatNoBodyOfMatterHasIsSaidAndNotFatal) {
+  const test::Arm arm("no_plant");
+  const std::vector<ProcessedLog> logs{arm.log(0)};
+  const IdentifiedModel truth = arm.truth(logs[0]);
+  IdentifiedModel impossible = truth;
+  impossible.inertia[1].zz = impossible.inertia[1].yy = impossible.inertia[1].xx = -5;
+  const json forward = evidence_json(impossible, truth, logs).at("forward");
+  EXPECT_FALSE(forward.at("failed").at("before").get<std::string>().empty());
+  EXPECT_FALSE(forward.at("failed").contains("after"));
+  EXPECT_TRUE(forward.at("joints")[0].at("tracking_before").is_null());
+  EXPECT_TRUE(forward.at("joints")[0].at("tracking_after").is_number());
+}
+
 TEST(Evidence, AModelThatFixedPointCannotHoldIsSaidAndNotFatal) {
   const test::Arm arm("no_fixed");
   const std::vector<ProcessedLog> logs{arm.log(0)};
