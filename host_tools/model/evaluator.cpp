@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace fxdyn {
@@ -147,6 +148,7 @@ void Evaluator<N>::add_effect(std::size_t joint, const EffectFit& fit, double ti
       }
     }
     auto step = std::make_unique<EffectStep<E>>();
+    step->shape = fit.shape;
     for (std::size_t i = 0; i < E::shape.size(); ++i) {
       step->words.push_back(word(Kind::number, E::shape[i].quantity, E::stored_shape(i, fit.shape[i], tick_s)));
     }
@@ -205,6 +207,36 @@ void Evaluator<N>::reset() {
     for (auto& step : joint) step->reset();
   }
   for (auto& deflection : deflections_) deflection = {};
+}
+
+template <class N>
+void Evaluator<N>::warm_up(double seconds) {
+  for (auto& joint : steps_) {
+    for (auto& step : joint) step->warm_up(seconds);
+  }
+}
+
+template <class N>
+void Evaluator<N>::mark() {
+  for (auto& joint : steps_) {
+    for (auto& step : joint) step->mark();
+  }
+  kept_deflections_ = deflections_;
+}
+
+template <class N>
+void Evaluator<N>::rewind() {
+  for (auto& joint : steps_) {
+    for (auto& step : joint) step->rewind();
+  }
+  deflections_ = kept_deflections_;
+}
+
+template <class N>
+std::span<const Torque<N>> Evaluator<N>::rigid_body(std::span<const JointState<N>> states) {
+  std::copy(states.begin(), states.end(), limited_.begin());
+  rnea<N, std::dynamic_extent>(geometry_, inertia_, up_, limited_, motions_, wrenches_, structural_);
+  return structural_;
 }
 
 template <class N>
@@ -269,9 +301,6 @@ template class Evaluator<Real>;
 template class Evaluator<BoundedNumbers>;
 template class Evaluator<RunTimeNumbers>;
 
-namespace {
-
-/// Limits are the drive's, not the model's.
 IdentifiedModel unlimited(IdentifiedModel model) {
   for (JointFit& joint : model.joints) {
     joint.q_upper = joint.dq_limit = joint.ddq_limit = joint.tau_limit = unbounded;
@@ -280,10 +309,10 @@ IdentifiedModel unlimited(IdentifiedModel model) {
   return model;
 }
 
-}  // namespace
-
-Predictor::Predictor(const IdentifiedModel& model, double step_s)
-    : evaluator_(unlimited(model), step_s), state_(model.joints.size()) {}
+Predictor::Predictor(const IdentifiedModel& model, double step_s, double age_s)
+    : evaluator_(unlimited(model), step_s), state_(model.joints.size()) {
+  evaluator_.warm_up(age_s);
+}
 
 void Predictor::operator()(const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq, const Eigen::MatrixXd& ddq,
                            Eigen::Ref<Eigen::MatrixXd> tau, Eigen::MatrixXd* deflections) {
@@ -300,9 +329,9 @@ void Predictor::operator()(const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq, 
 }
 
 Eigen::MatrixXd predict(const IdentifiedModel& model, const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,
-                        const Eigen::MatrixXd& ddq, double step_s, Eigen::MatrixXd* deflections) {
+                        const Eigen::MatrixXd& ddq, double step_s, Eigen::MatrixXd* deflections, double age_s) {
   Eigen::MatrixXd tau(q.rows(), q.cols());
-  Predictor(model, step_s)(q, dq, ddq, tau, deflections);
+  Predictor(model, step_s, age_s)(q, dq, ddq, tau, deflections);
   return tau;
 }
 

@@ -76,6 +76,14 @@ class Evaluator {
   void set_outputs(std::uint32_t outputs) { outputs_ = outputs; }
   /// Effects back to rest.
   void reset();
+  /// Advances by `seconds` what depends on time alone (friction_drift); everything else stays at rest. Call it before
+  /// the first tick.
+  void warm_up(double seconds);
+  /// Keeps the effects' states, and puts the kept ones back: to try a tick that is not taken.
+  void mark();
+  void rewind();
+  /// Rigid-body torque alone of these states; steps no effect. The span is valid until the next call.
+  std::span<const Torque<N>> rigid_body(std::span<const JointState<N>> states);
   /// One tick; the span returned is valid until the next call.
   std::span<const Torque<N>> tick(std::span<const JointState<N>> setpoints, Saturations& saturations);
   /// Rigid-body torque of the last tick.
@@ -96,11 +104,15 @@ class Evaluator {
     virtual typename N::TorqueSum torque(JointInput<N>&, typename N::TorqueSum, Saturations&) { return N::no_torque(); }
     virtual typename N::DeflectionSum deflection(const JointInput<N>&, Saturations&) { return N::no_deflection(); }
     virtual void reset() = 0;
+    virtual void warm_up(double) {}
+    virtual void mark() {}
+    virtual void rewind() {}
     std::vector<typename N::Word> words;
   };
   template <class E>
   struct EffectStep final : Step {
-    typename E::template State<N> state{};
+    typename E::template State<N> state{}, kept{};
+    std::vector<double> shape;
     typename N::TorqueSum torque(JointInput<N>& u, typename N::TorqueSum so_far, Saturations& saturations) override {
       if constexpr (acts_on<E> == ActsOn::torque) {
         if constexpr (needs_total<E>) u.total = running_total<N>(u.structural, so_far);
@@ -114,16 +126,24 @@ class Evaluator {
       return N::no_deflection();
     }
     void reset() override { state = {}; }
+    void warm_up(double seconds) override {
+      if constexpr (std::is_same_v<E, FrictionDrift>)
+        state.w = from_si<N, Quantity::unit>(FrictionDrift::warmth(seconds, shape[0]));
+    }
+    void mark() override { kept = state; }
+    void rewind() override { state = kept; }
   };
   struct BroadLearningStep final : Step {
     std::size_t nodes = 0;
     int bits = 0;
-    BroadLearningState<N> state{};
+    BroadLearningState<N> state{}, kept{};
     std::vector<typename N::NodeArgument> scratch;
     typename N::TorqueSum torque(JointInput<N>& u, typename N::TorqueSum, Saturations& saturations) override {
       return broad_learning_sum<N>(nodes, bits, u, Words<N>{this->words.data()}, state, saturations, scratch);
     }
     void reset() override { state = {}; }
+    void mark() override { kept = state; }
+    void rewind() override { state = kept; }
   };
 
   static typename N::Word word(Kind::Group group, Quantity quantity, double value) {
@@ -143,7 +163,7 @@ class Evaluator {
   std::vector<std::vector<std::unique_ptr<Step>>> steps_;
   std::vector<JointState<N>> limited_;
   std::vector<JointInput<N>> inputs_;
-  std::vector<Deflection<N>> deflections_;
+  std::vector<Deflection<N>> deflections_, kept_deflections_;
   std::vector<LinkMotion<N>> motions_;
   std::vector<Wrench<N>> wrenches_;
   std::vector<Torque<N>> structural_, tau_;
@@ -158,7 +178,8 @@ extern template class Evaluator<RunTimeNumbers>;
 /// not the feedforward that a drive may put out.
 class Predictor {
  public:
-  Predictor(const IdentifiedModel& model, double step_s);
+  /// @param age_s how long the robot has run before the motion (Evaluator::warm_up) [s]
+  Predictor(const IdentifiedModel& model, double step_s, double age_s = 0);
   /// The next samples of the motion, samples x joints; writes their torques [N*m | N] and, where asked for, motor minus
   /// link of each joint [rad | m].
   void operator()(const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq, const Eigen::MatrixXd& ddq,
@@ -169,8 +190,12 @@ class Predictor {
   std::vector<JointState<Real>> state_;
 };
 
+/// The model without its drives' limits: they are not the robot's.
+IdentifiedModel unlimited(IdentifiedModel model);
+
 /// Over a whole motion at once.
 Eigen::MatrixXd predict(const IdentifiedModel& model, const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,
-                        const Eigen::MatrixXd& ddq, double step_s, Eigen::MatrixXd* deflections = nullptr);
+                        const Eigen::MatrixXd& ddq, double step_s, Eigen::MatrixXd* deflections = nullptr,
+                        double age_s = 0);
 
 }  // namespace fxdyn

@@ -23,9 +23,9 @@ struct FrictionDrift {
   struct State {
     Unit<N> w{};
   };
-  static double stored_shape(std::size_t, double time_constant, double tick_s) {
-    return -std::expm1(-tick_s / time_constant);
-  }
+  /// w after a time from the start [s].
+  static double warmth(double seconds, double time_constant) { return -std::expm1(-seconds / time_constant); }
+  static double stored_shape(std::size_t, double time_constant, double tick_s) { return warmth(tick_s, time_constant); }
 
   template <class N, class Emit>
   static constexpr void basis(const JointInput<N>& u, Words<N> words, State<N>& state, Saturations&, Emit&& emit) {

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <Eigen/Dense>
+
+#include "host_tools/model/identified_model.hpp"
+
+namespace fxdyn {
+
+/// Where the robot is asked to go: samples x joints, `step_s` apart [rad | m, and per s, s^2].
+struct Reference {
+  double step_s = 0;
+  Eigen::MatrixXd q, dq, ddq;
+  Eigen::MatrixXd feedforward;  ///< torque added to the controller's [N*m | N]; empty: none
+};
+
+/// Joint by joint tau = kp (q_r - q) + kd (dq_r - dq) + feedforward with kp = M w^2 and kd = 2 damping M w,
+/// w = 2 pi bandwidth, M the joint's own inertia at the start pose [kg m^2 | kg].
+struct ClosedLoopSettings {
+  double bandwidth_hz = 6;
+  double damping = 0.7;
+  int substeps = 4;  ///< of the plant between two samples of the reference
+  int hold = 1;      ///< the controller acts at every hold-th sample of the reference and keeps its torque till then
+  double age_s = 0;  ///< how long the robot has run before (Evaluator::warm_up) [s]
+};
+
+/// At the reference's samples. dq and ddq are derivatives of q; ddq jumps with the controller's torque, and shows the
+/// mean of both sides there. tau: the torque that the controller applies from the sample on [N*m | N].
+struct ClosedLoopRun {
+  Eigen::MatrixXd q, dq, ddq, tau;
+};
+
+/// The model as a plant: M(q) ddq + h(q, dq) + effects(q, dq) = tau, from the reference's first state on. Effects that
+/// need the running total (delay, saturation, torque_gain) or act on the position (elasticity, backlash, eccentricity)
+/// do not shape the motion.
+/// @throws DataError where the model's mass matrix is not positive definite, or the loop runs away.
+ClosedLoopRun run_closed_loop(const IdentifiedModel& plant, const Reference& reference,
+                              const ClosedLoopSettings& settings);
+
+}  // namespace fxdyn

@@ -1,0 +1,133 @@
+#include "host_tools/simulate/mujoco_forces.hpp"
+
+#include <cmath>
+
+#include "host_tools/simulate/mujoco_model.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// Sign of a velocity with a soft zero.
+double soft_sign(double v, double width) { return v / std::sqrt(v * v + width * width); }
+
+/// Torque of an effect with no memory on joint j [N*m | N].
+double force(const EffectFit& fit, const JointFit& joint, Index j, const DriveState& now,
+             const IdentifiedModel& plant) {
+  const std::string& name = fit.effect;
+  const auto& p = fit.linear;
+  const double q = now.q[j], v = now.dq[j], sign = soft_sign(v, joint.sign_width);
+  const auto peer = [&] { return static_cast<Index>(fit.shape[0]) - 1; };
+  if (name == "offset") return p[0];
+  if (name == "stribeck") return p[0] * sign * std::exp(-std::pow(v / fit.shape[0], 2));
+  if (name == "asymmetric_friction") return p[0] * std::fabs(sign) + p[1] * std::fabs(v);
+  if (name == "viscous_quadratic") return p[0] * v * std::fabs(v);
+  if (name == "viscous_cubic") return p[0] * v * v * v;
+  if (name == "load_friction") return p[0] * std::fabs(now.load[j]) * sign;
+  if (name == "ripple") return p[0] * std::cos(fit.shape[0] * q) + p[1] * std::sin(fit.shape[0] * q);
+  if (name == "spring") return p[0] > 0 ? 0 : p[0] * q + p[1];  // MuJoCo's where it pulls back
+  if (name == "gravity_compensator") return p[0] * std::cos(q) + p[1] * std::sin(q);
+  if (name == "friction_drift") return (1 - std::exp(-now.time_s / fit.shape[0])) * (p[0] * sign + p[1] * v);
+  if (name == "joint_coupling") {
+    const double other = now.dq[peer()];
+    return p[0] * soft_sign(other, plant.joints[static_cast<std::size_t>(peer())].sign_width) + p[1] * other;
+  }
+  if (name == "motor_coupling") {
+    const double ratio = fit.shape[1], geared = ratio * now.dq[peer()];
+    return p[0] * soft_sign(v + geared, fit.shape[2]) + p[1] * geared + p[2] * ratio * now.ddq[peer()];
+  }
+  return 0;  // viscous, coulomb, rotor_inertia and elasticity are MuJoCo's; the rest are no torques of the motion
+}
+
+/// Value between the samples of a column; before the first it has always been the same.
+double at(const Eigen::Ref<const VectorXd>& column, double sample) {
+  if (sample <= 0) return column[0];
+  const auto from = std::min(static_cast<Index>(sample), column.size() - 1);
+  const Index to = std::min(from + 1, column.size() - 1);
+  const double share = sample - static_cast<double>(from);
+  return column[from] + share * (column[to] - column[from]);
+}
+
+/// Load behind a damper: load + r d(load)/dt = torque, exact for a torque that is linear between samples.
+VectorXd relaxed(const Eigen::Ref<const VectorXd>& torque, double r, double step_s) {
+  VectorXd load = torque;
+  if (r <= 0) return load;
+  const double x = step_s / r, decay = std::exp(-x);
+  for (Index k = 1; k < load.size(); ++k) {
+    const double slope = (torque[k] - torque[k - 1]) / x;
+    // particular solution: torque - slope; the rest decays
+    load[k] = (load[k - 1] - torque[k - 1] + slope) * decay + torque[k] - slope;
+  }
+  return load;
+}
+
+}  // namespace
+
+DriveForces::DriveForces(const IdentifiedModel& plant)
+    : plant_(plant), bristle_(plant.joints.size(), 0.0), bristle_q_(plant.joints.size(), 0.0) {}
+
+VectorXd DriveForces::operator()(const DriveState& now) {
+  VectorXd sum = VectorXd::Zero(now.q.size());
+  for (Index j = 0; j < sum.size(); ++j) {
+    const auto i = static_cast<std::size_t>(j);
+    const JointFit& joint = plant_.joints[i];
+    sum[j] += coulomb_share(joint).applied * soft_sign(now.dq[j], joint.sign_width);
+    for (const EffectFit& fit : joint.effects) {
+      if (fit.effect != "presliding") {
+        sum[j] += force(fit, joint, j, now, plant_);
+        continue;
+      }
+      // Dahl, dz/dq = (1 - sign z) / distance: over a stretch z decays to the direction's sign
+      const double stretch = started_ ? now.q[j] - bristle_q_[i] : 0;
+      const double end = stretch < 0 ? -1 : 1;
+      bristle_[i] = end + (bristle_[i] - end) * std::exp(-std::fabs(stretch) / fit.shape[0]);
+      bristle_q_[i] = now.q[j];
+      sum[j] += fit.linear[0] * bristle_[i];
+    }
+  }
+  started_ = true;
+  return sum;
+}
+
+void measure_torque(const IdentifiedModel& plant, double step_s, Eigen::MatrixXd& tau) {
+  for (Index j = 0; j < tau.cols(); ++j) {
+    for (const EffectFit& fit : plant.joints[static_cast<std::size_t>(j)].effects) {
+      const VectorXd before = tau.col(j);
+      if (fit.effect == "torque_gain") tau.col(j) *= 1 + fit.linear[0];
+      if (fit.effect == "saturation") {
+        const double limit = fit.shape[0];
+        tau.col(j) += fit.linear[0] * (before.cwiseMin(limit).cwiseMax(-limit) - before);
+      }
+      if (fit.effect == "delay") {
+        for (Index k = 0; k < tau.rows(); ++k) {
+          const double late = at(before, static_cast<double>(k) - fit.shape[0] / step_s);
+          tau(k, j) += fit.linear[0] * (late - before[k]);
+        }
+      }
+    }
+  }
+}
+
+Eigen::MatrixXd gear_deflections(const IdentifiedModel& plant, double step_s, const Eigen::MatrixXd& load) {
+  Eigen::MatrixXd delta = Eigen::MatrixXd::Zero(load.rows(), load.cols());
+  for (Index j = 0; j < load.cols(); ++j) {
+    const JointFit& joint = plant.joints[static_cast<std::size_t>(j)];
+    for (const EffectFit& fit : joint.effects) {
+      if (fit.effect == "elasticity") delta.col(j) += fit.linear[0] * relaxed(load.col(j), fit.shape[0], step_s);
+      if (fit.effect == "backlash")
+        delta.col(j) += fit.linear[0] * (load.col(j) / fit.shape[0]).array().tanh().matrix();
+    }
+  }
+  return delta;
+}
+
+Eccentric eccentric(const JointFit& joint, double q) {
+  const EffectFit* fit = joint.find("eccentricity");
+  if (fit == nullptr) return {};
+  const double a = fit->linear[0], b = fit->linear[1], s = std::sin(q), c = std::cos(q);
+  return {a * s + b * c, a * c - b * s, -(a * s + b * c)};
+}
+
+}  // namespace fxdyn

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "host_tools/excite/fourier.hpp"
+#include "host_tools/model/identified_model.hpp"
+
+namespace fxdyn {
+
+/// One [[log]] of a scenario.
+struct ScenarioLog {
+  std::string name;
+  double duration_s = 10, period_s = 10, speed = 1;
+  int order = 5;
+  std::uint64_t seed = 0;
+  double start_s = 0;    ///< since the session's start
+  double amplitude = 1;  ///< share of the motion's size once it is scaled to the limits
+};
+
+/// A position loop on every joint.
+struct ScenarioControl {
+  double bandwidth_hz = 6;
+  bool feedforward = true;  ///< of the rigid body's torque along the reference
+  double tick_s = 0.002;
+};
+
+/// A scenario file (docs/guide/scenario.md).
+struct Scenario {
+  enum class Plant { internal, mujoco };
+  enum class Motion { prescribed, closed_loop };
+
+  IdentifiedModel plant;
+  Plant plant_kind = Plant::internal;
+  Motion motion = Motion::prescribed;
+  ScenarioControl control;
+  std::vector<FourierBounds> bounds;
+  double sample_s = 0.002;
+  double start_s = 0;    ///< the session's clock at its start
+  double jitter = 0;     ///< stamps are off by uniform +- jitter * sample_s / 2
+  int encoder_bits = 0;  ///< per turn of the joint, or per metre; 0: exact
+  int link_encoder_bits = 0;
+  std::vector<bool> link_encoder;  ///< which joints have one; empty: none
+  double torque_noise = 0;         ///< white, share of rated torque
+  double ar_noise = 0;             ///< first-order autoregressive, RMS as share of rated torque
+  double ar_pole = 0.95;           ///< its correlation from sample to sample
+  bool exact_motion = false;       ///< logs carry exact q, dq, ddq
+  std::uint64_t seed = 1;
+  std::vector<ScenarioLog> logs;
+};
+
+/// @throws InputError with file and line.
+Scenario read_scenario(const std::filesystem::path& file);
+
+}  // namespace fxdyn

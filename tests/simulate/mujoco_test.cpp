@@ -1,0 +1,150 @@
+#include <gtest/gtest.h>
+
+#include "host_tools/model/effects.hpp"
+#include "host_tools/model/evaluator.hpp"
+#include "host_tools/simulate/mujoco_plant.hpp"
+#include "tests/simulate/support.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::MatrixXd;
+
+MatrixXd model_torque(const IdentifiedModel& plant, const Reference& motion, double age_s = 0) {
+  return predict(plant, motion.q, motion.dq, motion.ddq, motion.step_s, nullptr, age_s);
+}
+
+bool slides(const Robot& robot) {
+  return std::any_of(robot.joints.begin(), robot.joints.end(),
+                     [](const Joint& joint) { return joint.type == JointType::prismatic; });
+}
+
+TEST(Mujoco, RigidBodyIsTheModels) {
+  std::vector<Robot> robots{read_urdf(test::puma560)};
+  for (unsigned seed = 1; robots.size() < 4; ++seed) {
+    Robot robot = test::Chains(seed).robot(5);
+    if (slides(robot)) robots.push_back(robot);
+  }
+  for (const Robot& robot : robots) {
+    IdentifiedModel plant = test::plant_of(robot);
+    for (JointFit& joint : plant.joints) joint.effects.push_back(test::effect("rotor_inertia", {}, {0.5}));
+    plant.body = {test::effect("payload", {}, {3.0, 0.1, -0.05, 0.2}), test::effect("gravity_tilt", {}, {0.02, -0.05})};
+    const Reference motion = test::motion_of(robot, 0.002, 2);
+    const MatrixXd expected = model_torque(plant, motion);
+    const PlantRun run = prescribed_on_mujoco(plant, motion, 0);
+    EXPECT_LT((run.tau - expected).cwiseAbs().maxCoeff(), 1e-6 * expected.cwiseAbs().maxCoeff());
+    EXPECT_EQ(run.q, motion.q);
+  }
+}
+
+/// Effects and how far MuJoCo's plant may be from the catalogue's formulas, of their own RMS.
+struct Hidden {
+  std::vector<EffectFit> effects;
+  double tolerance;
+};
+void PrintTo(const Hidden& hidden, std::ostream* out) { *out << hidden.effects.back().effect; }
+
+class HiddenEffect : public testing::TestWithParam<Hidden> {};
+
+TEST_P(HiddenEffect, ChangesTheTorqueAsTheCatalogueSays) {
+  const auto& [effects, tolerance] = GetParam();
+  IdentifiedModel healthy = test::puma_with_friction();
+  constexpr std::size_t j = 1;
+  for (JointFit& joint : healthy.joints) joint.effects.pop_back();  // Coulomb's: its reversal has a test of its own
+  IdentifiedModel plant = healthy;
+  const bool on_body = find_effect(effects[0].effect)->acts_on == ActsOn::body;
+  for (const EffectFit& effect : effects) (on_body ? plant.body : plant.joints[j].effects).push_back(effect);
+  const Reference motion = test::motion_of(plant.robot, 0.0005, 10);
+  const double age_s = 7;
+  const MatrixXd expected = model_torque(plant, motion, age_s) - model_torque(healthy, motion, age_s);
+  const MatrixXd found =
+      prescribed_on_mujoco(plant, motion, age_s).tau - prescribed_on_mujoco(healthy, motion, age_s).tau;
+  EXPECT_GT(test::rms(expected.col(j)), 0.1);
+  EXPECT_LT(test::rms(found.col(j) - expected.col(j)), tolerance * test::rms(expected.col(j)));
+  if (on_body) return;
+  for (Eigen::Index other = 0; other < 6; ++other) {
+    if (other == j) continue;
+    EXPECT_LT(test::rms(found.col(other)), 1e-9) << "joint " << other + 1;
+  }
+}
+
+// Where there is a sign, it is another function of the velocity, most of all MuJoCo's own of dry friction, which turns
+// within less than a mrad/s; else the numbers are the same.
+INSTANTIATE_TEST_SUITE_P(
+    Mujoco, HiddenEffect,
+    testing::Values(
+        Hidden{{test::effect("offset", {}, {3})}, 1e-6}, Hidden{{test::effect("stribeck", {0.3}, {6})}, 0.03},
+        Hidden{{test::effect("coulomb", {}, {8})}, 0.1},
+        Hidden{{test::effect("coulomb", {}, {8}), test::effect("presliding", {0.01}, {8})}, 0.03},
+        Hidden{{test::effect("asymmetric_friction", {}, {2, 1})}, 0.03},
+        Hidden{{test::effect("viscous_quadratic", {}, {3})}, 1e-6},
+        Hidden{{test::effect("viscous_cubic", {}, {-1})}, 1e-6},
+        Hidden{{test::effect("load_friction", {}, {0.1})}, 0.03},
+        Hidden{{test::effect("torque_gain", {}, {0.05})}, 0.03}, Hidden{{test::effect("ripple", {40}, {1, -2})}, 1e-6},
+        Hidden{{test::effect("spring", {}, {20, 3})}, 1e-6}, Hidden{{test::effect("spring", {}, {-20, 3})}, 1e-6},
+        Hidden{{test::effect("gravity_compensator", {}, {10, -5})}, 1e-6},
+        Hidden{{test::effect("friction_drift", {30}, {4, 3})}, 0.03},
+        Hidden{{test::effect("saturation", {30}, {1})}, 0.05},
+        Hidden{{test::effect("joint_coupling", {3}, {2, 1})}, 0.03},
+        Hidden{{test::effect("motor_coupling", {3, 1.0, 0.002}, {2, 1, 0.5})}, 0.03},
+        Hidden{{test::effect("delay", {0.004}, {1})}, 0.01},
+        Hidden{{test::effect("payload", {}, {4, 0.05, 0, 0.1})}, 1e-6},
+        Hidden{{test::effect("gravity_tilt", {}, {0.05, 0.1})}, 1e-6}));
+
+TEST(Mujoco, GearsThatGiveAreTheModelsWhereThisIsSlow) {
+  // Links are prescribed here and motors there, so the motors' motion is compared with what the model makes of it.
+  for (const EffectFit& effect : {test::effect("elasticity", {0.004}, {3e-5}), test::effect("backlash", {10}, {1e-3}),
+                                  test::effect("eccentricity", {}, {2e-3, -1e-3})}) {
+    IdentifiedModel plant = test::puma_with_friction();
+    plant.joints[1].effects.push_back(effect);
+    const Reference motion = test::motion_of(plant.robot, 0.0005, 10, 10);
+    const PlantRun run = prescribed_on_mujoco(plant, motion, 0);
+    const auto inner = Eigen::seq(200, run.q.rows() - 200);
+    EXPECT_LT(((run.q - run.deflections) - motion.q).cwiseAbs().maxCoeff(), 1e-12);
+    MatrixXd deflections;
+    const MatrixXd tau = predict(plant, run.q, run.dq, run.ddq, run.step_s, &deflections);
+    const auto error = [&](const MatrixXd& a, const MatrixXd& b) {
+      return test::rms(a(inner, 1) - b(inner, 1)) / test::rms(b(inner, 1));
+    };
+    EXPECT_LT(error(run.deflections, deflections), 0.02) << effect.effect;
+    EXPECT_LT(error(run.tau, tau), 0.02) << effect.effect;
+  }
+}
+
+TEST(Mujoco, ClosedLoopWithEveryEffectItTakes) {
+  IdentifiedModel plant = test::puma_with_friction();
+  const std::vector<EffectFit> effects{test::effect("stribeck", {0.1}, {2}),
+                                       test::effect("presliding", {0.005}, {5}),
+                                       test::effect("asymmetric_friction", {}, {1, 0.5}),
+                                       test::effect("viscous_cubic", {}, {0.5}),
+                                       test::effect("load_friction", {}, {0.05}),
+                                       test::effect("ripple", {30}, {0.5, 0.5}),
+                                       test::effect("spring", {}, {5, 1}),
+                                       test::effect("friction_drift", {30}, {1, 1}),
+                                       test::effect("joint_coupling", {3}, {1, 0.5}),
+                                       test::effect("elasticity", {0.004}, {3e-5}),
+                                       test::effect("eccentricity", {}, {1e-3, 0})};
+  for (const EffectFit& effect : effects) plant.joints[1].effects.push_back(effect);
+  plant.body = {test::effect("payload", {}, {2, 0, 0, 0.1})};
+  Reference reference = test::motion_of(plant.robot, 0.0005, 10);
+  reference.feedforward = model_torque(test::plant_of(plant.robot), reference);
+  ClosedLoopSettings settings;
+  settings.hold = 4;
+  const PlantRun run = closed_loop_on_mujoco(plant, reference, settings);
+  EXPECT_LT(test::rms(run.q - reference.q), 0.03);
+  // The model's torque for that motion, as slow as its gear has to be.
+  const ZeroPhaseFilter filter(8, run.step_s);
+  const MatrixXd expected =
+      filter.apply(predict(plant, filter.apply(run.q), filter.apply(run.dq), filter.apply(run.ddq), run.step_s));
+  const MatrixXd measured = filter.apply(run.tau);
+  for (Eigen::Index j = 0; j < 6; ++j) {
+    // friction is most of the wrist's torque, and it creeps otherwise than a tanh does
+    EXPECT_LT(test::rms(measured.col(j) - expected.col(j)), (j < 3 ? 0.05 : 0.25) * test::rms(expected.col(j)))
+        << "joint " << j + 1;
+  }
+  EXPECT_GT(test::rms(run.deflections.col(1)), 5e-4);
+  EXPECT_EQ(run.deflections.col(2).cwiseAbs().maxCoeff(), 0);
+}
+
+}  // namespace
+}  // namespace fxdyn

@@ -1,0 +1,195 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "host_tools/files.hpp"
+#include "host_tools/model/evaluator.hpp"
+#include "host_tools/simulate/simulate.hpp"
+#include "tests/simulate/support.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+const std::string log_text = "[[log]]\nname = \"run\"\nduration_s = 4\nperiod_s = 4\nspeed = 0.5\nseed = 7\n";
+
+struct Played {
+  Log log, truth;
+  IdentifiedModel plant;
+};
+
+/// Plays a scenario of one log.
+Played play(const std::string& name, const std::string& text) {
+  const auto out = test::folder() / name;
+  const auto file = simulate(test::write(name + ".toml", text), out)[0];
+  const std::vector<bool> revolute(6, true);
+  Played played{read_log(file, 6, revolute, {}, {}, {}), {}, read_model(out / "truth.json")};
+  // the truth has torques only: it borrows the log's positions
+  const std::string truth = read_file(out / "run.truth.csv");
+  LogFormat format;
+  format.columns = {{"q", "tau"}};
+  played.truth = read_log(test::write(name + "_truth.csv", truth), 6, std::vector<bool>(6, false), format, {}, {});
+  return played;
+}
+
+const std::string friction = test::effect_text(1, "viscous", "coefficient = 5.0") +
+                             test::effect_text(1, "coulomb", "amplitude = 7.0, width = 0.002") +
+                             test::effect_text(2, "rotor_inertia", "inertia = 4.0") +
+                             test::effect_text(3, "presliding", "distance = 0.003, amplitude = 3.0") +
+                             test::effect_text(4, "friction_drift", "time_constant = 30, coulomb = 2, viscous = 1");
+
+TEST(Scenario, TruthIsTheModelsTorqueOnTheMotionThatTheLogShows) {
+  for (const std::string top : {"motion = \"prescribed\"", "motion = \"closed_loop\""}) {
+    // at the plant's own step nothing is left out between the samples
+    const std::string text =
+        test::puma_scenario(top, "exact_motion = true\nsample_s = 0.0005") + friction + log_text + "start_s = 12\n";
+    const Played played = play("truth", text);
+    const MatrixXd model = predict(played.plant, played.log.q, played.log.dq, played.log.ddq, 0.0005, nullptr, 12);
+    EXPECT_LT((model - played.truth.tau).rightCols(3).cwiseAbs().maxCoeff(), 0.1) << top;
+    EXPECT_LT((model - played.truth.tau).leftCols(2).cwiseAbs().maxCoeff(), 1e-9) << top;
+  }
+}
+
+TEST(Scenario, ClosedLoopStaysNearTheReference) {
+  const std::string sensors = "exact_motion = true";
+  const Played free = play("free", test::puma_scenario("", sensors) + friction + log_text);
+  const Played held = play("held", test::puma_scenario("motion = \"closed_loop\"\n[control]\nbandwidth_hz = 10\n"
+                                                       "tick_s = 0.001\n",
+                                                       sensors) +
+                                       friction + log_text);
+  const double error = test::rms(held.log.q - free.log.q);
+  EXPECT_LT(error, 0.02);
+  EXPECT_GT(error, 1e-5);
+  const Played blind =
+      play("blind", test::puma_scenario("motion = \"closed_loop\"\n[control]\nfeedforward = false\n", sensors) +
+                        friction + log_text);
+  EXPECT_GT(test::rms(blind.log.q - free.log.q), 2 * error);
+}
+
+TEST(Scenario, MujocoWritesTheSameFiles) {
+  for (const std::string top : {"plant = \"mujoco\"", "plant = \"mujoco\"\nmotion = \"closed_loop\""}) {
+    const Played played =
+        play("mujoco", test::puma_scenario(top, "encoder_bits = 17\ntorque_noise = 0.01") + friction + log_text);
+    EXPECT_EQ(played.log.samples(), 2000);
+    EXPECT_EQ(played.truth.tau.rows(), 2000);
+    EXPECT_EQ(played.plant.joints[0].effects.size(), 2U);
+    EXPECT_NEAR(test::rms((played.log.tau - played.truth.tau).col(0)), 0.976, 0.05);
+  }
+}
+
+TEST(Scenario, AutoregressiveNoiseHasItsSizeAndMemory) {
+  const std::string text = test::puma_scenario("", "ar_noise = 0.02\nar_pole = 0.9\nsample_s = 0.001") +
+                           "[[log]]\nname = \"run\"\nduration_s = 60\nseed = 7\n";
+  const Played played = play("ar", text);
+  const MatrixXd noise = played.log.tau - played.truth.tau;
+  const Eigen::Index n = noise.rows();
+  const VectorXd e = noise.col(1);
+  EXPECT_NEAR(test::rms(e), 0.02 * 186.4, 0.02 * 186.4 * 0.05);
+  const double power = e.squaredNorm();
+  for (const Eigen::Index lag : {1, 5, 10}) {
+    EXPECT_NEAR(e.head(n - lag).dot(e.tail(n - lag)) / power, std::pow(0.9, lag), 0.05) << lag;
+  }
+  EXPECT_LT(std::fabs(noise.col(0).dot(noise.col(1))), 0.05 * noise.col(0).norm() * noise.col(1).norm());
+  // Stationary from the first sample on, over many sessions; and the white noise stays what it was.
+  double first = 0;
+  constexpr int sessions = 200;
+  std::string many = test::puma_scenario("", "ar_noise = 0.02\nar_pole = 0.99");
+  for (int k = 0; k < sessions; ++k)
+    many += fmt::format("[[log]]\nname = \"s{}\"\nduration_s = 0.01\nseed = {}\n", k, k);
+  const auto files = simulate(test::write("many.toml", many), test::folder() / "many");
+  for (std::size_t k = 0; k < sessions; ++k) {
+    const Log log = read_log(files[k], 6, std::vector<bool>(6, true), {}, {}, {});
+    LogFormat format;
+    format.columns = {{"q", "tau"}};
+    const Log truth = read_log(test::folder() / "many" / fmt::format("s{}.truth.csv", k), 6,
+                               std::vector<bool>(6, false), format, {}, {});
+    first += std::pow((log.tau(0, 0) - truth.tau(0, 0)) / (0.02 * 97.6), 2) / sessions;
+  }
+  EXPECT_NEAR(first, 1, 0.3);
+}
+
+TEST(Scenario, JitteredStampsAreReadAndResampled) {
+  const std::string sensors = "exact_motion = true";
+  const Played regular = play("regular", test::puma_scenario("", sensors) + friction + log_text);
+  const Played irregular = play("irregular", test::puma_scenario("", sensors + "\njitter = 0.5") + friction + log_text);
+  EXPECT_FALSE(regular.log.resampled);
+  ASSERT_TRUE(irregular.log.resampled);
+  const VectorXd off = irregular.log.stamps - regular.log.t;
+  EXPECT_LE(off.cwiseAbs().maxCoeff(), 0.0005);
+  EXPECT_GT(off.maxCoeff(), 0.0004);
+  EXPECT_NEAR(test::rms(off), 0.0005 / std::sqrt(3.0), 2e-5);
+  // Sampled at the very instants: resampled it is the regular log again.
+  const Eigen::Index common = std::min(regular.log.samples(), irregular.log.samples());
+  const MatrixXd back = interpolate(irregular.log.q, irregular.log.t, regular.log.t.head(common));
+  EXPECT_LT((back - regular.log.q.topRows(common)).middleRows(2, common - 4).cwiseAbs().maxCoeff(), 1e-5);
+  const MatrixXd tau = interpolate(irregular.truth.tau, irregular.truth.t, regular.log.t.head(common));
+  EXPECT_LT(test::rms((tau - regular.truth.tau.topRows(common)).middleRows(2, common - 4)), 0.2);
+}
+
+TEST(Scenario, StartsShiftTheStampsAndWarmTheDrift) {
+  const std::string sensors = "exact_motion = true\nstart_s = 1000";
+  const std::string drift = test::effect_text(1, "friction_drift", "time_constant = 30, coulomb = 0, viscous = 5");
+  for (const std::string top : {"", "plant = \"mujoco\""}) {
+    const Played cold = play("cold", test::puma_scenario(top, sensors) + drift + log_text);
+    const Played warm = play("warm", test::puma_scenario(top, sensors) + drift + log_text + "start_s = 45\n");
+    EXPECT_EQ(cold.log.t[0], 1000);
+    EXPECT_EQ(warm.log.t[0], 1045);
+    EXPECT_EQ(cold.log.q, warm.log.q);
+    for (Eigen::Index k = 0; k < cold.log.samples(); k += 100) {
+      const double t = 0.002 * static_cast<double>(k), more = std::exp(-t / 30) - std::exp(-(t + 45) / 30);
+      EXPECT_NEAR((warm.truth.tau - cold.truth.tau)(k, 0), more * 5 * cold.log.dq(k, 0), 1e-6);
+    }
+  }
+}
+
+TEST(Scenario, AmplitudeScalesTheMotionAboutItsCentre) {
+  const std::string head = test::puma_scenario("", "exact_motion = true") + log_text;
+  const Log whole = play("whole", head).log, part = play("part", head + "amplitude = 0.05\n").log;
+  EXPECT_LT((whole.q.row(0) - part.q.row(0)).cwiseAbs().maxCoeff(), 1e-12);  // a period starts at the centre
+  EXPECT_LT((part.dq - 0.05 * whole.dq).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_LT((part.ddq - 0.05 * whole.ddq).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+class BadScenario : public testing::TestWithParam<test::Bad> {};
+
+TEST_P(BadScenario, IsRefusedWithItsLine) {
+  const auto file = test::write(GetParam().name + ".toml", GetParam().text);
+  test::expect_refused(file, GetParam().message, [&] { simulate(file, test::folder() / "bad"); });
+}
+
+std::string scenario(const std::string& top, const std::string& sensors, const std::string& more = {}) {
+  return test::puma_scenario(top, sensors) + more + log_text;
+}
+
+// Lines count from "seed = 4".
+INSTANTIATE_TEST_SUITE_P(
+    Scenario, BadScenario,
+    testing::Values(
+        test::Bad{"plant", scenario("plant = \"mojoco\"", ""), {":2:", "unknown plant 'mojoco'", "mujoco"}},
+        test::Bad{"motion", scenario("motion = \"loop\"", ""), {":2:", "unknown motion", "closed_loop"}},
+        test::Bad{"control", scenario("[control]\nbandwidth_hz = 6", ""), {":2:", "closed_loop"}},
+        test::Bad{
+            "bandwidth", scenario("motion = \"closed_loop\"\n[control]\nbandwidth_hz = 0", ""), {":4:", "above 0"}},
+        test::Bad{
+            "tick", scenario("motion = \"closed_loop\"\n[control]\ntick_s = 0.1", ""), {":3:", "ticks of at most"}},
+        test::Bad{"key", scenario("motion = \"closed_loop\"\n[control]\ntick = 0.1", ""), {":4:", "'tick'", "tick_s"}},
+        test::Bad{"jitter", scenario("", "jitter = 1.0"), {":4:", "below 1"}},
+        test::Bad{"ar_noise", scenario("", "ar_noise = -0.1"), {":4:", "at least 0"}},
+        test::Bad{"ar_pole", scenario("", "ar_pole = 1.0"), {":4:", "below 1"}},
+        test::Bad{"amplitude", scenario("", "") + "amplitude = 2.0", {":15:", "at most 1"}},
+        test::Bad{"start", scenario("", "") + "start_s = -1", {":15:", "at least 0"}},
+        test::Bad{"elastic",
+                  scenario("plant = \"mujoco\"", "",
+                           test::effect_text(1, "elasticity", "compliance = 1e-4, relaxation = 0.004")),
+                  {":9:", "rotor_inertia"}},
+        test::Bad{"backlash",
+                  scenario("plant = \"mujoco\"\nmotion = \"closed_loop\"", "",
+                           test::effect_text(1, "rotor_inertia", "inertia = 1") +
+                               test::effect_text(1, "backlash", "half_gap = 1e-3, torque_scale = 1")),
+                  {":14:", "prescribed"}}),
+    [](const auto& bad) { return bad.param.name; });
+
+}  // namespace
+}  // namespace fxdyn
