@@ -30,6 +30,14 @@ std::string what_it_means(const json& diagnosis) {
   return verdict;
 }
 
+std::string figures(const json& diagnosis) {
+  std::string out;
+  if (const std::string on = words::figures_on(diagnosis); !on.empty()) out += paragraph("Gaps on " + on + ".");
+  const std::string hidden = words::list(diagnosis.value("not_identifiable", json::array()));
+  if (!hidden.empty()) out += paragraph("Not identifiable on the robot as a whole: " + hidden + ".");
+  return out;
+}
+
 Cell n(const std::string& text) { return {text, "n"}; }
 
 const char* colour_of(const json& joint) {
@@ -53,6 +61,8 @@ std::string joint_table(const json& joints) {
     std::string regions;
     for (const json& region : joint.value("where", json::array()))
       regions += (regions.empty() ? "" : "; ") + words::where(region, unit);
+    const std::string like = words::list(joint.value("resembles", json::array()));
+    if (!like.empty()) regions += (regions.empty() ? "" : "; ") + std::string("resembles ") + like;
     table.add({{words::joint(joint, j)},
                {unit},
                {words::verdict(joint), colour_of(joint)},
@@ -66,7 +76,9 @@ std::string joint_table(const json& joints) {
   return table.html() +
          paragraph(
              "The gap is the RMS of measured minus model torque on held-out logs, both filtered alike, noise not "
-             "subtracted. Closed: the share of the gap's power above the noise that the effects found take away.");
+             "subtracted. Closed: the share of the gap's power above the noise that the effects found take away. "
+             "\"Resembles\": an effect that helps, but explains too little to be named; the "
+             "model keeps it without a name.");
 }
 
 std::string effect_table(const json& diagnosis) {
@@ -183,8 +195,8 @@ std::string pictures(const json& joints, const fs::path& directory) {
 
 std::string diagnosis_section(const json& diagnosis, const fs::path& directory) {
   const json joints = diagnosis.value("joints", json::array());
-  std::string out =
-      section("Diagnosis") + paragraph(what_it_means(diagnosis)) + joint_table(joints) + effect_table(diagnosis);
+  std::string out = section("Diagnosis") + paragraph(what_it_means(diagnosis)) + figures(diagnosis) +
+                    joint_table(joints) + effect_table(diagnosis);
   if (diagnosis.contains("evidence")) {
     const json& evidence = diagnosis.at("evidence");
     out += evidence_section(evidence) + forward_section(evidence.value("forward", json()));

@@ -102,6 +102,16 @@ std::string where_lines(const json& joints) {
   return out.empty() ? "" : "where the gap sits\n" + out;
 }
 
+/// Effects that an unexplained gap resembles without being one of them.
+std::string resembling_lines(const json& joints) {
+  std::string out;
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    const std::string names = words::list(joints[j].value("resembles", json::array()));
+    if (!names.empty()) out += indented(words::joint(joints[j], j), names);
+  }
+  return out.empty() ? "" : "unexplained, resembles (kept in the model without a name)\n" + out;
+}
+
 std::string alternative_lines(const json& diagnosis) {
   std::string out;
   const auto add = [&](const std::string& whose, const json& effects) {
@@ -130,12 +140,15 @@ std::string robot_lines(const json& diagnosis) {
   return out.empty() ? "" : "on the robot as a whole\n" + out;
 }
 
-std::string hidden_lines(const json& joints) {
+std::string hidden_lines(const json& diagnosis) {
+  const json joints = diagnosis.value("joints", json::array());
   std::string out;
   for (std::size_t j = 0; j < joints.size(); ++j) {
     const std::string names = words::list(joints[j].value("not_identifiable", json::array()));
     if (!names.empty()) out += indented(words::joint(joints[j], j), names);
   }
+  const std::string robot = words::list(diagnosis.value("not_identifiable", json::array()));
+  if (!robot.empty()) out += indented("robot", robot);
   return out.empty() ? "" : "not identifiable with this motion\n" + out;
 }
 
@@ -179,8 +192,9 @@ std::string evidence_lines(const json& diagnosis) {
 std::string diagnosis_table(const json& diagnosis) {
   const json joints = diagnosis.value("joints", json::array());
   std::string out = "\ndiagnosis: " + words::verdict(diagnosis) + "\n";
-  out += joint_rows(joints) + robot_lines(diagnosis) + where_lines(joints) + alternative_lines(diagnosis) +
-         hidden_lines(joints) + evidence_lines(diagnosis);
+  if (const std::string on = words::figures_on(diagnosis); !on.empty()) out += "gaps on " + on + "\n";
+  out += joint_rows(joints) + robot_lines(diagnosis) + where_lines(joints) + resembling_lines(joints) +
+         alternative_lines(diagnosis) + hidden_lines(diagnosis) + evidence_lines(diagnosis);
   if (const std::string next = words::next_experiment(diagnosis); !next.empty()) out += indented("next", next);
   for (const json& note : diagnosis.value("notes", json::array())) {
     if (note.is_string()) out += indented("note", note.get<std::string>());

@@ -115,6 +115,13 @@ std::string joint(const json& of, std::size_t place) {
   return name.empty() ? fmt::format("joint {}", of.value("index", place + 1)) : name;
 }
 
+std::string figures_on(const json& diagnosis) {
+  std::string out = text(diagnosis, "figures_on");
+  if (diagnosis.value("baseline", false))
+    out += out.empty() ? "change since the baseline" : "; change since the baseline";
+  return out;
+}
+
 std::string next_experiment(const json& diagnosis) {
   std::vector<std::string> sentences;
   const auto add = [&](const json& of) {

@@ -24,6 +24,8 @@ std::string where(const nlohmann::json& of, const std::string& torque_unit);
 std::string list(const nlohmann::json& of);
 /// "joint_1", or "joint 1" where it has no name.
 std::string joint(const nlohmann::json& of, std::size_t place);
+/// "test logs; change since a baseline", or "".
+std::string figures_on(const nlohmann::json& diagnosis);
 /// Sentences on what to do next: of the robot, then those of single joints.
 std::string next_experiment(const nlohmann::json& diagnosis);
 

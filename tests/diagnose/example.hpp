@@ -7,7 +7,8 @@ namespace fxdyn::test {
 /// A diagnosis.json with each verdict, an effect on the robot as a whole, and evidence.
 inline nlohmann::json diagnosis() {
   return nlohmann::json::parse(R"({
- "schema": "fxdyn.diagnosis/1", "verdict": "unexplained",
+ "schema": "fxdyn.diagnosis/1", "verdict": "unexplained", "figures_on": "test logs", "baseline": true,
+ "not_identifiable": ["gravity_tilt"],
  "joints": [
   {"joint": "shoulder", "index": 1, "unit": "N*m", "verdict": "effects_found", "gap_before": 1.9, "gap_after": 0.4,
    "noise_floor": 0.35, "closure": 0.83,
@@ -20,7 +21,7 @@ inline nlohmann::json diagnosis() {
   {"joint": "elbow", "index": 2, "unit": "N*m", "verdict": "unexplained", "gap_before": 0.9, "gap_after": 0.9,
    "noise_floor": 0.2, "closure": 0.0, "where": [{"signal": "t", "from": 3, "to": 4, "share_of_gap": 0.7},
              {"signal": "direction", "from": -1, "to": 0, "share_of_gap": 0.9}],
-   "effects": [], "not_identifiable": []},
+   "resembles": ["saturation"], "effects": [], "not_identifiable": []},
   {"joint": "roll", "index": 3, "unit": "N*m", "verdict": "nothing_missing", "gap_before": 0.1, "gap_after": 0.1,
    "noise_floor": 0.1, "closure": null, "where": [], "effects": [], "not_identifiable": []},
   {"joint": "slide", "index": 4, "unit": "N", "verdict": "not_excited", "gap_before": 3.0, "gap_after": 3.0,

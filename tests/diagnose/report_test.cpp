@@ -76,7 +76,8 @@ TEST(DiagnosisReport, IsInTheReportWithPlotsAndTheReportSurvivesWithoutIt) {
   for (const char* part :
        {"<h2>Diagnosis</h2>", "stribeck", "amplitude 2.1 ± 0.05 N*m", "presliding", "83 %", "unexplained",
         "61 % of the gap at velocity", "after, fixed point", "b.csv", "recorded motion in closed loop",
-        "not positive definite", "slow reversals of joint 1", "shoulder: residual before and after"})
+        "not positive definite", "resembles saturation", "Gaps on test logs", "as a whole: gravity_tilt",
+        "slow reversals of joint 1", "shoulder: residual before and after"})
     EXPECT_NE(page.find(part), std::string::npos) << part;
   EXPECT_EQ(count(page, "residual before and after"), 2U);
   EXPECT_NE(summary_table(run.out).find("diagnosis: unexplained"), std::string::npos);
