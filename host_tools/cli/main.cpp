@@ -85,6 +85,8 @@ int run(int argc, char** argv) {
   const CLI::App* run_verb = stage("run", "identify, train, export and report in one go.");
   const CLI::App* identify_verb =
       stage("identify", "Structure and friction from the train logs: model.json, metrics.json.");
+  const CLI::App* diagnose_verb =
+      stage("diagnose", "Find and name what the nominal model lacks, add it: diagnosis.json, model.json.");
   const CLI::App* train_verb =
       stage("train", "Fit a Broad Learning System on what is left; keep it where validation improves.");
   const CLI::App* export_verb =
@@ -153,6 +155,7 @@ int run(int argc, char** argv) {
     Pipeline pipeline(project, out);
     if (*run_verb) pipeline.run();
     if (*identify_verb) pipeline.identify();
+    if (*diagnose_verb) pipeline.diagnose();
     if (*train_verb) pipeline.train();
     if (*export_verb) pipeline.export_tables();
     if (*report_verb) pipeline.report();

@@ -117,6 +117,8 @@ double correlation(const MatrixXd& e, const MatrixXd& f, const MatrixXd& between
   return std::min(1.0, std::sqrt((e.transpose() * between * f).squaredNorm() / static_cast<double>(e.cols())));
 }
 
+}  // namespace
+
 std::string cure(const std::string& e, const std::string& f) {
   struct Cure {
     std::set<std::string_view> effects;
@@ -146,6 +148,8 @@ std::string cure(const std::string& e, const std::string& f) {
   if (e.ends_with("coupling") || f.ends_with("coupling")) return "joints moved one at a time";
   return "other positions, speeds and loads in other combinations";
 }
+
+namespace {
 
 void check(const IdentifiedModel& nominal, const std::vector<Motion>& motions, const SightSettings& settings) {
   const auto n = static_cast<Index>(nominal.robot.size());

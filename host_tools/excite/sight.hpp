@@ -77,6 +77,9 @@ struct Sight {
 Sight see(const IdentifiedModel& nominal, const std::vector<Motion>& motions, const SightSettings& settings,
           Progress& progress);
 
+/// Which experiment would tell two effects (or "base parameters") apart.
+std::string cure(const std::string& e, const std::string& f);
+
 /// The key "sight" of excite.json: percent of rated torque, correlations, shapes and parameters with units; a value
 /// that can't be reached is null.
 nlohmann::json sight_json(const Sight& sight, const std::vector<std::string>& assumptions = {});

@@ -203,7 +203,7 @@ class ProjectReader {
   }
 
   void read_diagnose(Table& table) {
-    if (const auto value = table.find("max_effects")) value->count(0);
+    if (const auto value = table.find("max_effects")) project_.diagnose.max_effects = value->count(0);
     table.finish();
   }
 

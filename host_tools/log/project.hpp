@@ -38,6 +38,10 @@ struct IdentifySettings {
   double forgetting = 1;   ///< rls: what a second-old row counts
 };
 
+struct DiagnoseSettings {
+  int max_effects = 3;  ///< per joint
+};
+
 struct TrainSettings {
   bool enabled = true;
   std::uint64_t seed = 1;
@@ -81,6 +85,7 @@ struct Project {
   std::vector<LogEntry> logs;
   SignalSettings signals;
   IdentifySettings identify;
+  DiagnoseSettings diagnose;
   TrainSettings train;
   ExciteSettings excite;
   TargetSettings target;

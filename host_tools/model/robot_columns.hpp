@@ -45,12 +45,14 @@ class RobotColumns {
   /// @throws InputError: no such effect or joint, wrong number of shape parameters, or what effect_columns() refuses.
   EffectColumns operator()(const EffectCandidate& candidate) const;
 
+  /// phi of a torque effect with the model's structural and total torque, as the effect emits it: samples x linear
+  /// parameters.
+  Eigen::MatrixXd phi(const EffectCandidate& candidate) const;
   /// The model's torque, and that of its rigid body (after deflections), samples x joints [N*m | N].
   const Eigen::MatrixXd& torque() const { return torque_; }
   const Eigen::MatrixXd& structural() const { return structural_; }
 
  private:
-  Eigen::MatrixXd phi(const EffectCandidate& candidate) const;
   /// [torque of `changed` - torque of the model] / theta
   Eigen::MatrixXd slope(const IdentifiedModel& changed, double theta) const;
 

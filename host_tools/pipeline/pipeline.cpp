@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "host_tools/diagnose/diagnose.hpp"
 #include "host_tools/error.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/export/proof.hpp"
@@ -177,6 +178,31 @@ std::unique_ptr<Fitter> Pipeline::fitter_from(const IdentifiedModel& model) {
 void Pipeline::identify() {
   const auto fitter = fxdyn::identify(project_, data(), progress_);
   finish(*fitter, Stage::identified, {});
+}
+
+void Pipeline::diagnose() {
+  std::vector<ProcessedLog> baseline;
+  for (Log& log : read_logs(project_, Role::baseline, directory_)) {
+    log.role = Role::train;  // what the healthy session is fitted on
+    baseline.push_back(process(std::move(log), data().filter));
+  }
+  const Diagnosis diagnosis = fxdyn::diagnose(project_, data(), baseline, logs(Role::test), progress_);
+  IdentifiedModel model = diagnosis.model;
+  model.stage = "diagnosed";
+  model.notes = data().notes;
+  progress_.stage("errors on all logs", 2);
+  json stages = json::array({stage_metrics(diagnosis.nominal, "friction")});
+  progress_.step();
+  stages.push_back(stage_metrics(model, "diagnosed"));
+  progress_.step();
+  progress_.done();
+  const json metrics = {{"schema", "fxdyn.metrics/1"},          {"gate", diagnosis.report.at("gate")},
+                        {"base_parameters", model.base.size()}, {"notes", data().notes},
+                        {"logs", stages.back()["logs"]},        {"stages", stages}};
+  write_file(directory_ / "nominal.json", to_json(diagnosis.nominal).dump(1) + "\n");
+  write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
+  write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
+  write_file(directory_ / "diagnosis.json", diagnosis.report.dump(1) + "\n");
 }
 
 void Pipeline::train() {

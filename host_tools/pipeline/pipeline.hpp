@@ -14,6 +14,8 @@ class Pipeline {
   Pipeline(const std::filesystem::path& project, std::filesystem::path directory);
 
   void identify();
+  /// Always from base parameters and nominal effects; needs nothing of the stages before.
+  void diagnose();
   void train();
   void export_tables();
   void report();

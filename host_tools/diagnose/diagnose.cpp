@@ -1,0 +1,612 @@
+#include "host_tools/diagnose/diagnose.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "host_tools/diagnose/lack_of_fit.hpp"
+#include "host_tools/diagnose/linearised.hpp"
+#include "host_tools/diagnose/refit.hpp"
+#include "host_tools/diagnose/search.hpp"
+#include "host_tools/diagnose/where.hpp"
+#include "host_tools/error.hpp"
+#include "host_tools/excite/sight.hpp"
+#include "host_tools/identify/solver.hpp"
+#include "host_tools/model/effects.hpp"
+#include "host_tools/parallel.hpp"
+#include "host_tools/report/metrics.hpp"
+
+namespace fxdyn {
+namespace {
+
+using namespace diagnosis;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using nlohmann::json;
+
+/// A name closes at least this share of the gap above the noise on data that did not fit it.
+constexpr double least_closure = 0.5;
+/// Where structure remains, a name is believed only if it closes this much: another effect may only resemble it.
+constexpr double sure_closure = 0.8;
+/// Rows a period of the torque cut-off: two would be Nyquist's.
+constexpr double rows_per_period = 2.5;
+/// Squared share of a column that is left: less can't be told from the nominal model.
+constexpr double nothing_left = 1e-5;
+constexpr int most_passes = 3;
+
+std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before,
+                                 const std::vector<ProcessedLog>& test) {
+  // One session where no two windows overlap in time; else every log starts its own.
+  std::vector<std::array<double, 2>> windows;
+  for (const auto* logs : {&now, &test}) {
+    for (const ProcessedLog& log : *logs) windows.push_back({log.t[0], log.t[log.t.size() - 1]});
+  }
+  std::sort(windows.begin(), windows.end());
+  bool one = true;
+  for (std::size_t i = 1; i < windows.size(); ++i) one &= windows[i][0] > windows[i - 1][1] - 1e-9;
+  std::vector<SessionLog> out;
+  const auto add = [&](const ProcessedLog& log, bool healthy, double start) {
+    SessionLog entry{log, healthy, healthy || log.role == Role::train, std::max(0.0, log.t[0] - start)};
+    entry.log.decimation = std::max<Index>(
+        log.decimation > 8 ? log.decimation / 8 : 1,
+        static_cast<Index>(1 / (log.step_s * rows_per_period * log.filter.torque_cutoff_hz)));
+    out.push_back(std::move(entry));
+  };
+  for (const ProcessedLog& log : now) add(log, false, one ? windows.front()[0] : log.t[0]);
+  for (const ProcessedLog& log : before) add(log, true, log.t[0]);
+  return out;
+}
+
+IdentifiedModel nominal_model(Project project, GateData& data, Progress& progress) {
+  if (!project.identify.effects) project.identify.effects = {"viscous", "coulomb", "offset", "rotor_inertia"};
+  project.identify.physical = false;
+  project.identify.essential = false;
+  if (project.identify.method == "rls") project.identify.method = "wls";
+  const auto fitter = identify(project, data, progress);
+  if (fitter->torque_lead_s() < 0 && !project.signals.torque_lead_s) {
+    // Torque that comes late is an effect with a name.
+    fitter->set_torque_lead(0);
+    weigh(*fitter, project.identify);
+    std::erase_if(data.notes, [](const std::string& note) { return note.starts_with("the torque column is"); });
+  }
+  IdentifiedModel model = finish_model(*fitter, project, data).model;
+  for (JointFit& joint : model.joints)
+    std::erase_if(joint.effects, [](const EffectFit& fit) { return fit.effect == Elasticity::name; });
+  return model;
+}
+
+/// What a search came to.
+struct Outcome {
+  Models models;
+  std::unique_ptr<Linearised> at;  ///< around the models, without candidates
+  std::vector<Found> found;        ///< of the last search; groups are those of `at`
+  std::vector<MatrixXd> features;
+  std::vector<LackOfFit> lack;
+  std::vector<std::vector<std::string>> not_identifiable;  ///< per joint, and of the robot
+  std::vector<VectorXd> whitening;
+};
+
+std::vector<std::size_t> in_model(const Linearised& at) {
+  std::vector<std::size_t> groups;
+  for (std::size_t g = 0; g < at.groups().size(); ++g) {
+    if (at.groups()[g].in_model) groups.push_back(g);
+  }
+  return groups;
+}
+
+std::vector<Index> columns_of(const Linearised& at, const std::vector<std::size_t>& groups) {
+  std::vector<Index> out = at.nuisance();
+  for (const std::size_t g : groups) {
+    for (Index i = 0; i < at.groups()[g].count; ++i) out.push_back(at.groups()[g].first + i);
+  }
+  return out;
+}
+
+bool same(const EffectCandidate& a, bool a_body, const EffectCandidate& b, bool b_body) {
+  return a.effect == b.effect && a_body == b_body && (a_body || a.joint == b.joint);
+}
+
+void drop(Models& models, const Group& group) {
+  auto& effects = group.on_body ? models.current.body : models.current.joints[group.candidate.joint].effects;
+  const auto it = std::find_if(effects.begin(), effects.end(), [&](const EffectFit& fit) {
+    return fit.named && fit.effect == group.candidate.effect && fit.shape == group.candidate.shape;
+  });
+  if (it != effects.end()) effects.erase(it);
+}
+
+void look_for_lack(Outcome& out) {
+  const std::size_t n = out.at->joints();
+  out.features.resize(n);
+  out.lack.resize(n);
+  const LinearFit fit = out.at->solve(columns_of(*out.at, in_model(*out.at)));
+  parallel_for(n, [&](std::size_t j) {
+    out.features[j] = features(*out.at, j);
+    out.lack[j] = lack_of_fit(*out.at, j, fit, out.features[j]);
+  });
+}
+
+/// What can't be seen whatever its size: by joint, the robot's last.
+std::vector<std::vector<std::string>> blind_spots(const Linearised& at, const Search& search) {
+  std::vector<std::vector<std::string>> out(at.joints() + 1);
+  for (const EffectInfo& info : effect_infos()) {
+    for (std::size_t j = 0; j < at.joints() + 1; ++j) {
+      bool any = false, seen = false;
+      for (std::size_t g = 0; g < search.not_absorbed().size() && g < at.groups().size(); ++g) {
+        const Group& group = at.groups()[g];
+        if (group.in_model || group.candidate.effect != info.name) continue;
+        if (group.on_body != (j == at.joints()) || (!group.on_body && group.candidate.joint != j)) continue;
+        any = true;
+        seen |= search.not_absorbed()[g] >= nothing_left;
+      }
+      if (any && !seen) out[j].emplace_back(info.name);
+    }
+  }
+  return out;
+}
+
+/// Search, name, fit again around what was named; until nothing changes.
+Outcome explore(Models models, const std::vector<SessionLog>& logs, const SearchSettings& settings,
+                const std::vector<EffectCandidate>& never, Progress& progress) {
+  Outcome out;
+  std::vector<VectorXd> whitening;
+  for (int pass = 0; pass < most_passes; ++pass) {
+    progress.stage(pass == 0 ? "looking for what is missing" : "looking again, around what was found", 8);
+    Linearised at(models, logs, whitening);
+    std::vector<EffectCandidate> skip = never;
+    for (const std::size_t g : in_model(at)) skip.push_back(at.groups()[g].candidate);
+    std::erase_if(skip, [](const EffectCandidate& c) { return c.effect == JointCoupling::name; });
+    at.add_all(dictionary(at, skip));
+    progress.step();
+    Search search(at, settings);
+    const std::vector<std::size_t> start = in_model(at);
+    const Choice choice = search.run(start, progress);
+    if (pass == 0) out.not_identifiable = blind_spots(at, search);
+    out.found = search.explain(choice);
+    out.whitening = at.whitening();
+    bool changed = false;
+    for (const std::size_t g : start) {
+      if (std::find(choice.groups.begin(), choice.groups.end(), g) != choice.groups.end()) continue;
+      drop(models, at.groups()[g]);
+      changed = true;
+    }
+    Index column = static_cast<Index>(at.nuisance().size());
+    std::vector<Group> groups;
+    for (const std::size_t g : choice.groups) {
+      const Group& group = at.groups()[g];
+      groups.push_back(group);
+      if (!group.in_model) {
+        name(models, group, choice.fit.x.segment(column, group.count));
+        changed = true;
+      }
+      column += group.count;
+    }
+    if (changed) refit(models, logs, at.whitening(), 4);
+    out.models = models;
+    // Without a baseline the gap was part of what looked like noise.
+    const bool better = changed && !models.has_baseline;
+    if (better) whitening.clear();
+    if (!better) whitening = at.whitening();
+    out.at = std::make_unique<Linearised>(models, logs, whitening);
+    // What the search found, by its group in the new linearisation.
+    std::vector<Found> found;
+    std::set<std::size_t> taken;
+    for (std::size_t i = 0; i < groups.size(); ++i) {
+      for (const std::size_t g : in_model(*out.at)) {
+        if (taken.contains(g)) continue;
+        if (!same(groups[i].candidate, groups[i].on_body, out.at->groups()[g].candidate, out.at->groups()[g].on_body)) continue;
+        taken.insert(g);
+        Found f = out.found[i];
+        f.group = g;
+        found.push_back(f);
+        break;
+      }
+    }
+    out.found = std::move(found);
+    look_for_lack(out);
+    const bool structured = std::any_of(out.lack.begin(), out.lack.end(), [](const LackOfFit& l) { return l.structured(); });
+    if (!changed || (!structured && out.found.size() < 2)) break;
+  }
+  return out;
+}
+
+/// Squares of judged residuals, whitened and weighted to unit variance.
+struct HeldOut {
+  VectorXd before, after, leftover;
+  std::vector<double> alone;  ///< by found effect: what comes back over all joints when it alone is removed
+  std::vector<VectorXd> alone_by_joint;
+  VectorXd rows;
+};
+
+HeldOut hold_out(const Outcome& outcome, const std::vector<std::size_t>& groups) {
+  const Linearised& at = *outcome.at;
+  const auto n = static_cast<Index>(at.joints());
+  HeldOut out{VectorXd::Zero(n), VectorXd::Zero(n), VectorXd::Zero(n), std::vector<double>(groups.size(), 0.0),
+              std::vector<VectorXd>(groups.size(), VectorXd::Zero(n)), VectorXd::Zero(n)};
+  const VectorXd& w = at.weights();
+  for (const Fold& fold : at.folds()) {
+    out.rows += at.row_count(fold.judge);
+    const LinearFit all = at.solve(columns_of(at, groups), fold.fit);
+    const VectorXd after = at.square(all, fold.judge).cwiseProduct(w);
+    out.after += after;
+    for (Index j = 0; j < n; ++j) {
+      out.leftover[j] += after[j] * structured_share(at, static_cast<std::size_t>(j), all,
+                                                     outcome.features[static_cast<std::size_t>(j)], fold.judge);
+    }
+    out.before += at.square(at.solve(at.nuisance(), fold.fit), fold.judge).cwiseProduct(w);
+    for (std::size_t i = 0; i < groups.size(); ++i) {
+      std::vector<std::size_t> others = groups;
+      others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+      const VectorXd without = at.square(at.solve(columns_of(at, others), fold.fit), fold.judge).cwiseProduct(w);
+      out.alone_by_joint[i] += without - after;
+      out.alone[i] += (without - after).sum();
+    }
+  }
+  return out;
+}
+
+json parameters_json(const EffectFit& fit, const Joint& joint) {
+  json out = json::array();
+  const EffectInfo& info = *find_effect(fit.effect);
+  const auto add = [&](const ParameterInfo& p, double value, const std::vector<double>& std, std::size_t i) {
+    const bool turns = joint.type == JointType::revolute;
+    json one = {{"name", p.name}, {"value", value}, {"unit", turns ? p.unit : p.unit_prismatic}};
+    one["std"] = i < std.size() && std[i] > 0 ? json(std[i]) : json(nullptr);
+    out.push_back(one);
+  };
+  for (std::size_t i = 0; i < info.shape.size(); ++i) add(info.shape[i], fit.shape[i], fit.shape_std, i);
+  for (std::size_t i = 0; i < info.linear.size(); ++i) add(info.linear[i], fit.linear[i], fit.linear_std, i);
+  return out;
+}
+
+/// Standard deviations from the whitened information.
+void add_deviations(Models& models, const Linearised& at) {
+  std::vector<Index> columns;
+  for (Index c = 0; c < static_cast<Index>(at.unknowns().size()); ++c) columns.push_back(c);
+  const LinearFit fit = at.solve(columns);
+  const MatrixXd covariance = SymmetricSolver(fit.information).inverse();
+  IdentifiedModel& model = models.current;
+  for (JointFit& joint : model.joints) {
+    for (EffectFit& effect : joint.effects) {
+      effect.linear_std.assign(effect.linear.size(), 0.0);
+      effect.shape_std.assign(effect.shape.size(), 0.0);
+    }
+  }
+  for (EffectFit& effect : model.body) effect.linear_std.assign(effect.linear.size(), 0.0);
+  for (std::size_t c = 0; c < at.unknowns().size(); ++c) {
+    const Unknown& u = at.unknowns()[c];
+    const double variance = covariance(static_cast<Index>(c), static_cast<Index>(c));
+    const double std = std::sqrt(std::max(variance, 0.0));
+    if (u.kind == Unknown::Kind::base) {
+      model.base[u.index].std = std;
+    } else if (u.kind == Unknown::Kind::width) {
+      model.joints[u.joint].sign_width_std = std * model.joints[u.joint].sign_width;
+    } else {
+      EffectFit& effect = u.body ? model.body[u.effect] : model.joints[u.joint].effects[u.effect];
+      if (u.kind == Unknown::Kind::shape) {
+        effect.shape_std[u.index] = std * effect.shape[u.index];
+      } else {
+        double& place = effect.linear_std[u.index];
+        place = std::hypot(place, std);  // common part and change
+        if (effect.effect == Payload::name && u.index > 0) place = std / std::max(effect.linear[0], 1e-9);
+      }
+    }
+  }
+}
+
+/// Filtered error of a joint over a log, full rate.
+VectorXd error_of(const ProcessedLog& log, const MatrixXd& torque, std::size_t joint) {
+  const auto j = static_cast<Index>(joint);
+  return log.filter_columns(log.tau.col(j) - torque.col(j)).col(0);
+}
+
+void check_same_robot(const Models& models, const std::vector<SessionLog>& logs, const IdentifiedModel& own) {
+  // Base parameters of the baseline with friction of their own against what the logs themselves fit.
+  const Linearised at(models, logs, std::vector<VectorXd>(models.current.joints.size(), VectorXd::Zero(1)));
+  (void)own;
+  const LinearFit fit = at.solve(at.nuisance());
+  std::vector<std::size_t> now;
+  for (const std::size_t b : at.fit_blocks()) {
+    if (!at.blocks()[b].healthy) now.push_back(b);
+  }
+  const VectorXd square = at.square(fit, now);
+  std::size_t strange = 0;
+  for (std::size_t j = 0; j < at.joints(); ++j) {
+    double whole = 0;
+    for (const std::size_t l : {std::size_t{0}}) (void)l;
+    for (const SessionLog& entry : logs) {
+      if (entry.healthy || !entry.fits) continue;
+      const MatrixXd tau = entry.log.decimate(entry.log.filter_columns(entry.log.tau.col(static_cast<Index>(j))));
+      whole += tau.squaredNorm();
+    }
+    strange += square[static_cast<Index>(j)] > 0.2 * whole;
+  }
+  if (2 * strange > at.joints()) {
+    throw DataError(
+        fmt::format("the baseline explains the torque of {} of {} joints not at all: a log of another robot, other units or "
+                    "columns; remove it (role = \"baseline\") or correct it",
+                    strange, at.joints()));
+  }
+}
+
+}  // namespace
+
+Diagnosis diagnose(const Project& project, GateData& data, const std::vector<ProcessedLog>& baseline,
+                   const std::vector<ProcessedLog>& test, Progress& progress) {
+  const std::size_t n = project.robot.size();
+  Models models;
+  models.has_baseline = !baseline.empty();
+  SearchSettings settings;
+  settings.max_effects = static_cast<std::size_t>(project.diagnose.max_effects);
+  std::vector<SessionLog> logs = sessions(data.logs, baseline, test);
+  std::vector<std::string> notes;
+  if (models.has_baseline) {
+    GateData healthy = data;
+    healthy.logs = baseline;
+    healthy.notes.clear();
+    models.healthy = nominal_model(project, healthy, progress);
+    models.healthy.logs = data.references;
+    // What the healthy session has that is not nominal is its background: learned, not reported.
+    Models alone{{}, models.healthy, false};
+    std::vector<SessionLog> before;
+    for (const SessionLog& log : logs) {
+      if (!log.healthy) continue;
+      before.push_back(log);
+      before.back().healthy = false;
+    }
+    refit(alone, before, {}, 3);
+    Outcome background;
+    background.at = std::make_unique<Linearised>(alone, before);
+    look_for_lack(background);
+    const bool structured = std::any_of(background.lack.begin(), background.lack.end(), [](const LackOfFit& l) { return l.structured(); });
+    if (structured) {
+      background = explore(alone, before, settings, {}, progress);
+      alone = background.models;
+      for (std::size_t j = 0; j < n; ++j) {
+        for (EffectFit& fit : alone.current.joints[j].effects) {
+          if (fit.named) notes.push_back(fmt::format("{}: the baseline has {} already", project.robot.joints[j].name, fit.effect));
+          fit.named = false;
+        }
+        if (background.lack[j].structured())
+          notes.push_back(fmt::format("{}: the baseline has structure that no effect explains", project.robot.joints[j].name));
+      }
+      for (EffectFit& fit : alone.current.body) fit.named = false;
+    }
+    models.healthy = models.current = alone.current;
+    check_same_robot(models, logs, models.current);
+    data.notes.insert(data.notes.end(), healthy.notes.begin(), healthy.notes.end());
+  } else {
+    models.current = nominal_model(project, data, progress);
+  }
+  refit(models, logs, {}, 3);
+  Diagnosis result;
+  {
+    const Linearised at(models, logs);
+    Models with = models;
+    add_deviations(with, at);
+    result.nominal = with.current;
+  }
+
+  Outcome outcome = explore(models, logs, settings, {}, progress);
+  // Names that do not hold on data that did not fit them go first.
+  std::vector<std::size_t> groups = in_model(*outcome.at);
+  HeldOut held = hold_out(outcome, groups);
+  for (bool again = true; again && !groups.empty();) {
+    again = false;
+    std::size_t worst = 0;
+    for (std::size_t i = 1; i < groups.size(); ++i) {
+      if (held.alone[i] < held.alone[worst]) worst = i;
+    }
+    if (held.alone[worst] > 4) break;
+    drop(outcome.models, outcome.at->groups()[groups[worst]]);
+    refit(outcome.models, logs, outcome.whitening, 3);
+    std::vector<Found> before = outcome.found;
+    std::vector<Group> old = outcome.at->groups();
+    outcome.at = std::make_unique<Linearised>(outcome.models, logs, outcome.whitening);
+    groups = in_model(*outcome.at);
+    outcome.found.clear();
+    for (const std::size_t g : groups) {
+      for (Found f : before) {
+        if (!same(old[f.group].candidate, old[f.group].on_body, outcome.at->groups()[g].candidate, outcome.at->groups()[g].on_body)) continue;
+        f.group = g;
+        outcome.found.push_back(f);
+        break;
+      }
+    }
+    look_for_lack(outcome);
+    held = hold_out(outcome, groups);
+    again = true;
+  }
+
+  const Linearised& at = *outcome.at;
+  Models& found = outcome.models;
+  add_deviations(found, at);
+  const VectorXd gap = (held.before - held.after).cwiseMax(0.0) + held.leftover;
+  VectorXd closure(static_cast<Index>(n));
+  for (Index j = 0; j < closure.size(); ++j) closure[j] = gap[j] > 0 ? (held.before[j] - held.after[j]) / gap[j] : 0;
+  double robot_gap = 0, robot_closed = 0;
+  for (const std::size_t g : groups) {
+    if (!at.groups()[g].on_body) continue;
+    robot_gap = gap.sum();
+    robot_closed = (held.before - held.after).sum();
+  }
+  const bool robot_named = robot_gap > 0 && robot_closed >= least_closure * robot_gap;
+  std::vector<bool> accepted(n), remains(n);
+  for (std::size_t j = 0; j < n; ++j) {
+    const auto k = static_cast<Index>(j);
+    remains[j] = outcome.lack[j].structured() && held.leftover[k] > (1 - sure_closure) * gap[k];
+    accepted[j] = closure[k] >= (remains[j] ? sure_closure : least_closure);
+  }
+
+  // Models: what is not named stays as an unnamed column, since the gate data says it helps.
+  for (std::size_t j = 0; j < n; ++j) {
+    for (EffectFit& fit : found.current.joints[j].effects) fit.named &= accepted[j];
+  }
+  for (EffectFit& fit : found.current.body) fit.named &= robot_named;
+  result.model = found.current;
+
+  // Figures on logs that decided nothing, where there are any.
+  std::vector<const ProcessedLog*> shown;
+  std::string kind = "test logs";
+  for (const ProcessedLog& log : test) shown.push_back(&log);
+  if (shown.empty()) {
+    kind = "validate logs";
+    for (const ProcessedLog& log : data.logs) {
+      if (log.role == Role::validate) shown.push_back(&log);
+    }
+  }
+  const bool blocks_only = shown.empty();
+  if (blocks_only) {
+    kind = "blocks of the train logs, each judged by a fit of the others";
+    for (const ProcessedLog& log : data.logs) shown.push_back(&log);
+  }
+  std::vector<MatrixXd> torque_before(shown.size()), torque_after(shown.size());
+  parallel_for(shown.size(), [&](std::size_t l) {
+    torque_before[l] = predict(result.nominal, *shown[l]);
+    torque_after[l] = predict(result.model, *shown[l]);
+  });
+  json joints = json::array();
+  bool any_effect = false, any_unexplained = false;
+  std::string next;
+  const auto advise = [&](const std::string& text) {
+    if (!text.empty() && next.find(text) == std::string::npos) next += (next.empty() ? "" : "; ") + text;
+  };
+  const auto share_of_model = [&](const EffectFit& fit, std::size_t j) {
+    IdentifiedModel less = result.model;
+    std::erase_if(less.joints[j].effects, [&](const EffectFit& f) { return f.effect == fit.effect && f.shape == fit.shape; });
+    const MatrixXd without = predict(less, *shown.front());
+    const auto k = static_cast<Index>(j);
+    return (torque_after.front() - without).col(k).norm() / std::max(torque_after.front().col(k).norm(), 1e-300);
+  };
+  const auto effect_json = [&](const EffectFit& fit, std::size_t j, const Found* f, double closed) {
+    json alternatives = json::array();
+    if (f != nullptr) {
+      for (const Alternative& a : f->alternatives) {
+        const bool body = find_effect(a.candidate.effect)->acts_on == ActsOn::body;
+        if (!body && a.candidate.joint != j) continue;
+        if (std::find(alternatives.begin(), alternatives.end(), a.candidate.effect) != alternatives.end()) continue;
+        alternatives.push_back(a.candidate.effect);
+        advise(fmt::format("{} or {} at joint {}: {}", fit.effect, a.candidate.effect, j + 1, cure(fit.effect, a.candidate.effect)));
+      }
+    }
+    return json{{"effect", fit.effect},
+                {"parameters", parameters_json(fit, project.robot.joints[j])},
+                {"score", f != nullptr ? f->score : 0.0},
+                {"held_out_closure", closed},
+                {"alternatives", alternatives}};
+  };
+  const auto found_of = [&](const EffectFit& fit, std::size_t j, bool body) -> std::pair<const Found*, std::size_t> {
+    for (std::size_t i = 0; i < groups.size(); ++i) {
+      const Group& group = at.groups()[groups[i]];
+      if (group.candidate.effect != fit.effect || group.on_body != body || (!body && group.candidate.joint != j)) continue;
+      if (group.candidate.shape != fit.shape && group.candidate.effect == Ripple::name) continue;
+      for (const Found& f : outcome.found) {
+        if (f.group == groups[i]) return {&f, i};
+      }
+      return {nullptr, i};
+    }
+    return {nullptr, groups.size()};
+  };
+  for (std::size_t j = 0; j < n; ++j) {
+    const auto k = static_cast<Index>(j);
+    double before = 0, after = 0, count = 0;
+    std::vector<VectorXd> errors;
+    for (std::size_t l = 0; l < shown.size(); ++l) {
+      const ProcessedLog& log = *shown[l];
+      const Index samples = log.last - log.first;
+      errors.push_back(error_of(log, torque_before[l], j));
+      before += errors.back().segment(log.first, samples).squaredNorm();
+      after += error_of(log, torque_after[l], j).segment(log.first, samples).squaredNorm();
+      count += static_cast<double>(samples);
+    }
+    if (blocks_only) {
+      // In-sample errors, by the ratio of judged to fitted ones.
+      const LinearFit plain = at.solve(at.nuisance()), all = at.solve(columns_of(at, groups));
+      const VectorXd rows = at.row_count(at.fit_blocks());
+      before *= held.before[k] / std::max(held.rows[k], 1.0) / (at.weights()[k] * plain.square[k] / rows[k]);
+      after *= held.after[k] / std::max(held.rows[k], 1.0) / (at.weights()[k] * all.square[k] / rows[k]);
+    }
+    const double rms_before = std::sqrt(before / std::max(count, 1.0)), rms_after = std::sqrt(after / std::max(count, 1.0));
+    const double floor = rms_after * std::sqrt(std::max(0.0, 1 - held.leftover[k] / std::max(held.after[k], 1e-300)));
+    json effects = json::array(), resembles = json::array();
+    for (const EffectFit& fit : found.current.joints[j].effects) {
+      const auto [f, i] = found_of(fit, j, false);
+      if (i >= groups.size()) continue;
+      if (!fit.named) {
+        resembles.push_back(fit.effect);
+        continue;
+      }
+      json one = effect_json(fit, j, f, gap[k] > 0 ? held.alone_by_joint[i][k] / gap[k] : 0);
+      one["model_share"] = share_of_model(fit, j);
+      effects.push_back(std::move(one));
+    }
+    const bool unexplained = (outcome.lack[j].structured() && (effects.empty() || remains[j])) || !resembles.empty();
+    const std::string verdict = unexplained ? "unexplained" : !effects.empty() ? "effects_found" : "nothing_missing";
+    any_effect |= !effects.empty();
+    any_unexplained |= unexplained;
+    std::sort(effects.begin(), effects.end(), [](const json& a, const json& b) { return a["score"] > b["score"]; });
+    json one = {{"joint", project.robot.joints[j].name},
+                {"index", j + 1},
+                {"unit", project.robot.joints[j].torque_unit()},
+                {"verdict", verdict},
+                {"gap_before", rms_before},
+                {"gap_after", rms_after},
+                {"noise_floor", std::min(floor, rms_after)},
+                {"closure", closure[k]},
+                {"where", verdict == "nothing_missing" && rms_before < 1.05 * floor
+                              ? json::array()
+                              : where(result.nominal, shown, j, errors, std::min(floor, rms_before))},
+                {"effects", effects},
+                {"resembles", resembles},
+                {"not_identifiable", outcome.not_identifiable[j]},
+                {"lack_of_fit", {{"state_p", outcome.lack[j].state_p}, {"time_p", outcome.lack[j].time_p}}}};
+    if (unexplained) {
+      const json& regions = one["where"];
+      advise(fmt::format("record more of joint {}{}", j + 1,
+                         regions.empty() ? std::string()
+                                         : fmt::format(" where the gap sits ({} from {:.3g} to {:.3g})", regions[0]["signal"].get<std::string>(),
+                                                       regions[0]["from"].get<double>(), regions[0]["to"].get<double>())));
+    }
+    joints.push_back(std::move(one));
+  }
+  json robot = json::array();
+  for (const EffectFit& fit : found.current.body) {
+    const auto [f, i] = found_of(fit, 0, true);
+    if (i >= groups.size() || !fit.named) continue;
+    json one = effect_json(fit, 0, f, robot_gap > 0 ? held.alone[i] / robot_gap : 0);
+    json which = json::array();
+    for (std::size_t j = 0; j < n; ++j) {
+      if (held.alone_by_joint[i][static_cast<Index>(j)] > 6) which.push_back(j + 1);
+    }
+    one["joints"] = which;
+    robot.push_back(std::move(one));
+    any_effect = true;
+  }
+  if (!robot.empty()) {
+    // A joint whose gap a load closes is explained by it.
+    for (json& joint : joints) {
+      const bool reached = std::any_of(robot.begin(), robot.end(), [&](const json& r) {
+        return std::find(r["joints"].begin(), r["joints"].end(), joint["index"]) != r["joints"].end();
+      });
+      if (reached && joint["verdict"] == "nothing_missing") joint["verdict"] = "effects_found";
+    }
+  }
+  const std::string verdict = any_unexplained ? "unexplained" : any_effect ? "effects_found" : "nothing_missing";
+  result.report = {{"schema", "fxdyn.diagnosis/1"},
+                   {"verdict", verdict},
+                   {"joints", joints},
+                   {"robot_effects", robot},
+                   {"not_identifiable", outcome.not_identifiable.back()},
+                   {"next_experiment", next},
+                   {"gate", at.folds().size() == 1 && !blocks_only ? "validate logs" : kind},
+                   {"figures_on", kind},
+                   {"baseline", models.has_baseline},
+                   {"notes", notes}};
+  data.notes.insert(data.notes.end(), notes.begin(), notes.end());
+  progress.done();
+  return result;
+}
+
+}  // namespace fxdyn

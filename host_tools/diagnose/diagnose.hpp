@@ -1,0 +1,25 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <vector>
+
+#include "host_tools/identify/identify.hpp"
+
+namespace fxdyn {
+
+struct Diagnosis {
+  IdentifiedModel nominal;  ///< base parameters and nominal effects (what a healthy session has beside them too)
+  IdentifiedModel model;    ///< with the effects that were named
+  nlohmann::json report;    ///< diagnosis.json
+};
+
+/// Finds what the nominal model lacks, names it, adds it, and tells what that is worth on logs that decided nothing.
+/// docs/guide/diagnosis.md explains the rules.
+/// @param data train and validate logs @param baseline a healthy session, role train, filtered alike; may be empty
+/// @param test read for the figures only
+/// @throws DataError: logs that tell too little, a baseline that can't be the same robot's
+Diagnosis diagnose(const Project& project, GateData& data, const std::vector<ProcessedLog>& baseline,
+                   const std::vector<ProcessedLog>& test, Progress& progress);
+
+}  // namespace fxdyn

@@ -1,0 +1,235 @@
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numbers>
+
+#include "host_tools/diagnose/search.hpp"
+#include "host_tools/model/effects.hpp"
+#include "host_tools/parallel.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+std::vector<double> geometric(double from, double to, int count) {
+  std::vector<double> values;
+  for (int i = 0; i < count; ++i) values.push_back(from * std::pow(to / from, static_cast<double>(i) / (count - 1)));
+  return values;
+}
+
+/// How a joint moves over the logs that fit.
+struct Scales {
+  double speed = 0, range = 0, torque = 0, structural = 0, seconds = 0, step_s = 1;
+};
+
+Scales scales_of(const Linearised& at, std::size_t joint) {
+  Scales s;
+  const auto j = static_cast<Index>(joint);
+  double lower = 1e300, upper = -1e300, last = 0;
+  for (std::size_t l = 0; l < at.logs().size(); ++l) {
+    const SessionLog& entry = at.logs()[l];
+    if (entry.healthy || !entry.fits) continue;
+    const Index first = entry.log.first, count = entry.log.last - first;
+    const auto inside = [&](const MatrixXd& m) { return m.col(j).segment(first, count); };
+    s.speed = std::max(s.speed, inside(at.motion(l).dq).cwiseAbs().maxCoeff());
+    lower = std::min(lower, inside(at.motion(l).q).minCoeff());
+    upper = std::max(upper, inside(at.motion(l).q).maxCoeff());
+    s.torque = std::max(s.torque, inside(at.robot_columns(l).torque()).cwiseAbs().maxCoeff());
+    s.structural = std::max(s.structural, inside(at.robot_columns(l).structural()).cwiseAbs().maxCoeff());
+    last = std::max(last, entry.age_s + entry.log.step_s * static_cast<double>(entry.log.samples()));
+    s.step_s = std::min(s.step_s, entry.log.step_s);
+  }
+  s.range = upper - lower;
+  s.seconds = last;
+  return s;
+}
+
+/// Shapes to try for an effect: one list a shape parameter.
+std::vector<std::vector<double>> grids(const EffectInfo& info, std::size_t joint, const Linearised& at,
+                                       const Scales& s) {
+  const bool turns = at.models().current.robot.joints[joint].type == JointType::revolute;
+  const std::size_t n = at.joints();
+  const double width = at.models().current.joints[joint].sign_width;
+  std::vector<std::vector<double>> out;
+  for (const ParameterInfo& shape : info.shape) {
+    std::vector<double> values;
+    if (shape.name == "velocity") {
+      // Narrower than the sign itself is the sign; wider is viscous friction.
+      const double from = std::max(3e-3 * s.speed, 1.5 * width);
+      values = geometric(std::min(from, 0.1 * s.speed), 0.2 * s.speed, 9);
+    } else if (shape.name == "distance") {
+      values = turns ? geometric(2e-4, 2e-2, 10) : geometric(1e-5, 1e-3, 10);
+    } else if (shape.name == "time_constant") {
+      values = geometric(0.1 * s.seconds, 4 * s.seconds, 5);
+    } else if (shape.name == "limit") {
+      for (const double share : {0.45, 0.55, 0.63, 0.7, 0.76, 0.82, 0.87, 0.91, 0.95}) values.push_back(share * s.torque);
+    } else if (shape.name == "time") {
+      values = geometric(5e-4, std::min(0.03, static_cast<double>(Delay::largest) * s.step_s), 5);
+    } else if (shape.name == "relaxation") {
+      values = {1e-3, 8e-3};
+    } else if (shape.name == "torque_scale") {
+      values = geometric(0.015 * s.structural, 0.25 * s.structural, 4);
+    } else if (shape.name == "ratio") {
+      values = {1, -1};
+    } else if (shape.name == "width") {
+      values = geometric(std::max(0.3 * width, 1e-3 * s.speed), std::max(3 * width, 0.03 * s.speed), 3);
+    } else if (shape.name == "joint") {
+      for (std::size_t k = 0; k < n; ++k) {
+        const bool neighbour = k + 1 == joint || k == joint + 1;
+        if (k != joint && (info.name != MotorCoupling::name || neighbour)) values.push_back(static_cast<double>(k + 1));
+      }
+    }
+    for (double& value : values) value = std::clamp(value, shape.lower, shape.upper);
+    out.push_back(std::move(values));
+  }
+  return out;
+}
+
+bool is_nominal(std::string_view effect) {
+  return effect == Viscous::name || effect == Coulomb::name || effect == Offset::name || effect == RotorInertia::name;
+}
+
+}  // namespace
+
+int searched_shape(const EffectCandidate& candidate) {
+  const EffectInfo& info = *find_effect(candidate.effect);
+  for (std::size_t i = 0; i < info.shape.size(); ++i) {
+    if (info.shape[i].name != "joint" && info.shape[i].name != "ratio") return static_cast<int>(i);
+  }
+  return -1;
+}
+
+std::vector<Group> dictionary(const Linearised& at, const std::vector<EffectCandidate>& skip) {
+  std::vector<Group> out;
+  const std::size_t n = at.joints();
+  for (const EffectInfo& info : effect_infos()) {
+    if (is_nominal(info.name) || info.name == Ripple::name) continue;
+    if (info.needs_peers && n < 2) continue;
+    for (std::size_t j = 0; j < (info.acts_on == ActsOn::body ? 1 : n); ++j) {
+      const bool skipped = std::any_of(skip.begin(), skip.end(), [&](const EffectCandidate& c) {
+        return c.effect == info.name && (info.acts_on == ActsOn::body || c.joint == j);
+      });
+      if (skipped) continue;
+      const Scales s = scales_of(at, j);
+      std::vector<std::vector<double>> shapes{{}};
+      double continuous = 0;
+      for (const auto& values : grids(info, j, at, s)) {
+        std::vector<std::vector<double>> more;
+        for (const double value : values) {
+          for (std::vector<double> before : shapes) {
+            before.push_back(value);
+            more.push_back(std::move(before));
+          }
+        }
+        shapes = std::move(more);
+      }
+      const int searched = searched_shape({std::string(info.name), j, {}});
+      if (searched >= 0) continuous = static_cast<double>(grids(info, j, at, s)[static_cast<std::size_t>(searched)].size());
+      for (const auto& shape : shapes) {
+        Group group;
+        group.candidate = {std::string(info.name), j, shape};
+        group.on_body = info.acts_on == ActsOn::body;
+        // A share that is 1 by definition is not free.
+        group.nonlinear = (searched >= 0) - (info.linear[0].name == "share");
+        group.log_grid = std::log(std::max(1.0, static_cast<double>(shapes.size()) / std::max(1.0, continuous) *
+                                                    std::max(1.0, 0.5 * continuous)));
+        for (const ParameterInfo& p : info.linear) group.lower.push_back(p.lower);
+        out.push_back(std::move(group));
+      }
+    }
+  }
+  return out;
+}
+
+std::vector<Group> ripples(const Linearised& at, std::size_t joint, const VectorXd& residual, std::size_t most) {
+  const Scales s = scales_of(at, joint);
+  if (!(s.range > 0)) return {};
+  const VectorXd& a = at.whitening()[joint];
+  const auto j = static_cast<Index>(joint);
+  const double fc = at.logs().front().log.filter.torque_cutoff_hz;
+  // The adjoint of decimation, filter and whitening on the residual; and how often which speed occurs.
+  std::vector<double> q, g;
+  std::vector<double> speed;
+  for (std::size_t l = 0; l < at.logs().size(); ++l) {
+    const SessionLog& entry = at.logs()[l];
+    if (entry.healthy || !entry.fits) continue;
+    const ProcessedLog& log = entry.log;
+    const Block& b = at.log_rows(l);
+    VectorXd e = residual.segment(b.first, b.count), w = e;
+    for (Index lag = 1; lag <= a.size() && lag < b.count; ++lag)
+      w.head(b.count - lag) -= a[lag - 1] * e.tail(b.count - lag);
+    VectorXd full = VectorXd::Zero(log.samples());
+    for (Index r = 0; r < b.count; ++r) full[log.first + r * log.decimation] = w[r];
+    full = log.filter_columns(full);
+    // exp(i n q) g lives below the cut-off wherever the filter lets the ripple through
+    const auto stride = std::max<Index>(1, static_cast<Index>(1 / (log.step_s * 6 * fc)));
+    for (Index k = log.first; k < log.last; k += stride) {
+      q.push_back(at.motion(l).q(k, j));
+      g.push_back(full[k] * static_cast<double>(stride));
+    }
+    for (Index r = 0; r < b.count; ++r)
+      speed.push_back(std::fabs(at.motion(l).dq(log.first + r * log.decimation, j)));
+  }
+  std::sort(speed.begin(), speed.end());
+  constexpr std::size_t bins = 64;
+  std::vector<double> bin(bins);
+  for (std::size_t i = 0; i < bins; ++i) bin[i] = speed[(2 * i + 1) * speed.size() / (2 * bins)];
+  const double interval = at.logs().front().log.step_s * static_cast<double>(at.logs().front().log.decimation);
+  const auto power = [&](double n) {
+    double sum = 0;
+    for (const double v : bin) {
+      const double f = n * v / (2 * std::numbers::pi);
+      const double h = 1 / (1 + std::pow(f / fc, 8));
+      std::complex<double> white = 1;
+      for (Index lag = 1; lag <= a.size(); ++lag)
+        white -= a[lag - 1] * std::polar(1.0, -2 * std::numbers::pi * f * interval * static_cast<double>(lag));
+      sum += h * h * std::norm(white);
+    }
+    return 0.5 * sum / static_cast<double>(bins) * static_cast<double>(speed.size());
+  };
+  const double cell = 2 * std::numbers::pi / s.range, step = cell / 4;
+  const double lowest = std::max(find_effect(Ripple::name)->shape[0].lower, std::max(0.6 * cell, 1.3 * std::min(1.0, 6.0 / s.range)));
+  const double floor = 2e-3 * power(lowest);
+  constexpr std::size_t most_wavenumbers = 2400;
+  std::vector<double> n, p;
+  const double base_power = power(lowest);
+  std::vector<std::complex<double>> turn(q.size()), at_n(q.size());
+  for (std::size_t k = 0; k < q.size(); ++k) {
+    turn[k] = std::polar(1.0, step * q[k]);
+    at_n[k] = g[k] * std::polar(1.0, lowest * q[k]);
+  }
+  for (std::size_t i = 0; i < most_wavenumbers; ++i) {
+    const double number = lowest + step * static_cast<double>(i), expected = power(number);
+    if (expected < floor) break;
+    std::complex<double> sum = 0;
+    for (std::size_t k = 0; k < q.size(); ++k) {
+      sum += at_n[k];
+      at_n[k] *= turn[k];
+    }
+    n.push_back(number);
+    // What is faint only because the filter takes it away must not win by that.
+    p.push_back(std::norm(sum) / (2 * std::max(expected, 1e-2 * base_power)));
+  }
+  std::vector<std::size_t> peaks;
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    const bool peak = (i == 0 || p[i] >= p[i - 1]) && (i + 1 == p.size() || p[i] > p[i + 1]);
+    if (peak) peaks.push_back(i);
+  }
+  std::sort(peaks.begin(), peaks.end(), [&](std::size_t x, std::size_t y) { return p[x] > p[y]; });
+  if (peaks.size() > most) peaks.resize(most);
+  std::vector<Group> out;
+  for (const std::size_t i : peaks) {
+    Group group;
+    group.candidate = {std::string(Ripple::name), joint, {n[i]}};
+    group.nonlinear = 1;
+    group.log_grid = std::log(std::max(1.0, static_cast<double>(p.size()) / 4));
+    group.lower = {-unbounded, -unbounded};
+    out.push_back(std::move(group));
+  }
+  return out;
+}
+
+}  // namespace fxdyn::diagnosis

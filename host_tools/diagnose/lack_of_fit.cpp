@@ -1,0 +1,252 @@
+#include "host_tools/diagnose/lack_of_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "host_tools/identify/solver.hpp"
+#include "host_tools/model/effects.hpp"
+#include "host_tools/random.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int random_features = 24;
+constexpr int shifts = 32;
+
+/// The residual of the rows in `blocks` at other times of the same log: one column a shift.
+MatrixXd shifted(const Linearised& at, std::size_t joint, const VectorXd& e, const std::vector<std::size_t>& blocks) {
+  Random random(4177 + joint);
+  MatrixXd out = MatrixXd::Zero(e.size(), shifts);
+  for (const std::size_t i : blocks) {
+    const Block& b = at.blocks()[i];
+    if (b.healthy) continue;
+    for (int k = 0; k < shifts; ++k) {
+      const auto by = static_cast<Index>(random.uniform(0.08, 0.92) * static_cast<double>(b.count));
+      out.block(b.first, k, b.count - by, 1) = e.segment(b.first + by, b.count - by);
+      out.block(b.first + b.count - by, k, by, 1) = e.segment(b.first, by);
+    }
+  }
+  return out;
+}
+
+VectorXd only(const Linearised& at, const VectorXd& e, const std::vector<std::size_t>& blocks) {
+  VectorXd out = VectorXd::Zero(e.size());
+  for (const std::size_t i : blocks) {
+    const Block& b = at.blocks()[i];
+    if (!b.healthy) out.segment(b.first, b.count) = e.segment(b.first, b.count);
+  }
+  return out;
+}
+
+MatrixXd only(const Linearised& at, const MatrixXd& x, const std::vector<std::size_t>& blocks) {
+  MatrixXd out = MatrixXd::Zero(x.rows(), x.cols());
+  for (const std::size_t i : blocks) {
+    const Block& b = at.blocks()[i];
+    if (!b.healthy) out.middleRows(b.first, b.count) = x.middleRows(b.first, b.count);
+  }
+  return out;
+}
+
+/// Chance of a chi-squared variable beyond `ratio` times its mean (Wilson and Hilferty).
+double chance(double ratio, double freedom) {
+  const double s = 2 / (9 * freedom);
+  const double z = (std::cbrt(ratio) - (1 - s)) / std::sqrt(s);
+  return 0.5 * std::erfc(z / std::numbers::sqrt2);
+}
+
+/// Chance of the highest line in the periodograms of the logs against their neighbourhood.
+double line_chance(const Linearised& at, const VectorXd& e) {
+  double most = 0, count = 0;
+  for (const Block& b : at.blocks()) {
+    if (b.healthy) continue;
+    const VectorXd x = e.segment(b.first, b.count);
+    const Index bins = b.count / 2;
+    VectorXd power(bins);
+    for (Index k = 0; k < bins; ++k) {
+      const double w = 2 * std::numbers::pi * static_cast<double>(k + 1) / static_cast<double>(b.count);
+      // Goertzel
+      double s1 = 0, s2 = 0;
+      const double c = 2 * std::cos(w);
+      for (Index i = 0; i < b.count; ++i) {
+        const double s = x[i] + c * s1 - s2;
+        s2 = s1;
+        s1 = s;
+      }
+      power[k] = s1 * s1 + s2 * s2 - c * s1 * s2;
+    }
+    for (Index k = 0; k < bins; ++k) {
+      const Index from = std::clamp<Index>(k - 15, 0, std::max<Index>(0, bins - 31)), n = std::min<Index>(31, bins - from);
+      VectorXd near = power.segment(from, n);
+      std::nth_element(near.begin(), near.begin() + n / 2, near.end());
+      const double level = near[n / 2] / std::numbers::ln2;
+      if (level > 0) most = std::max(most, power[k] / level);
+      count += 1;
+    }
+  }
+  return std::min(1.0, count * std::exp(-most));
+}
+
+/// Means over stretches of two seconds against those of the healthy session.
+double slow_chance(const Linearised& at, const VectorXd& e) {
+  double sum[2] = {0, 0}, count[2] = {0, 0};
+  for (const Block& b : at.log_rows(0).count > 0 ? at.blocks() : std::vector<Block>{}) {
+    const ProcessedLog& log = at.logs()[b.log].log;
+    const auto length = static_cast<Index>(2 / (log.step_s * static_cast<double>(log.decimation)));
+    if (length < 2) continue;
+    for (Index k = 0; k + length <= b.count; k += length) {
+      const double mean = e.segment(b.first + k, length).mean();
+      sum[b.healthy] += mean * mean;
+      count[b.healthy] += 1;
+    }
+  }
+  if (count[0] < 5 || count[1] < 5 || !(sum[1] > 0)) return 1;
+  const double ratio = sum[0] / count[0] / (sum[1] / count[1]);
+  // Paulson's normal approximation of F
+  const double a = 2 / (9 * count[0]), b = 2 / (9 * count[1]), root = std::cbrt(ratio);
+  const double z = ((1 - b) * root - (1 - a)) / std::sqrt(b * root * root + a);
+  return 0.5 * std::erfc(z / std::numbers::sqrt2);
+}
+
+}  // namespace
+
+MatrixXd features(const Linearised& at, std::size_t joint) {
+  const std::size_t n = at.joints();
+  const auto j = static_cast<Index>(joint);
+  MatrixXd out;
+  const Index total = at.log_rows(at.logs().size() - 1).first + at.log_rows(at.logs().size() - 1).count;
+  Eigen::ArrayXd speed = Eigen::ArrayXd::Zero(static_cast<Index>(n)), acceleration = speed, load = speed;
+  for (std::size_t l = 0; l < at.logs().size(); ++l) {
+    const ProcessedLog& log = at.logs()[l].log;
+    const auto inside = [&](const MatrixXd& m) { return m.middleRows(log.first, log.last - log.first).array().abs().colwise().maxCoeff().transpose(); };
+    speed = speed.max(inside(at.motion(l).dq).eval());
+    acceleration = acceleration.max(inside(at.motion(l).ddq).eval());
+    load = load.max(inside(at.robot_columns(l).structural()).eval());
+  }
+  speed = speed.max(1e-9);
+  acceleration = acceleration.max(1e-9);
+  load = load.max(1e-9);
+  const bool turns = at.models().current.robot.joints[joint].type == JointType::revolute;
+  for (std::size_t l = 0; l < at.logs().size(); ++l) {
+    if (at.logs()[l].healthy) continue;
+    const Motion& m = at.motion(l);
+    const Index samples = m.q.rows();
+    std::vector<Eigen::ArrayXd> columns;
+    const Eigen::ArrayXd q = m.q.col(j), dq = m.dq.col(j) / speed[j], ddq = m.ddq.col(j) / acceleration[j],
+                         tau = at.robot_columns(l).structural().col(j).array() / load[j];
+    const double scale = turns ? 1.0 : 10.0;
+    for (std::size_t k = 0; k < n; ++k) {
+      const auto i = static_cast<Index>(k);
+      const bool peer_turns = at.models().current.robot.joints[k].type == JointType::revolute;
+      const Eigen::ArrayXd qk = m.q.col(i) * (peer_turns ? 1.0 : 10.0), dqk = m.dq.col(i).array() / speed[i];
+      columns.push_back(qk.sin());
+      columns.push_back(qk.cos());
+      columns.push_back((2 * qk).sin());
+      columns.push_back((2 * qk).cos());
+      if (k == joint) continue;
+      columns.push_back((dqk * 40).tanh());
+      columns.push_back(dqk);
+      columns.push_back(dq * dqk);
+    }
+    for (const double width : {0.01, 0.03, 0.1, 0.3}) {
+      columns.push_back((dq / width).tanh());
+      columns.push_back((dq / width).tanh().abs());
+    }
+    columns.push_back(ddq);
+    columns.push_back(ddq * ddq.abs());
+    columns.push_back(tau);
+    columns.push_back(tau * (dq * 40).tanh());
+    for (const double distance : {1e-3, 5e-3}) {
+      const JointSeries series{m.q.col(j), m.dq.col(j), m.ddq.col(j), {}, m.step_s};
+      columns.push_back(effect_columns(Presliding::name, std::array{turns ? distance : 0.1 * distance},
+                                       at.models().current.joints[joint].sign_width, series)
+                            .col(0)
+                            .array());
+    }
+    Random random(91 + joint);
+    for (int r = 0; r < random_features; ++r) {
+      const double a = 3 * random.normal(), b = 3 * random.normal(), c = 1.5 * random.normal(), d = random.normal(),
+                   e = 2 * std::numbers::pi * random.uniform(), f = 2 * random.normal();
+      columns.push_back((a * scale * q * 0.5 + b * dq + c * (dq / 0.02).asinh() + d * ddq + f * tau + e).cos());
+    }
+    MatrixXd full(samples, static_cast<Index>(columns.size()));
+    for (std::size_t c = 0; c < columns.size(); ++c) full.col(static_cast<Index>(c)) = columns[c];
+    if (out.size() == 0) out.setZero(total, full.cols());
+    out.middleRows(at.log_rows(l).first, at.log_rows(l).count) = at.prepare(l, joint, full);
+  }
+  return out;
+}
+
+LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& fit, const MatrixXd& all_features) {
+  LackOfFit out;
+  const auto k = static_cast<Index>(joint);
+  const double w = fit.rows[k] / std::max(fit.square[k], 1e-12 * fit.rows[k] / at.weights()[k]);
+  const VectorXd residual = at.residual(joint, fit);
+  if (fit.square[k] * at.weights()[k] < 1e-10 * fit.rows[k]) return out;
+  const VectorXd e = only(at, residual, at.fit_blocks());
+  const MatrixXd f = only(at, all_features, at.fit_blocks());
+  const JointRows& rows = at.rows(joint);
+  MatrixXd cross = MatrixXd::Zero(static_cast<Index>(fit.columns.size()), f.cols());
+  MatrixXd surrogate = shifted(at, joint, e, at.fit_blocks());
+  MatrixXd theirs = MatrixXd::Zero(static_cast<Index>(fit.columns.size()), surrogate.cols());
+  for (std::size_t i = 0; i < fit.columns.size(); ++i) {
+    const Index local = rows.local[static_cast<std::size_t>(fit.columns[i])];
+    if (local < 0) continue;
+    cross.row(static_cast<Index>(i)) = w * rows.x.col(local).transpose() * f;
+    theirs.row(static_cast<Index>(i)) = w * rows.x.col(local).transpose() * surrogate;
+  }
+  const MatrixXd z = SymmetricSolver(fit.information).inverse() * cross;
+  MatrixXd gram = w * (f.transpose() * f) - cross.transpose() * z;
+  const VectorXd size = (w * f.colwise().squaredNorm().transpose().array()).max(1e-300).sqrt().inverse();
+  gram = size.asDiagonal() * gram * size.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(gram);
+  std::vector<Index> kept;
+  for (Index i = 0; i < gram.rows(); ++i) {
+    if (eigen.eigenvalues()[i] > 1e-4) kept.push_back(i);
+  }
+  const MatrixXd basis = eigen.eigenvectors()(Eigen::all, kept);
+  const VectorXd inverse = eigen.eigenvalues()(kept).cwiseInverse();
+  const auto statistic = [&](const VectorXd& b) {
+    const VectorXd along = basis.transpose() * size.cwiseProduct(b);
+    return along.cwiseAbs2().dot(inverse);
+  };
+  const double mine = statistic(w * f.transpose() * e);
+  const MatrixXd b = w * (f.transpose() * surrogate) - z.transpose() * theirs;
+  VectorXd null(surrogate.cols());
+  for (Index s = 0; s < null.size(); ++s) null[s] = statistic(b.col(s));
+  const double mean = null.mean(), variance = (null.array() - mean).square().sum() / static_cast<double>(null.size() - 1);
+  const double freedom = std::clamp(2 * mean * mean / std::max(variance, 1e-300), 3.0, static_cast<double>(kept.size()));
+  out.state_p = chance(mine / std::max(mean, 1e-300), freedom);
+  out.time_p = std::min(line_chance(at, residual), at.models().has_baseline ? slow_chance(at, residual) : 1.0);
+  return out;
+}
+
+double structured_share(const Linearised& at, std::size_t joint, const LinearFit& fit, const MatrixXd& all_features,
+                        const std::vector<std::size_t>& blocks) {
+  const VectorXd e = only(at, at.residual(joint, fit), blocks);
+  const MatrixXd f = only(at, all_features, blocks);
+  if (!(e.squaredNorm() > 0)) return 0;
+  const VectorXd size = f.colwise().norm().transpose().array().max(1e-300).inverse();
+  const MatrixXd gram = size.asDiagonal() * (f.transpose() * f) * size.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(gram);
+  const auto energy = [&](const VectorXd& x) {
+    const VectorXd along = eigen.eigenvectors().transpose() * size.cwiseProduct(f.transpose() * x);
+    double sum = 0;
+    for (Index i = 0; i < along.size(); ++i) {
+      if (eigen.eigenvalues()[i] > 1e-4) sum += along[i] * along[i] / eigen.eigenvalues()[i];
+    }
+    return sum;
+  };
+  const MatrixXd surrogate = shifted(at, joint, e, blocks);
+  double null = 0;
+  for (Index s = 0; s < surrogate.cols(); ++s) null += energy(surrogate.col(s)) / static_cast<double>(surrogate.cols());
+  const double whole = e.squaredNorm(), found = energy(e), expected = std::min(null / whole, 0.95);
+  // found = structure + expected * (whole - structure)
+  return std::clamp((found / whole - expected) / (1 - expected), 0.0, 1.0);
+}
+
+}  // namespace fxdyn::diagnosis

@@ -1,0 +1,727 @@
+#include "host_tools/diagnose/linearised.hpp"
+
+#include <cmath>
+
+#include "host_tools/error.hpp"
+#include "host_tools/identify/solver.hpp"
+#include "host_tools/model/effects.hpp"
+#include "host_tools/model/evaluator.hpp"
+#include "host_tools/parallel.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Order of the autoregressive model of the noise.
+constexpr Index order = 6;
+/// Friction differs from session to session by this share of itself (standard deviation) without anything being wrong.
+constexpr double friction_change = 0.3;
+/// Likewise the offset, as a share of Coulomb friction.
+constexpr double offset_change = 0.05;
+/// What a parameter that is zero may change by, of rated torque.
+constexpr double smallest_change = 1e-3;
+/// A share that is 1 by definition.
+constexpr double share_std = 1e-3;
+constexpr double difference = 1e-3;
+constexpr int blocks_of_one_log = 5;
+
+bool is_shape_free(const EffectInfo& info, std::size_t i) {
+  return info.shape[i].name != "joint" && info.shape[i].name != "ratio";
+}
+
+/// Columns that come from differences of predict() rather than from phi.
+bool by_difference(const EffectInfo& info) {
+  return info.acts_on != ActsOn::torque || info.needs_total || info.needs_structural;
+}
+
+const EffectFit& fit_of(const IdentifiedModel& model, const Unknown& u) {
+  return u.body ? model.body[u.effect] : model.joints[u.joint].effects[u.effect];
+}
+
+double& value_of(IdentifiedModel& model, const Unknown& u) {
+  EffectFit& fit = u.body ? model.body[u.effect] : model.joints[u.joint].effects[u.effect];
+  return u.kind == Unknown::Kind::shape ? fit.shape[u.index] : fit.linear[u.index];
+}
+
+bool is_moment(const EffectFit& fit, const Unknown& u) {
+  return fit.effect == Payload::name && u.kind == Unknown::Kind::linear && u.index > 0;
+}
+
+/// Value of an unknown in a model: payload's centre counts as first moment.
+double read(const IdentifiedModel& model, const Unknown& u) {
+  const EffectFit& fit = fit_of(model, u);
+  return is_moment(fit, u) ? fit.linear[0] * fit.linear[u.index] : fit.linear[u.index];
+}
+
+void add_to(IdentifiedModel& model, const Unknown& u, double step) {
+  switch (u.kind) {
+    case Unknown::Kind::base: {
+      BaseParameter& base = model.base[u.index];
+      base.value += step;
+      LinkInertia<Real>& link = model.inertia[base.column / parameters_per_link];
+      auto values = to_array(link);
+      values[base.column % parameters_per_link] += step;
+      link = to_inertia(values);
+      return;
+    }
+    case Unknown::Kind::width:
+      model.joints[u.joint].sign_width *= std::exp(step);
+      return;
+    case Unknown::Kind::shape: {
+      const ParameterInfo& info = find_effect(fit_of(model, u).effect)->shape[u.index];
+      double& value = value_of(model, u);
+      value = std::clamp(value * std::exp(step), info.lower, info.upper);
+      return;
+    }
+    case Unknown::Kind::linear: {
+      const EffectFit& fit = fit_of(model, u);
+      if (is_moment(fit, u)) {
+        value_of(model, u) += step / fit.linear[0];
+      } else {
+        value_of(model, u) += step;
+      }
+      return;
+    }
+  }
+}
+
+VectorXd yule_walker(const std::vector<VectorXd>& residuals) {
+  VectorXd r = VectorXd::Zero(order + 1);
+  for (const VectorXd& e : residuals) {
+    for (Index lag = 0; lag <= order && lag < e.size(); ++lag)
+      r[lag] += e.head(e.size() - lag).dot(e.tail(e.size() - lag));
+  }
+  if (!(r[0] > 0)) return VectorXd::Zero(order);
+  MatrixXd toeplitz(order, order);
+  for (Index i = 0; i < order; ++i) {
+    for (Index k = 0; k < order; ++k) toeplitz(i, k) = r[std::abs(i - k)];
+  }
+  // A touch of white noise keeps the roots inside.
+  toeplitz.diagonal() *= 1 + 1e-4;
+  return toeplitz.ldlt().solve(r.tail(order));
+}
+
+}  // namespace
+
+Linearised::Linearised(const Models& models, const std::vector<SessionLog>& logs, std::vector<VectorXd> whitening)
+    : models_(models), logs_(&logs), whitening_(std::move(whitening)) {
+  chain_ = to_dh(models_.current.robot);
+  for (const BaseParameter& parameter : models_.current.base)
+    base_.columns.push_back(static_cast<Index>(parameter.column));
+  rows_.resize(models_.current.joints.size());
+  weights_ = VectorXd::Ones(static_cast<Index>(rows_.size()));
+  motions_.resize(logs.size());
+  robot_.resize(logs.size());
+  parallel_for(logs.size(), [&](std::size_t l) {
+    const ProcessedLog& log = logs[l].log;
+    MotionRows m = log.motion();
+    motions_[l] = std::make_unique<Motion>(
+        Motion{log.name, log.step_s, log.t, std::move(m.q), std::move(m.dq), std::move(m.ddq)});
+    robot_[l] = std::make_unique<RobotColumns>(
+        with_load_of(log, logs[l].healthy ? models_.healthy : models_.current), *motions_[l]);
+  });
+  make_blocks();
+  make_unknowns();
+  make_rows();
+}
+
+void Linearised::make_blocks() {
+  Index at = 0;
+  std::size_t fitting = 0;
+  bool judged = false;
+  for (const SessionLog& entry : *logs_) {
+    fitting += !entry.healthy && entry.fits;
+    judged |= !entry.fits;
+  }
+  for (std::size_t l = 0; l < logs_->size(); ++l) {
+    const SessionLog& entry = (*logs_)[l];
+    const Index count = entry.log.rows();
+    log_rows_.push_back({l, at, count, entry.healthy, entry.fits});
+    const int parts = !judged && fitting == 1 && !entry.healthy ? blocks_of_one_log : 1;
+    for (int part = 0; part < parts; ++part) {
+      const Index from = count * part / parts, to = count * (part + 1) / parts;
+      blocks_.push_back({l, at + from, to - from, entry.healthy, entry.fits});
+    }
+    at += count;
+  }
+  Fold all;
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    if (blocks_[b].fits) fit_blocks_.push_back(b);
+  }
+  if (judged) {
+    all.fit = fit_blocks_;
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      if (!blocks_[b].fits) all.judge.push_back(b);
+    }
+    folds_.push_back(all);
+    return;
+  }
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    if (blocks_[b].healthy) continue;
+    Fold fold;
+    fold.judge = {b};
+    for (const std::size_t other : fit_blocks_) {
+      if (other != b) fold.fit.push_back(other);
+    }
+    folds_.push_back(fold);
+  }
+}
+
+void Linearised::make_unknowns() {
+  const IdentifiedModel& now = models_.current;
+  const bool two = models_.has_baseline;
+  const IdentifiedModel& common = two ? models_.healthy : now;
+  for (std::size_t k = 0; k < now.base.size(); ++k) {
+    Unknown u;
+    u.index = k;
+    u.value = now.base[k].value;
+    unknowns_.push_back(u);
+  }
+  for (std::size_t j = 0; j < now.joints.size(); ++j) {
+    const JointFit& joint = now.joints[j];
+    bool signs = false;
+    for (const EffectFit& fit : joint.effects) signs |= !fit.named && find_effect(fit.effect)->uses_sign;
+    if (signs) {
+      Unknown u;
+      u.kind = Unknown::Kind::width;
+      u.joint = j;
+      unknowns_.push_back(u);
+    }
+    const EffectFit* coulomb = common.joints[j].find(Coulomb::name);
+    for (std::size_t e = 0; e < joint.effects.size(); ++e) {
+      const EffectFit& fit = joint.effects[e];
+      if (fit.named) continue;
+      const EffectInfo& info = *find_effect(fit.effect);
+      Unknown u;
+      u.joint = j;
+      u.effect = e;
+      for (u.index = 0; u.index < info.linear.size(); ++u.index) {
+        u.kind = Unknown::Kind::linear;
+        u.change = false;
+        u.prior_std = 0;
+        u.value = common.joints[j].effects[e].linear[u.index];
+        unknowns_.push_back(u);
+        if (!two || fit.effect == RotorInertia::name) continue;
+        u.change = true;
+        // Of motions of unit size: a coefficient's own scale.
+        double scale = friction_change * std::fabs(u.value);
+        if (fit.effect == Offset::name && coulomb != nullptr) scale += offset_change * std::fabs(coulomb->linear[0]);
+        const double motion = info.linear[u.index].quantity == Quantity::velocity ? joint.dq_limit : 1.0;
+        u.prior_std = std::hypot(scale, smallest_change * joint.rated_torque / std::max(motion, 1e-9));
+        u.value = fit.linear[u.index] - u.value;
+        unknowns_.push_back(u);
+      }
+      u.change = false;
+      u.prior_std = 0;
+      u.value = 0;
+      u.kind = Unknown::Kind::shape;
+      for (u.index = 0; u.index < info.shape.size(); ++u.index) {
+        if (is_shape_free(info, u.index)) unknowns_.push_back(u);
+      }
+    }
+  }
+  for (Index i = 0; i < static_cast<Index>(unknowns_.size()); ++i) nuisance_.push_back(i);
+  const auto named = [&](const EffectFit& fit, std::size_t j, std::size_t e, bool body) {
+    const EffectInfo& info = *find_effect(fit.effect);
+    Group group;
+    group.candidate = {fit.effect, j, fit.shape};
+    group.on_body = body;
+    group.in_model = true;
+    group.first = static_cast<Index>(unknowns_.size());
+    Unknown u;
+    u.joint = j;
+    u.effect = e;
+    u.body = body;
+    u.kind = Unknown::Kind::linear;
+    for (u.index = 0; u.index < info.linear.size(); ++u.index) {
+      u.value = 0;
+      u.prior = u.prior_std = 0;
+      u.value = read(now, u);
+      if (info.linear[u.index].name == "share") {
+        u.prior = 1;
+        u.prior_std = share_std;
+      }
+      unknowns_.push_back(u);
+      group.lower.push_back(info.linear[u.index].lower);
+    }
+    u.kind = Unknown::Kind::shape;
+    u.value = u.prior = u.prior_std = 0;
+    for (u.index = 0; u.index < info.shape.size(); ++u.index) {
+      if (!is_shape_free(info, u.index)) continue;
+      unknowns_.push_back(u);
+      ++group.nonlinear;
+      group.lower.push_back(-1e300);
+    }
+    group.count = static_cast<Index>(unknowns_.size()) - group.first;
+    groups_.push_back(std::move(group));
+  };
+  for (std::size_t j = 0; j < now.joints.size(); ++j) {
+    for (std::size_t e = 0; e < now.joints[j].effects.size(); ++e) {
+      if (now.joints[j].effects[e].named) named(now.joints[j].effects[e], j, e, false);
+    }
+  }
+  for (std::size_t e = 0; e < now.body.size(); ++e) {
+    if (now.body[e].named) named(now.body[e], 0, e, true);
+  }
+  columns_ = static_cast<Index>(unknowns_.size());
+}
+
+MatrixXd Linearised::follow(std::size_t log, std::size_t joint, MatrixXd columns) const {
+  const SessionLog& entry = (*logs_)[log];
+  const JointFit& fit = (entry.healthy ? models_.healthy : models_.current).joints[joint];
+  for (const EffectFit* effect : in_order(fit, true)) {
+    const double share = effect->linear[0];
+    if (effect->effect == Saturation::name) {
+      const auto torque = robot_[log]->torque().col(static_cast<Index>(joint)).array().abs();
+      const Eigen::ArrayXd pass = (torque < effect->shape[0] * (1 - 1e-9)).select(Eigen::ArrayXd::Ones(torque.size()), 1 - share);
+      columns = pass.matrix().asDiagonal() * columns;
+      continue;
+    }
+    for (Index c = 0; c < columns.cols(); ++c) {
+      JointSeries series{columns.col(c), columns.col(c), columns.col(c), {}, entry.log.step_s};
+      series.total = columns.col(c);
+      columns.col(c) += share * effect_columns(effect->effect, effect->shape, 1, series);
+    }
+  }
+  return columns;
+}
+
+EffectColumns Linearised::full_rate(std::size_t log, const EffectCandidate& candidate) const {
+  const EffectInfo& info = *find_effect(candidate.effect);
+  if (info.acts_on != ActsOn::torque || info.needs_total) return (*robot_[log])(candidate);
+  EffectColumns out;
+  out.joints.resize(joints());
+  out.joints[candidate.joint] = robot_[log]->phi(candidate);
+  if (candidate.effect == FrictionDrift::name && (*logs_)[log].age_s > 0) {
+    // w(t + age) = w(t) + (1 - w(t)) w(age)
+    const double w = -std::expm1(-(*logs_)[log].age_s / candidate.shape[0]);
+    MatrixXd warm(out.joints[candidate.joint].rows(), 2);
+    warm << robot_[log]->phi({std::string(Coulomb::name), candidate.joint, {}}),
+        robot_[log]->phi({std::string(Viscous::name), candidate.joint, {}});
+    out.joints[candidate.joint] = (1 - w) * out.joints[candidate.joint] + w * warm;
+  }
+  out.joints[candidate.joint] = follow(log, candidate.joint, std::move(out.joints[candidate.joint]));
+  return out;
+}
+
+MatrixXd Linearised::prepare(std::size_t log, std::size_t joint, const Eigen::Ref<const MatrixXd>& full) const {
+  const ProcessedLog& l = (*logs_)[log].log;
+  return whiten(joint, l.decimate(l.filter_columns(full)));
+}
+
+/// Rows of one log; its first ones have no past and are left out (zero).
+MatrixXd Linearised::whiten(std::size_t joint, MatrixXd columns) const {
+  if (whitening_.empty()) return columns;
+  const VectorXd& a = whitening_[joint];
+  MatrixXd out = columns;
+  const Index rows = columns.rows();
+  for (Index lag = 1; lag <= a.size() && lag < rows; ++lag)
+    out.bottomRows(rows - lag) -= a[lag - 1] * columns.topRows(rows - lag);
+  out.topRows(std::min(rows, a.size())).setZero();
+  return out;
+}
+
+void Linearised::make_rows() {
+  const std::size_t n = joints();
+  const Index total = log_rows_.back().first + log_rows_.back().count;
+  const auto first_unknown = [&](std::size_t j) {
+    const auto at = std::lower_bound(base_.columns.begin(), base_.columns.end(),
+                                     static_cast<Index>(j) * static_cast<Index>(parameters_per_link));
+    return at - base_.columns.begin();
+  };
+  const auto nb = static_cast<Index>(base_.columns.size());
+  // Which unknowns each joint feels: its base columns, its own, and everything that is not an effect on its torque.
+  for (std::size_t j = 0; j < n; ++j) {
+    JointRows& rows = rows_[j];
+    for (Index c = first_unknown(j); c < nb; ++c) rows.column.push_back(c);
+    for (Index c = nb; c < columns_; ++c) {
+      const Unknown& u = unknowns_[static_cast<std::size_t>(c)];
+      bool felt = u.joint == j && !u.body;
+      if (u.kind != Unknown::Kind::width) {
+        const EffectInfo& info = *find_effect(fit_of(models_.current, u).effect);
+        felt |= u.body || info.acts_on != ActsOn::torque;
+      }
+      if (felt) rows.column.push_back(c);
+    }
+    rows.local.assign(static_cast<std::size_t>(columns_), -1);
+    for (std::size_t i = 0; i < rows.column.size(); ++i) rows.local[static_cast<std::size_t>(rows.column[i])] = static_cast<Index>(i);
+    rows.x.setZero(total, static_cast<Index>(rows.column.size()));
+    rows.y.setZero(total);
+  }
+  parallel_for(logs_->size(), [&](std::size_t l) {
+    const SessionLog& entry = (*logs_)[l];
+    const ProcessedLog& log = entry.log;
+    const IdentifiedModel& model = entry.healthy ? models_.healthy : models_.current;
+    const Motion& motion = *motions_[l];
+    const Index at = log_rows_[l].first, count = log_rows_[l].count;
+    std::vector<MatrixXd> full(n);
+    for (std::size_t j = 0; j < n; ++j)
+      full[j].setZero(log.samples(), static_cast<Index>(rows_[j].column.size()) + 1);
+    Regressor regressor(chain_);
+    const MotionRows link = log.link_motion(0, log.samples());
+    for (Index k = 0; k < log.samples(); ++k) {
+      const MatrixXd& y = regressor(link.q.row(k), link.dq.row(k), link.ddq.row(k));
+      for (std::size_t j = 0; j < n; ++j) {
+        for (Index c = first_unknown(j), i = 0; c < nb; ++c, ++i)
+          full[j](k, i) = y(static_cast<Index>(j), base_.columns[static_cast<std::size_t>(c)]);
+      }
+    }
+    for (std::size_t j = 0; j < n; ++j) {
+      const Index base = nb - first_unknown(j);
+      full[j].leftCols(base) = follow(l, j, full[j].leftCols(base));
+    }
+    const MatrixXd& torque = robot_[l]->torque();
+    const auto loaded = [&](IdentifiedModel m) {
+      return fxdyn::predict(with_load_of(log, std::move(m)), motion.q, motion.dq, motion.ddq, log.step_s);
+    };
+    MatrixXd predicted = torque;
+    for (Index c = nb; c < columns_; ++c) {
+      const Unknown& u = unknowns_[static_cast<std::size_t>(c)];
+      const bool named = u.kind != Unknown::Kind::width && fit_of(models_.current, u).named;
+      if (entry.healthy && (u.change || named)) continue;
+      std::vector<MatrixXd> columns(n);
+      if (u.kind == Unknown::Kind::width) {
+        // d / d log w of everything that uses the sign
+        IdentifiedModel wide = model, narrow = model;
+        wide.joints[u.joint].sign_width *= 1 + difference;
+        narrow.joints[u.joint].sign_width *= 1 - difference;
+        JointSeries series{motion.q.col(static_cast<Index>(u.joint)), motion.dq.col(static_cast<Index>(u.joint)),
+                           motion.ddq.col(static_cast<Index>(u.joint)),
+                           robot_[l]->structural().col(static_cast<Index>(u.joint)), log.step_s};
+        VectorXd sum = VectorXd::Zero(log.samples());
+        for (const EffectFit& fit : model.joints[u.joint].effects) {
+          const EffectInfo& info = *find_effect(fit.effect);
+          if (!info.uses_sign || info.needs_total || info.needs_peers || info.acts_on != ActsOn::torque) continue;
+          const VectorXd theta = Eigen::Map<const VectorXd>(fit.linear.data(), static_cast<Index>(fit.linear.size()));
+          sum += (effect_columns(fit.effect, fit.shape, wide.joints[u.joint].sign_width, series) -
+                  effect_columns(fit.effect, fit.shape, narrow.joints[u.joint].sign_width, series)) *
+                 theta / (2 * difference);
+        }
+        columns[u.joint] = follow(l, u.joint, sum);
+      } else {
+        const EffectFit& fit = fit_of(model, u);
+        const EffectInfo& info = *find_effect(fit.effect);
+        if (by_difference(info)) {
+          IdentifiedModel more = model, less = model;
+          const double value = u.kind == Unknown::Kind::shape ? 1.0 : std::max(std::fabs(u.value), 1e-6);
+          const double step = difference * value;
+          add_to(more, u, step);
+          add_to(less, u, -step);
+          const MatrixXd slope = (loaded(more) - loaded(less)) / (2 * step);
+          for (std::size_t j = 0; j < n; ++j) columns[j] = slope.col(static_cast<Index>(j));
+        } else if (u.kind == Unknown::Kind::linear) {
+          columns[u.joint] = full_rate(l, {fit.effect, u.joint, fit.shape}).joints[u.joint].col(static_cast<Index>(u.index));
+        } else {
+          EffectCandidate more{fit.effect, u.joint, fit.shape}, less = more;
+          more.shape[u.index] *= 1 + difference;
+          less.shape[u.index] *= 1 - difference;
+          const VectorXd theta = Eigen::Map<const VectorXd>(fit.linear.data(), static_cast<Index>(fit.linear.size()));
+          columns[u.joint] =
+              (full_rate(l, more).joints[u.joint] - full_rate(l, less).joints[u.joint]) * theta / (2 * difference);
+        }
+        if (fit.effect == FrictionDrift::name && u.kind == Unknown::Kind::linear) {
+          // predict() starts cold
+          const VectorXd cold = robot_[l]->phi({fit.effect, u.joint, fit.shape}).col(static_cast<Index>(u.index));
+          predicted.col(static_cast<Index>(u.joint)) += u.value * (columns[u.joint] - cold);
+        }
+      }
+      for (std::size_t j = 0; j < n; ++j) {
+        const Index local = rows_[j].local[static_cast<std::size_t>(c)];
+        if (local >= 0 && columns[j].size() > 0) full[j].col(local) = columns[j];
+      }
+    }
+    const double lead = model.filter.torque_lead_s / log.step_s;
+    for (std::size_t j = 0; j < n; ++j) {
+      const auto k = static_cast<Index>(j);
+      full[j].rightCols(1) = predicted.col(k);
+      const MatrixXd kept = log.decimate(log.filter_columns(full[j]));
+      rows_[j].x.middleRows(at, count) = kept.leftCols(kept.cols() - 1);
+      MatrixXd tau = log.filter_columns(log.tau.col(k));
+      if (lead != 0) tau = at_other_times(tau, -lead);
+      rows_[j].y.segment(at, count) = log.decimate(tau) - kept.rightCols(1);
+    }
+  });
+  // y = r + J x0
+  VectorXd x0(columns_);
+  for (Index c = 0; c < columns_; ++c) {
+    const Unknown& u = unknowns_[static_cast<std::size_t>(c)];
+    x0[c] = u.kind == Unknown::Kind::linear || u.kind == Unknown::Kind::base ? u.value : 0;
+  }
+  std::vector<Index> all;
+  for (Index c = 0; c < columns_; ++c) all.push_back(c);
+  parallel_for(n, [&](std::size_t j) {
+    JointRows& rows = rows_[j];
+    for (std::size_t i = 0; i < rows.column.size(); ++i) rows.y += rows.x.col(static_cast<Index>(i)) * x0[rows.column[i]];
+    sum_up(rows, 0);
+  });
+  const auto reweight = [&] {
+    for (int round = 0; round < 2; ++round) {
+      const LinearFit fit = solve(all);
+      weights_ = (fit.rows.array() / fit.square.array().max(1e-18 * fit.rows.array())).matrix();
+      for (std::size_t j = 0; j < n; ++j) {
+        double square = 0;
+        for (const std::size_t b : fit_blocks_) square += rows_[j].sums[b].square;
+        // noise-free: no more than 1e-9 of the signal
+        weights_[static_cast<Index>(j)] = fit.rows[static_cast<Index>(j)] / std::max(fit.square[static_cast<Index>(j)], 1e-18 * square + 1e-300);
+      }
+    }
+    return solve(all);
+  };
+  const LinearFit fit = reweight();
+  if (whitening_.empty()) {
+    std::vector<VectorXd> coefficients(n);
+    for (std::size_t j = 0; j < n; ++j) {
+      const VectorXd e = residual(j, fit);
+      std::vector<VectorXd> parts;
+      for (const Block& b : log_rows_) {
+        const bool use = models_.has_baseline ? b.healthy : b.fits;
+        if (use) parts.emplace_back(e.segment(b.first, b.count));
+      }
+      coefficients[j] = yule_walker(parts);
+    }
+    whitening_ = std::move(coefficients);
+  }
+  parallel_for(n, [&](std::size_t j) {
+    JointRows& rows = rows_[j];
+    for (const Block& b : log_rows_) {
+      rows.x.middleRows(b.first, b.count) = whiten(j, rows.x.middleRows(b.first, b.count));
+      rows.y.segment(b.first, b.count) = whiten(j, rows.y.segment(b.first, b.count));
+    }
+    rows.sums.clear();
+    sum_up(rows, 0);
+  });
+  reweight();
+}
+
+void Linearised::sum_up(JointRows& rows, Index from) const {
+  const Index cols = rows.x.cols(), more = cols - from;
+  rows.sums.resize(blocks_.size());
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    const Block& block = blocks_[b];
+    const auto x = rows.x.middleRows(block.first, block.count);
+    const auto y = rows.y.segment(block.first, block.count);
+    JointRows::Sums& s = rows.sums[b];
+    const MatrixXd fresh = x.transpose() * x.rightCols(more);
+    s.gram.conservativeResize(cols, cols);
+    s.gram.rightCols(more) = fresh;
+    s.gram.bottomRows(more) = fresh.transpose();
+    s.projection.conservativeResize(cols);
+    s.projection.tail(more) = x.rightCols(more).transpose() * y;
+    s.square = y.squaredNorm();
+    s.rows = static_cast<double>(block.count);
+  }
+}
+
+std::vector<MatrixXd> Linearised::make(const EffectCandidate& candidate) const {
+  std::vector<MatrixXd> out(joints());
+  const Index total = log_rows_.back().first + log_rows_.back().count;
+  for (std::size_t l = 0; l < logs_->size(); ++l) {
+    if ((*logs_)[l].healthy) continue;
+    const EffectColumns full = full_rate(l, candidate);
+    for (std::size_t j = 0; j < joints(); ++j) {
+      if (full.joints[j].size() == 0) continue;
+      if (out[j].size() == 0) out[j].setZero(total, full.joints[j].cols());
+      out[j].middleRows(log_rows_[l].first, log_rows_[l].count) = prepare(l, j, full.joints[j]);
+    }
+  }
+  return out;
+}
+
+std::size_t Linearised::add(const Group& group, const std::vector<MatrixXd>& columns) {
+  Group g = group;
+  g.first = columns_;
+  g.count = 0;
+  for (const MatrixXd& c : columns) g.count = std::max(g.count, c.cols());
+  columns_ += g.count;
+  parallel_for(joints(), [&](std::size_t j) {
+    JointRows& rows = rows_[j];
+    rows.local.resize(static_cast<std::size_t>(columns_), -1);
+    if (columns[j].size() == 0) return;
+    const Index from = rows.x.cols();
+    rows.x.conservativeResize(Eigen::NoChange, from + g.count);
+    rows.x.rightCols(g.count) = columns[j];
+    for (Index i = 0; i < g.count; ++i) {
+      rows.local[static_cast<std::size_t>(g.first + i)] = from + i;
+      rows.column.push_back(g.first + i);
+    }
+    sum_up(rows, from);
+  });
+  groups_.push_back(std::move(g));
+  return groups_.size() - 1;
+}
+
+void Linearised::add_all(std::vector<Group> groups) {
+  std::vector<std::vector<MatrixXd>> made(groups.size());
+  parallel_for(groups.size(), [&](std::size_t g) { made[g] = make(groups[g].candidate); });
+  std::vector<Index> from(joints());
+  for (std::size_t j = 0; j < joints(); ++j) from[j] = rows_[j].x.cols();
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    groups[g].first = columns_;
+    groups[g].count = 0;
+    for (const MatrixXd& c : made[g]) groups[g].count = std::max(groups[g].count, c.cols());
+    columns_ += groups[g].count;
+  }
+  parallel_for(joints(), [&](std::size_t j) {
+    JointRows& rows = rows_[j];
+    rows.local.resize(static_cast<std::size_t>(columns_), -1);
+    Index at = from[j];
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      if (made[g][j].size() == 0) continue;
+      for (Index i = 0; i < groups[g].count; ++i) {
+        rows.local[static_cast<std::size_t>(groups[g].first + i)] = at++;
+        rows.column.push_back(groups[g].first + i);
+      }
+    }
+    rows.x.conservativeResize(Eigen::NoChange, at);
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      if (made[g][j].size() > 0)
+        rows.x.middleCols(rows.local[static_cast<std::size_t>(groups[g].first)], groups[g].count) = made[g][j];
+    }
+    sum_up(rows, from[j]);
+  });
+  groups_.insert(groups_.end(), groups.begin(), groups.end());
+}
+
+void Linearised::normal(const std::vector<Index>& columns, const std::vector<std::size_t>& blocks, MatrixXd& gram,
+                        VectorXd& projection) const {
+  const auto p = static_cast<Index>(columns.size());
+  gram.setZero(p, p);
+  projection.setZero(p);
+  for (std::size_t j = 0; j < joints(); ++j) {
+    const JointRows& rows = rows_[j];
+    std::vector<Index> place, local;
+    for (Index i = 0; i < p; ++i) {
+      const Index at = rows.local[static_cast<std::size_t>(columns[static_cast<std::size_t>(i)])];
+      if (at < 0) continue;
+      place.push_back(i);
+      local.push_back(at);
+    }
+    const double w = weights_[static_cast<Index>(j)];
+    for (const std::size_t b : blocks) {
+      gram(place, place) += w * rows.sums[b].gram(local, local);
+      projection(place) += w * rows.sums[b].projection(local);
+    }
+  }
+  for (Index i = 0; i < p; ++i) {
+    const auto c = static_cast<std::size_t>(columns[static_cast<std::size_t>(i)]);
+    if (c >= unknowns_.size() || unknowns_[c].prior_std == 0) continue;
+    const double information = 1 / (unknowns_[c].prior_std * unknowns_[c].prior_std);
+    gram(i, i) += information;
+    projection[i] += information * unknowns_[c].prior;
+  }
+}
+
+LinearFit Linearised::solve(const std::vector<Index>& columns, const std::vector<std::size_t>& blocks) const {
+  LinearFit fit;
+  fit.columns = columns;
+  VectorXd projection;
+  normal(columns, blocks, fit.information, projection);
+  fit.x = SymmetricSolver(fit.information).solve(projection);
+  fit.square = square(fit, blocks);
+  fit.rows = row_count(blocks);
+  return fit;
+}
+
+VectorXd Linearised::row_count(const std::vector<std::size_t>& blocks) const {
+  VectorXd out = VectorXd::Zero(static_cast<Index>(joints()));
+  for (std::size_t j = 0; j < joints(); ++j) {
+    for (const std::size_t b : blocks) out[static_cast<Index>(j)] += rows_[j].sums[b].rows;
+  }
+  return out;
+}
+
+VectorXd Linearised::square(const LinearFit& fit, const std::vector<std::size_t>& blocks) const {
+  VectorXd out = VectorXd::Zero(static_cast<Index>(joints()));
+  for (std::size_t j = 0; j < joints(); ++j) {
+    const VectorXd e = residual(j, fit);
+    for (const std::size_t b : blocks) out[static_cast<Index>(j)] += e.segment(blocks_[b].first, blocks_[b].count).squaredNorm();
+  }
+  return out;
+}
+
+VectorXd Linearised::residual(std::size_t joint, const LinearFit& fit) const {
+  const JointRows& rows = rows_[joint];
+  VectorXd e = rows.y;
+  for (std::size_t i = 0; i < fit.columns.size(); ++i) {
+    const Index at = rows.local[static_cast<std::size_t>(fit.columns[i])];
+    if (at >= 0) e -= fit.x[static_cast<Index>(i)] * rows.x.col(at);
+  }
+  return e;
+}
+
+MatrixXd Linearised::cross(const std::vector<Index>& columns, Index from) const {
+  MatrixXd out = MatrixXd::Zero(static_cast<Index>(columns.size()), columns_ - from);
+  for (std::size_t j = 0; j < joints(); ++j) {
+    const JointRows& rows = rows_[j];
+    std::vector<Index> place, local, there, theirs;
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      const Index at = rows.local[static_cast<std::size_t>(columns[i])];
+      if (at < 0) continue;
+      place.push_back(static_cast<Index>(i));
+      local.push_back(at);
+    }
+    for (Index c = from; c < columns_; ++c) {
+      const Index at = rows.local[static_cast<std::size_t>(c)];
+      if (at < 0) continue;
+      there.push_back(c - from);
+      theirs.push_back(at);
+    }
+    const double w = weights_[static_cast<Index>(j)];
+    for (const std::size_t b : fit_blocks_) out(place, there) += w * rows.sums[b].gram(local, theirs);
+  }
+  return out;
+}
+
+VectorXd Linearised::projection(Index from) const {
+  VectorXd out = VectorXd::Zero(columns_ - from);
+  for (std::size_t j = 0; j < joints(); ++j) {
+    const JointRows& rows = rows_[j];
+    for (std::size_t i = 0; i < rows.column.size(); ++i) {
+      const Index c = rows.column[i];
+      if (c < from) continue;
+      for (const std::size_t b : fit_blocks_)
+        out[c - from] += weights_[static_cast<Index>(j)] * rows.sums[b].projection[static_cast<Index>(i)];
+    }
+  }
+  return out;
+}
+
+MatrixXd Linearised::gram(Index first, Index count) const {
+  MatrixXd out = MatrixXd::Zero(count, count);
+  for (std::size_t j = 0; j < joints(); ++j) {
+    const JointRows& rows = rows_[j];
+    const Index at = rows.local[static_cast<std::size_t>(first)];
+    if (at < 0) continue;
+    for (const std::size_t b : fit_blocks_)
+      out += weights_[static_cast<Index>(j)] * rows.sums[b].gram.block(at, at, count, count);
+  }
+  return out;
+}
+
+void update(Models& models, const Linearised& at, const LinearFit& fit, double share) {
+  for (std::size_t i = 0; i < fit.columns.size(); ++i) {
+    const auto c = static_cast<std::size_t>(fit.columns[i]);
+    if (c >= at.unknowns().size()) continue;
+    const Unknown& u = at.unknowns()[c];
+    const bool logarithm = u.kind == Unknown::Kind::shape || u.kind == Unknown::Kind::width;
+    double step = share * (fit.x[static_cast<Index>(i)] - u.value);
+    if (logarithm) step = std::clamp(step, -0.4, 0.4);
+    // Payload's mass first: its centre is first moment over mass.
+    if (!u.change && u.kind == Unknown::Kind::linear && u.body && u.index == 0 &&
+        fit_of(models.current, u).effect == Payload::name) {
+      EffectFit& load = models.current.body[u.effect];
+      const double mass = std::max(1e-6, load.linear[0] + step);
+      for (std::size_t k = 1; k < load.linear.size(); ++k) load.linear[k] *= load.linear[0] / mass;
+      load.linear[0] = mass;
+      continue;
+    }
+    add_to(models.current, u, step);
+    const bool named = u.kind != Unknown::Kind::base && u.kind != Unknown::Kind::width && fit_of(models.current, u).named;
+    if (models.has_baseline && !u.change && !named) add_to(models.healthy, u, step);
+  }
+}
+
+}  // namespace fxdyn::diagnosis

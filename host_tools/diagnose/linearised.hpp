@@ -1,0 +1,182 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "host_tools/excite/motion.hpp"
+#include "host_tools/identify/dataset.hpp"
+#include "host_tools/identify/regressor.hpp"
+#include "host_tools/model/robot_columns.hpp"
+
+namespace fxdyn::diagnosis {
+
+/// Two states of one robot: before (the baseline, a session known to be healthy) and now. Base parameters are the same;
+/// friction may differ a little, named effects are in `current` only. Without a baseline `healthy` is not used.
+struct Models {
+  IdentifiedModel healthy, current;
+  bool has_baseline = false;
+};
+
+/// A log of one of the two sessions. Rows are decimated to `log.decimation`.
+struct SessionLog {
+  ProcessedLog log;
+  bool healthy = false;  ///< of the baseline
+  bool fits = true;      ///< else it judges only (validate)
+  double age_s = 0;      ///< of the session when the log begins: what drifts has drifted so far
+};
+
+/// One scalar that is fitted.
+struct Unknown {
+  enum class Kind {
+    base,    ///< base parameter
+    linear,  ///< coefficient of an effect
+    width,   ///< logarithm of a joint's sign width
+    shape,   ///< logarithm of an effect's shape parameter
+  };
+  Kind kind = Kind::base;
+  std::size_t joint = 0, effect = 0, index = 0;  ///< base: index; shape and linear: of the model's effect
+  bool body = false;                             ///< effect of IdentifiedModel::body
+  bool change = false;                           ///< what the current session has more than the healthy one
+  double value = 0;                              ///< in the model; 0 for logarithms, whose steps are fitted
+  double prior = 0, prior_std = 0;               ///< std 0: none
+};
+
+/// Columns of one effect with one shape: a candidate, or one that the model has by name.
+struct Group {
+  EffectCandidate candidate;
+  bool on_body = false;
+  bool in_model = false;         ///< columns are d torque / d (unknown) around the named effect
+  Eigen::Index first = 0;        ///< column
+  Eigen::Index count = 0;        ///< columns
+  int nonlinear = 0;             ///< shape parameters that were searched
+  double log_grid = 0;           ///< ln of the number of independent shapes tried
+  std::vector<double> lower{};   ///< bounds of the coefficients
+  bool noise_limited = false;    ///< what is seen of it is encoder noise
+};
+
+/// Rows that are used or left out together.
+struct Block {
+  std::size_t log = 0;
+  Eigen::Index first = 0, count = 0;
+  bool healthy = false, fits = true;
+};
+struct Fold {
+  std::vector<std::size_t> fit, judge;  ///< blocks
+};
+
+/// One joint's whitened rows and their sums of products by block.
+struct JointRows {
+  Eigen::MatrixXd x;
+  Eigen::VectorXd y;
+  std::vector<Eigen::Index> column;  ///< of each column of x: its place in the whole
+  std::vector<Eigen::Index> local;   ///< the inverse, -1: the joint does not feel it
+  struct Sums {
+    Eigen::MatrixXd gram;
+    Eigen::VectorXd projection;
+    double square = 0, rows = 0;
+  };
+  std::vector<Sums> sums;
+};
+
+/// A fit of chosen columns.
+struct LinearFit {
+  std::vector<Eigen::Index> columns;
+  Eigen::VectorXd x;
+  Eigen::VectorXd square;  ///< per joint: of the whitened residual
+  Eigen::VectorXd rows;    ///< per joint
+  Eigen::MatrixXd information;
+};
+
+/// The measurement as a linear function of what may be fitted, around two models:
+///   y = tau - predict(model) + J x0 = J x + noise,
+/// torque and columns filtered and decimated alike, then prewhitened per joint by an autoregressive model of the noise.
+/// J has the nuisance (base parameters, nominal effects and widths, their change since the baseline), the named effects
+/// of the model, and candidates of the catalogue.
+class Linearised {
+ public:
+  /// @param whitening per joint the autoregressive coefficients; empty: from the residual of the nuisance and the
+  /// model's named effects (of the healthy session where there is one).
+  Linearised(const Models& models, const std::vector<SessionLog>& logs, std::vector<Eigen::VectorXd> whitening = {});
+
+  std::size_t joints() const { return rows_.size(); }
+  Eigen::Index columns() const { return columns_; }
+  const std::vector<Unknown>& unknowns() const { return unknowns_; }  ///< of the nuisance and of named effects
+  const std::vector<Eigen::Index>& nuisance() const { return nuisance_; }
+  const std::vector<Group>& groups() const { return groups_; }
+  Group& group(std::size_t i) { return groups_[i]; }
+  const JointRows& rows(std::size_t joint) const { return rows_[joint]; }
+  const std::vector<Block>& blocks() const { return blocks_; }
+  const std::vector<Fold>& folds() const { return folds_; }
+  const std::vector<std::size_t>& fit_blocks() const { return fit_blocks_; }
+  const std::vector<SessionLog>& logs() const { return *logs_; }
+  const std::vector<Eigen::VectorXd>& whitening() const { return whitening_; }
+  const Models& models() const { return models_; }
+  const Motion& motion(std::size_t log) const { return *motions_[log]; }
+  const RobotColumns& robot_columns(std::size_t log) const { return *robot_[log]; }
+  /// One over the variance of each joint's whitened residual.
+  const Eigen::VectorXd& weights() const { return weights_; }
+  void set_weights(const Eigen::VectorXd& weights) { weights_ = weights; }
+
+  /// Columns of candidates (current session), whitened: per joint rows x columns; 0 x 0 where nothing is felt.
+  /// `shortened` for each candidate alone, safe from several threads.
+  std::vector<Eigen::MatrixXd> make(const EffectCandidate& candidate) const;
+  /// Appends them as a group; returns its index.
+  std::size_t add(const Group& group, const std::vector<Eigen::MatrixXd>& columns);
+  void add_all(std::vector<Group> groups);
+
+  /// Least squares of the columns on some blocks, with the priors of the unknowns.
+  LinearFit solve(const std::vector<Eigen::Index>& columns, const std::vector<std::size_t>& blocks) const;
+  LinearFit solve(const std::vector<Eigen::Index>& columns) const { return solve(columns, fit_blocks_); }
+  /// Squared whitened residual of a fit on blocks, per joint; and their rows.
+  Eigen::VectorXd square(const LinearFit& fit, const std::vector<std::size_t>& blocks) const;
+  Eigen::VectorXd row_count(const std::vector<std::size_t>& blocks) const;
+  /// Whitened residual of a joint, all rows.
+  Eigen::VectorXd residual(std::size_t joint, const LinearFit& fit) const;
+  /// X^T W X and X^T W y.
+  void normal(const std::vector<Eigen::Index>& columns, const std::vector<std::size_t>& blocks, Eigen::MatrixXd& gram,
+              Eigen::VectorXd& projection) const;
+  /// Between `columns` (rows) and those from `from` on (columns), joints weighted.
+  Eigen::MatrixXd cross(const std::vector<Eigen::Index>& columns, Eigen::Index from) const;
+  /// Of single columns with y.
+  Eigen::VectorXd projection(Eigen::Index from) const;
+  Eigen::MatrixXd gram(Eigen::Index first, Eigen::Index count) const;
+
+  /// Filtered, decimated, whitened: full-rate columns of a log for a joint.
+  Eigen::MatrixXd prepare(std::size_t log, std::size_t joint, const Eigen::Ref<const Eigen::MatrixXd>& full) const;
+  /// Rows of a log.
+  const Block& log_rows(std::size_t log) const { return log_rows_[log]; }
+
+ private:
+  void make_unknowns();
+  void make_blocks();
+  void make_rows();
+  void sum_up(JointRows& rows, Eigen::Index from) const;
+  Eigen::MatrixXd whiten(std::size_t joint, Eigen::MatrixXd columns) const;
+  Eigen::MatrixXd follow(std::size_t log, std::size_t joint, Eigen::MatrixXd columns) const;
+  Eigen::MatrixXd aged(const Group& group, std::size_t log, Eigen::MatrixXd columns) const;
+  EffectColumns full_rate(std::size_t log, const EffectCandidate& candidate) const;
+
+  Models models_;
+  const std::vector<SessionLog>* logs_;
+  DhChain chain_;
+  BaseSet base_;
+  std::vector<Unknown> unknowns_;
+  std::vector<Eigen::Index> nuisance_;
+  std::vector<Group> groups_;
+  Eigen::Index columns_ = 0;
+  std::vector<std::unique_ptr<Motion>> motions_;
+  std::vector<std::unique_ptr<RobotColumns>> robot_;
+  std::vector<JointRows> rows_;
+  std::vector<Block> blocks_, log_rows_;
+  std::vector<Fold> folds_;
+  std::vector<std::size_t> fit_blocks_;
+  std::vector<Eigen::VectorXd> whitening_;
+  Eigen::VectorXd weights_;
+};
+
+/// What a fit over nuisance and named effects makes of the models: x at `columns` (places of unknowns).
+void update(Models& models, const Linearised& at, const LinearFit& fit, double share);
+
+}  // namespace fxdyn::diagnosis

@@ -1,0 +1,75 @@
+#include "host_tools/diagnose/refit.hpp"
+
+#include <cmath>
+
+#include "host_tools/model/effects.hpp"
+
+namespace fxdyn::diagnosis {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+namespace {
+
+/// -2 ln likelihood of the models as they are, but for a constant.
+double misfit(const Linearised& at) {
+  LinearFit now;
+  for (Index c = 0; c < static_cast<Index>(at.unknowns().size()); ++c) now.columns.push_back(c);
+  now.x.resize(static_cast<Index>(now.columns.size()));
+  double sum = 0;
+  for (std::size_t c = 0; c < at.unknowns().size(); ++c) {
+    const Unknown& u = at.unknowns()[c];
+    now.x[static_cast<Index>(c)] = u.value;
+    if (u.prior_std > 0) sum += std::pow((u.value - u.prior) / u.prior_std, 2);
+  }
+  const VectorXd square = at.square(now, at.fit_blocks()), rows = at.row_count(at.fit_blocks());
+  for (Index j = 0; j < square.size(); ++j) sum += rows[j] * std::log(std::max(square[j], 1e-300));
+  return sum;
+}
+
+}  // namespace
+
+void refit(Models& models, const std::vector<SessionLog>& all, const std::vector<VectorXd>& whitening, int rounds) {
+  std::vector<SessionLog> logs;
+  for (const SessionLog& log : all) {
+    if (log.fits) logs.push_back(log);
+  }
+  Models best = models;
+  double least = 1e300;
+  for (int round = 0; round <= rounds; ++round) {
+    const Linearised at(models, logs, whitening);
+    const double now = misfit(at);
+    if (now > least) {
+      // Too far: a quarter of the step, once.
+      models = best;
+      return;
+    }
+    const bool converged = least - now < 0.5;
+    best = models;
+    least = now;
+    if (converged || round == rounds) return;
+    std::vector<Index> columns;
+    for (Index c = 0; c < static_cast<Index>(at.unknowns().size()); ++c) columns.push_back(c);
+    update(models, at, at.solve(columns), 1);
+  }
+}
+
+void name(Models& models, const Group& group, const VectorXd& theta) {
+  EffectFit fit;
+  fit.effect = group.candidate.effect;
+  fit.shape = group.candidate.shape;
+  fit.named = true;
+  const EffectInfo& info = *find_effect(fit.effect);
+  for (Index i = 0; i < theta.size(); ++i) {
+    const ParameterInfo& p = info.linear[static_cast<std::size_t>(i)];
+    fit.linear.push_back(fit.effect == Payload::name ? theta[i] : std::clamp(theta[i], p.lower, p.upper));
+  }
+  if (info.linear[0].name == "share") fit.linear[0] = 1;
+  if (fit.effect == Payload::name) {
+    fit.linear[0] = std::max(fit.linear[0], 1e-6);
+    for (std::size_t i = 1; i < fit.linear.size(); ++i) fit.linear[i] = std::clamp(fit.linear[i] / fit.linear[0], -10.0, 10.0);
+  }
+  (group.on_body ? models.current.body : models.current.joints[group.candidate.joint].effects).push_back(std::move(fit));
+}
+
+}  // namespace fxdyn::diagnosis

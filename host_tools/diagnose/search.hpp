@@ -1,0 +1,85 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "host_tools/diagnose/linearised.hpp"
+#include "host_tools/progress.hpp"
+
+namespace fxdyn::diagnosis {
+
+/// Candidates of the whole catalogue with their grids of shapes, for every joint and for the robot; but for what
+/// `skip` names. Ripples are not among them, see ripples().
+std::vector<Group> dictionary(const Linearised& at, const std::vector<EffectCandidate>& skip);
+
+/// Wavenumbers at which a joint's residual ripples, the strongest first: peaks of
+///   P(n) = |sum g exp(i n q)|^2 / expected power,
+/// g the residual with the adjoint of filter, decimation and whitening applied, so that no column has to be made.
+std::vector<Group> ripples(const Linearised& at, std::size_t joint, const Eigen::VectorXd& residual, std::size_t most);
+
+/// A set of effects beside the nuisance.
+struct Choice {
+  std::vector<std::size_t> groups;
+  LinearFit fit;
+  /// -sum N ln(RSS / N) over the joints - sum over effects of ((linear + nonlinear) ln N + 2 ln grid)
+  double score = -1e300;
+  bool possible = true;  ///< coefficients keep their bounds
+};
+
+struct Alternative {
+  EffectCandidate candidate;
+  double behind = 0;  ///< score of the set with it in place of the chosen one, less
+};
+
+/// One effect of the outcome.
+struct Found {
+  std::size_t group = 0;
+  double score = 0;  ///< what the set loses without it
+  std::vector<Alternative> alternatives;
+};
+
+struct SearchSettings {
+  std::size_t max_effects = 3;  ///< per joint
+  std::size_t robot_effects = 2;
+  double within = 10;  ///< alternatives are no further behind
+};
+
+/// Beam search forward, swaps, backward elimination.
+class Search {
+ public:
+  Search(Linearised& at, const SearchSettings& settings) : at_(at), settings_(settings) {}
+
+  /// @param start groups to begin with (named effects of the model)
+  Choice run(std::vector<std::size_t> start, Progress& progress);
+  std::vector<Found> explain(const Choice& choice);
+  Choice evaluate(const std::vector<std::size_t>& groups) const;
+  /// By group, at the start of run(): share of its columns that the nuisance and the named effects do not absorb (the
+  /// largest over their directions), squared.
+  const std::vector<double>& not_absorbed() const { return kept_; }
+  /// Scores that an effect of a joint must reach to be believed: from residuals shifted in time against the motion.
+  const Eigen::VectorXd& thresholds() const { return thresholds_; }
+
+ private:
+  struct Scored {
+    std::size_t group;
+    double score;
+  };
+  std::vector<Scored> score_all(const Choice& state, bool with_thresholds);
+  std::size_t refine(const Choice& state, std::size_t group);
+  double penalty(std::size_t group) const;
+  double threshold(std::size_t group) const;
+  bool allowed(const Choice& state, std::size_t group) const;
+  std::vector<Eigen::Index> columns(const std::vector<std::size_t>& groups) const;
+  void find_ripples(const Choice& state);
+  double samples() const;
+
+  Linearised& at_;
+  SearchSettings settings_;
+  Eigen::VectorXd thresholds_;
+  std::vector<double> kept_;
+};
+
+/// Index of the shape parameter that is searched continuously; none: -1.
+int searched_shape(const EffectCandidate& candidate);
+
+}  // namespace fxdyn::diagnosis

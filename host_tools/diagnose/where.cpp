@@ -1,0 +1,142 @@
+#include "host_tools/diagnose/where.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "host_tools/log/spectrum.hpp"
+#include "host_tools/model/evaluator.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+constexpr Index bins = 24;
+/// A region says something where its share of the gap is that much more than its share of the samples.
+constexpr double telling = 0.15;
+constexpr std::size_t most_regions = 4;
+
+struct Region {
+  std::string signal;
+  double from = 0, to = 0, share = 0, contrast = 0;
+};
+
+/// The interval with the largest share of the gap beyond its share of the samples.
+Region concentrated(const std::string& signal, const VectorXd& values, const VectorXd& square, double noise) {
+  Region best{signal};
+  std::vector<double> sorted(values.begin(), values.end());
+  std::sort(sorted.begin(), sorted.end());
+  const double from = sorted[sorted.size() / 200], to = sorted[sorted.size() - 1 - sorted.size() / 200];
+  if (!(to > from)) return best;
+  VectorXd power = VectorXd::Zero(bins), count = VectorXd::Zero(bins);
+  for (Index k = 0; k < values.size(); ++k) {
+    const auto bin = std::clamp<Index>(static_cast<Index>((values[k] - from) / (to - from) * bins), 0, bins - 1);
+    power[bin] += square[k] - noise * noise;
+    count[bin] += 1;
+  }
+  const double whole = power.sum(), samples = count.sum();
+  if (!(whole > 0)) return best;
+  for (Index a = 0; a < bins; ++a) {
+    double p = 0, c = 0;
+    for (Index b = a; b < bins; ++b) {
+      p += power[b];
+      c += count[b];
+      const double contrast = p / whole - c / samples;
+      if (contrast <= best.contrast) continue;
+      best.contrast = contrast;
+      best.share = std::min(1.0, p / whole);
+      best.from = from + (to - from) * static_cast<double>(a) / bins;
+      best.to = from + (to - from) * static_cast<double>(b + 1) / bins;
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+nlohmann::json where(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs, std::size_t joint,
+                     const std::vector<VectorXd>& error, double noise) {
+  const auto j = static_cast<Index>(joint);
+  Index total = 0;
+  for (const ProcessedLog* log : logs) total += log->rows();
+  VectorXd q(total), dq(total), ddq(total), load(total), t(total), square(total);
+  IdentifiedModel rigid = model;
+  for (JointFit& fit : rigid.joints) {
+    fit.effects.clear();
+    fit.bls.reset();
+  }
+  Index at = 0;
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    const ProcessedLog& log = *logs[l];
+    const MotionRows m = log.joint_motion(j);
+    const VectorXd structural = predict(rigid, log).col(j);
+    for (Index r = 0; r < log.rows(); ++r, ++at) {
+      const Index k = log.first + r * log.decimation;
+      q[at] = m.q(k, 0);
+      dq[at] = m.dq(k, 0);
+      ddq[at] = m.ddq(k, 0);
+      load[at] = structural[k];
+      t[at] = log.t[k];
+      square[at] = error[l][k] * error[l][k];
+    }
+  }
+  std::vector<Region> regions;
+  const auto look = [&](const std::string& signal, const VectorXd& values) {
+    Region region = concentrated(signal, values, square, noise);
+    if (region.share > 0) regions.push_back(region);
+  };
+  look("dq", dq);
+  look("q", q);
+  look("ddq", ddq);
+  look("load", load);
+  look("t", t);
+  {
+    // direction of motion
+    double forward = 0, backward = 0, ahead = 0;
+    for (Index k = 0; k < total; ++k) {
+      (dq[k] > 0 ? forward : backward) += square[k] - noise * noise;
+      ahead += dq[k] > 0;
+    }
+    const double whole = forward + backward, share = ahead / static_cast<double>(std::max<Index>(total, 1));
+    if (whole > 0) {
+      const bool positive = forward / whole - share > 0;
+      const double mine = positive ? forward / whole : backward / whole;
+      regions.push_back({"direction", positive ? 0.0 : -1.0, positive ? 1.0 : 0.0, std::min(1.0, mine),
+                         mine - (positive ? share : 1 - share)});
+    }
+  }
+  {
+    // octaves of frequency; contrast against the band
+    VectorXd power;
+    double step = 0;
+    for (std::size_t l = 0; l < logs.size(); ++l) {
+      const ProcessedLog& log = *logs[l];
+      const Spectrum spectrum = welch(error[l].segment(log.first, log.last - log.first), log.step_s);
+      if (power.size() == 0) power = VectorXd::Zero(spectrum.density.size());
+      if (power.size() != spectrum.density.size()) continue;
+      power += spectrum.density * static_cast<double>(log.rows());
+      step = spectrum.frequency(1) - spectrum.frequency(0);
+    }
+    const double cutoff = logs.front()->filter.torque_cutoff_hz, whole = power.sum();
+    Region best{"frequency"};
+    for (double from = 0; from < cutoff && whole > 0 && step > 0; from = std::max(2 * from, 0.5)) {
+      const double to = std::max(2 * from, 0.5);
+      const auto a = static_cast<Index>(from / step), b = std::min<Index>(power.size(), static_cast<Index>(to / step));
+      if (b <= a) continue;
+      const double share = power.segment(a, b - a).sum() / whole, contrast = share - (to - from) / cutoff;
+      if (contrast > best.contrast) best = {"frequency", from, to, share, contrast};
+    }
+    if (best.share > 0) regions.push_back(best);
+  }
+  std::sort(regions.begin(), regions.end(), [](const Region& a, const Region& b) { return a.contrast > b.contrast; });
+  nlohmann::json out = nlohmann::json::array();
+  for (const Region& region : regions) {
+    if (out.size() >= most_regions || (region.contrast < telling && !out.empty())) break;
+    out.push_back({{"signal", region.signal}, {"from", region.from}, {"to", region.to}, {"share_of_gap", region.share}});
+  }
+  return out;
+}
+
+}  // namespace fxdyn::diagnosis

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "host_tools/identify/dataset.hpp"
+#include "host_tools/model/identified_model.hpp"
+
+namespace fxdyn::diagnosis {
+
+/// Where a gap sits: the regions of velocity, position, acceleration, load, direction, time and frequency that hold
+/// clearly more of its power than of the samples, the most telling first: [{signal, from, to, share_of_gap}].
+/// @param error filtered residual of the joint over each log, full rate @param noise its noise floor
+nlohmann::json where(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs, std::size_t joint,
+                     const std::vector<Eigen::VectorXd>& error, double noise);
+
+}  // namespace fxdyn::diagnosis
