@@ -356,7 +356,7 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
       before.push_back(log);
       before.back().healthy = false;
     }
-    refit(alone, before, {}, 3);
+    for (int round = 0; round < 2; ++round) refit(alone, before, {}, 8);
     Outcome background;
     background.at = std::make_unique<Linearised>(alone, before);
     look_for_lack(background);
@@ -380,7 +380,7 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
   } else {
     models.current = nominal_model(project, data, progress);
   }
-  refit(models, logs, {}, 3);
+  refit(models, logs, {}, 8);
   Diagnosis result;
   {
     const Linearised at(models, logs);

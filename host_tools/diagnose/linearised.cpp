@@ -1,6 +1,7 @@
 #include "host_tools/diagnose/linearised.hpp"
 
 #include <cmath>
+#include <numbers>
 
 #include "host_tools/error.hpp"
 #include "host_tools/identify/solver.hpp"
@@ -309,7 +310,33 @@ EffectColumns Linearised::full_rate(std::size_t log, const EffectCandidate& cand
 
 MatrixXd Linearised::prepare(std::size_t log, std::size_t joint, const Eigen::Ref<const MatrixXd>& full) const {
   const ProcessedLog& l = (*logs_)[log].log;
-  return whiten(joint, l.decimate(l.filter_columns(full)));
+  const Block& b = log_rows_[log];
+  return row_scale_[joint].segment(b.first, b.count).asDiagonal() * whiten(joint, l.decimate(l.filter_columns(full)));
+}
+
+/// What a row counts for, as a factor: near standstill the friction that an uncertain velocity makes is noise too,
+///   1 / sqrt(1 + (d tau / d dq  sigma_dq / sigma)^2),
+/// sigma_dq what the position filter leaves of the encoder's noise.
+VectorXd Linearised::certainty(std::size_t log, std::size_t joint, double sigma) const {
+  const SessionLog& entry = (*logs_)[log];
+  const ProcessedLog& l = entry.log;
+  const JointFit& fit = (entry.healthy ? models_.healthy : models_.current).joints[joint];
+  const EffectFit* coulomb = fit.find(Coulomb::name);
+  const double noise = std::max(l.filter.position_noise[joint], l.filter.encoder_step[joint] / std::sqrt(12.0));
+  if (coulomb == nullptr || l.measured_dq.size() > 0 || !(noise > 0)) return VectorXd::Ones(l.rows());
+  // Twice white noise's: an encoder at standstill repeats its error.
+  const double cutoff = std::min(l.filter.position_cutoff_hz, 0.5 / l.step_s);
+  const double sigma_dq = 2 * 2 * std::numbers::pi * noise * std::sqrt(2 * l.step_s * cutoff * cutoff * cutoff / 3);
+  const double amplitude = std::fabs(coulomb->linear[0]), width = fit.sign_width;
+  VectorXd uncertain(l.samples());
+  for (Index k = 0; k < l.samples(); ++k) {
+    const double dq = (*motions_[log]).dq(k, static_cast<Index>(joint));
+    // the mean slope over what the velocity may be
+    const double slope = (std::tanh((dq + sigma_dq) / width) - std::tanh((dq - sigma_dq) / width)) / (2 * sigma_dq);
+    uncertain[k] = amplitude * slope * sigma_dq / sigma;
+  }
+  VectorXd rows = l.decimate(l.filter_columns(uncertain.cwiseAbs2()));
+  return (1 + rows.array().max(0)).sqrt().inverse();
 }
 
 /// Rows of one log; its first ones have no past and are left out (zero).
@@ -484,12 +511,18 @@ void Linearised::make_rows() {
     }
     whitening_ = std::move(coefficients);
   }
+  row_scale_.resize(n);
   parallel_for(n, [&](std::size_t j) {
     JointRows& rows = rows_[j];
+    row_scale_[j] = VectorXd::Ones(total);
+    const double sigma = 1 / std::sqrt(weights_[static_cast<Index>(j)]);
+    for (std::size_t l = 0; l < logs_->size(); ++l) row_scale_[j].segment(log_rows_[l].first, log_rows_[l].count) = certainty(l, j, sigma);
     for (const Block& b : log_rows_) {
       rows.x.middleRows(b.first, b.count) = whiten(j, rows.x.middleRows(b.first, b.count));
       rows.y.segment(b.first, b.count) = whiten(j, rows.y.segment(b.first, b.count));
     }
+    rows.x = row_scale_[j].asDiagonal() * rows.x;
+    rows.y = row_scale_[j].cwiseProduct(rows.y);
     rows.sums.clear();
     sum_up(rows, 0);
   });

@@ -153,6 +153,7 @@ class Linearised {
   void make_blocks();
   void make_rows();
   void sum_up(JointRows& rows, Eigen::Index from) const;
+  Eigen::VectorXd certainty(std::size_t log, std::size_t joint, double sigma) const;
   Eigen::MatrixXd whiten(std::size_t joint, Eigen::MatrixXd columns) const;
   Eigen::MatrixXd follow(std::size_t log, std::size_t joint, Eigen::MatrixXd columns) const;
   Eigen::MatrixXd aged(const Group& group, std::size_t log, Eigen::MatrixXd columns) const;
@@ -173,6 +174,7 @@ class Linearised {
   std::vector<Fold> folds_;
   std::vector<std::size_t> fit_blocks_;
   std::vector<Eigen::VectorXd> whitening_;
+  std::vector<Eigen::VectorXd> row_scale_;  ///< per joint, see certainty()
   Eigen::VectorXd weights_;
 };
 

@@ -1,6 +1,7 @@
 #include "host_tools/diagnose/refit.hpp"
 
 #include <cmath>
+#include <memory>
 
 #include "host_tools/model/effects.hpp"
 
@@ -29,28 +30,40 @@ double misfit(const Linearised& at) {
 
 }  // namespace
 
-void refit(Models& models, const std::vector<SessionLog>& all, const std::vector<VectorXd>& whitening, int rounds) {
+void refit(Models& models, const std::vector<SessionLog>& all, const std::vector<VectorXd>& given, int rounds) {
+  std::vector<VectorXd> whitening = given;
   std::vector<SessionLog> logs;
   for (const SessionLog& log : all) {
     if (log.fits) logs.push_back(log);
   }
+  constexpr int most_halvings = 3;
   Models best = models;
-  double least = 1e300;
-  for (int round = 0; round <= rounds; ++round) {
-    const Linearised at(models, logs, whitening);
-    const double now = misfit(at);
-    if (now > least) {
-      // Too far: a quarter of the step, once.
+  std::unique_ptr<Linearised> around;  // the best so far
+  LinearFit step;
+  double least = 1e300, share = 1;
+  int halvings = 0;
+  for (int round = 0;; ++round) {
+    auto at = std::make_unique<Linearised>(models, logs, whitening);
+    whitening = at->whitening();  // one for all rounds, else their misfits can't be compared
+    const double now = misfit(*at);
+    if (now < least) {
+      const bool converged = least - now < 0.5;
+      best = models;
+      least = now;
+      if (converged || round >= rounds) return;
+      around = std::move(at);
+      std::vector<Index> columns;
+      for (Index c = 0; c < static_cast<Index>(around->unknowns().size()); ++c) columns.push_back(c);
+      step = around->solve(columns);
+      share = 1;
+      halvings = 0;
+    } else {
+      // Too far.
       models = best;
-      return;
+      if (++halvings > most_halvings || round >= rounds + most_halvings) return;
+      share *= 0.3;
     }
-    const bool converged = least - now < 0.5;
-    best = models;
-    least = now;
-    if (converged || round == rounds) return;
-    std::vector<Index> columns;
-    for (Index c = 0; c < static_cast<Index>(at.unknowns().size()); ++c) columns.push_back(c);
-    update(models, at, at.solve(columns), 1);
+    update(models, *around, step, share);
   }
 }
 

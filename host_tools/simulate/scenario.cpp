@@ -64,6 +64,14 @@ void read_effect(Table table, Scenario& scenario) {
   if (fit.effect == "coulomb") {
     if (const auto width = parameters.find("width")) target->sign_width = width->positive();
   }
+  if (info.needs_peers) {
+    const Value other = parameters.need("joint", "the other joint");
+    const double n = static_cast<double>(scenario.plant.robot.size());
+    if (fit.shape[0] != std::floor(fit.shape[0]) || fit.shape[0] > n ||
+        target == &scenario.plant.joints[static_cast<std::size_t>(fit.shape[0]) - 1]) {
+      other.place().fail(fmt::format("expected another joint of 1 .. {}", n));
+    }
+  }
   parameters.finish();
   table.finish();
   (target != nullptr ? target->effects : scenario.plant.body).push_back(fit);
@@ -71,14 +79,22 @@ void read_effect(Table table, Scenario& scenario) {
 
 /// What the plant can't show with this kind of motion.
 void check_plant(const Value& effects, const Scenario& scenario) {
-  if (scenario.plant_kind != Scenario::Plant::mujoco) return;
+  const bool mujoco = scenario.plant_kind == Scenario::Plant::mujoco;
+  const double longest = Delay::largest * plant_step(scenario) * (1 + 1e-9);
   for (const Value& value : effects.items()) {
     Table table(value);
     const auto joint = table.find("joint");
     if (!joint) continue;
     const JointFit& fit = scenario.plant.joints[static_cast<std::size_t>(joint->integer(1)) - 1];
-    const EffectFit* effect = fit.find(table.need("name", "").string());
-    if (const auto why = mujoco_refuses(fit, *effect, scenario.motion == Scenario::Motion::closed_loop))
+    const EffectFit& effect = *fit.find(table.need("name", "").string());
+    if (!mujoco && effect.effect == Delay::name && effect.shape[0] > longest) {
+      value.place().fail(
+          fmt::format("this plant's step of {} s leaves room for a delay of {:.4g} s at most; plant = "
+                      "\"mujoco\" takes any",
+                      plant_step(scenario), longest));
+    }
+    if (!mujoco) continue;
+    if (const auto why = mujoco_refuses(fit, effect, scenario.motion == Scenario::Motion::closed_loop))
       value.place().fail(*why);
   }
 }
@@ -135,7 +151,31 @@ void read_link_encoders(Table& sensors, Scenario& scenario) {
   }
 }
 
+/// The largest delay that the plant has to remember [s].
+double longest_delay(const IdentifiedModel& plant) {
+  double longest = 0;
+  for (const JointFit& joint : plant.joints) {
+    if (const EffectFit* delay = joint.find(Delay::name)) longest = std::max(longest, delay->shape[0]);
+  }
+  return longest;
+}
+
 }  // namespace
+
+double plant_step(const Scenario& scenario) {
+  constexpr double longest_step = 0.0005;  // under a controller
+  constexpr int substeps = 4;              // of a sample: friction states are stepped so
+  double step = scenario.sample_s / substeps;
+  if (scenario.motion == Scenario::Motion::closed_loop) {
+    const double tick = scenario.control.tick_s;
+    return tick / std::max(1.0, std::ceil(tick / std::min(step, longest_step) - 1e-9));
+  }
+  const double remembered = longest_delay(scenario.plant) / (Delay::largest * (1 + 1e-9));
+  // Stamps off the grid are interpolated, which wants a finer one.
+  for (int finer = 0; finer < 2 && scenario.jitter > 0 && step / 2 >= remembered; ++finer) step /= 2;
+  while (step < remembered && step < scenario.sample_s * 0.9) step *= 2;
+  return step;
+}
 
 Scenario read_scenario(const fs::path& file) {
   const toml::table root_table = toml_input::parse(file);

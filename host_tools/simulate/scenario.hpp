@@ -53,4 +53,7 @@ struct Scenario {
 /// @throws InputError with file and line.
 Scenario read_scenario(const std::filesystem::path& file);
 
+/// Of the plant's run [s]: a fraction of the samples' step, under a controller a whole fraction of its tick.
+double plant_step(const Scenario& scenario);
+
 }  // namespace fxdyn

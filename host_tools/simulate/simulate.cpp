@@ -18,36 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A prescribed motion is this much finer than the log is sampled; friction states are stepped so.
-constexpr int substeps = 4;
-/// The plant's step under a controller is at most this [s].
-constexpr double longest_step = 0.0005;
-
-/// The largest delay that the plant has to remember [s].
-double longest_delay(const IdentifiedModel& plant) {
-  double longest = 0;
-  for (const JointFit& joint : plant.joints) {
-    if (const EffectFit* delay = joint.find(Delay::name)) longest = std::max(longest, delay->shape[0]);
-  }
-  return longest;
-}
-
-/// The step of the plant's run. Stamps off the grid are interpolated, which wants a finer one, as long as it can
-/// remember the delays.
-double prescribed_step(const Scenario& scenario) {
-  double step = scenario.sample_s / substeps;
-  for (int finer = 0; finer < 2 && scenario.jitter > 0; ++finer) {
-    if (longest_delay(scenario.plant) <= Delay::largest * step / 2) step /= 2;
-  }
-  return step;
-}
-
-/// Steps of the plant in a tick of the controller.
-int steps_per_tick(const Scenario& scenario) {
-  const double step = std::min(scenario.sample_s / substeps, longest_step);
-  return std::max(1, static_cast<int>(std::ceil(scenario.control.tick_s / step - 1e-9)));
-}
-
 Reference play(const Scenario& scenario, const ScenarioLog& log, double step_s, Eigen::Index samples) {
   const std::size_t n = scenario.bounds.size();
   const auto cols = static_cast<Eigen::Index>(n);
@@ -106,8 +76,8 @@ PlantRun closed_loop(const Scenario& scenario, Reference reference, double age_s
 
 PlantRun run_plant(const Scenario& scenario, const ScenarioLog& log, double length_s) {
   const bool controlled = scenario.motion == Scenario::Motion::closed_loop;
-  const int hold = controlled ? steps_per_tick(scenario) : 1;
-  const double step_s = controlled ? scenario.control.tick_s / hold : prescribed_step(scenario);
+  const double step_s = plant_step(scenario);
+  const int hold = controlled ? static_cast<int>(std::lround(scenario.control.tick_s / step_s)) : 1;
   const auto samples = static_cast<Eigen::Index>(std::ceil(length_s / step_s - 1e-9));
   Reference motion = play(scenario, log, step_s, samples);
   const bool mujoco = scenario.plant_kind == Scenario::Plant::mujoco;

@@ -85,10 +85,12 @@ TEST(ClosedLoop, AppliedTorqueIsThatOfTheModelOnItsMotion) {
 
 TEST(ClosedLoop, RigidBodyMovesAsMuJoCos) {
   // Open loop but for a weak controller: errors of the dynamics add up.
-  for (const unsigned seed : {1U, 2U, 3U}) {
-    test::Chains chains(seed);
-    const IdentifiedModel plant =
-        seed == 1 ? without_effects(test::puma_with_friction()) : test::plant_of(chains.robot(4));
+  std::vector<IdentifiedModel> plants{without_effects(test::puma_with_friction())};
+  for (unsigned seed = 1; plants.size() < 4; ++seed) {
+    const Robot robot = test::Chains(seed).robot(4);
+    if (test::slides(robot)) plants.push_back(test::plant_of(robot));
+  }
+  for (const IdentifiedModel& plant : plants) {
     Reference reference = test::motion_of(plant.robot, 0.0005, 3);
     reference.feedforward = 0.7 * predict(plant, reference.q, reference.dq, reference.ddq, reference.step_s);
     ClosedLoopSettings settings;
@@ -97,7 +99,7 @@ TEST(ClosedLoop, RigidBodyMovesAsMuJoCos) {
     const MatrixXd theirs = closed_loop_on_mujoco(plant, reference, settings).q;
     EXPECT_GT(test::rms(ours - reference.q), 0.02) << "the controller holds the robot, so nothing is compared";
     // theirs is of first order in its step of 0.125 ms
-    EXPECT_LT(test::rms(ours - theirs), 0.001 * test::rms(ours - reference.q)) << "seed " << seed;
+    EXPECT_LT(test::rms(ours - theirs), 0.001 * test::rms(ours - reference.q));
   }
 }
 

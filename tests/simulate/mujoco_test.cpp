@@ -14,16 +14,11 @@ MatrixXd model_torque(const IdentifiedModel& plant, const Reference& motion, dou
   return predict(plant, motion.q, motion.dq, motion.ddq, motion.step_s, nullptr, age_s);
 }
 
-bool slides(const Robot& robot) {
-  return std::any_of(robot.joints.begin(), robot.joints.end(),
-                     [](const Joint& joint) { return joint.type == JointType::prismatic; });
-}
-
 TEST(Mujoco, RigidBodyIsTheModels) {
   std::vector<Robot> robots{read_urdf(test::puma560)};
   for (unsigned seed = 1; robots.size() < 4; ++seed) {
     Robot robot = test::Chains(seed).robot(5);
-    if (slides(robot)) robots.push_back(robot);
+    if (test::slides(robot)) robots.push_back(robot);
   }
   for (const Robot& robot : robots) {
     IdentifiedModel plant = test::plant_of(robot);
@@ -54,7 +49,7 @@ TEST_P(HiddenEffect, ChangesTheTorqueAsTheCatalogueSays) {
   IdentifiedModel plant = healthy;
   const bool on_body = find_effect(effects[0].effect)->acts_on == ActsOn::body;
   for (const EffectFit& effect : effects) (on_body ? plant.body : plant.joints[j].effects).push_back(effect);
-  const Reference motion = test::motion_of(plant.robot, 0.0005, 10);
+  const Reference motion = test::motion_of(plant.robot, 0.0005, 5);
   const double age_s = 7;
   const MatrixXd expected = model_torque(plant, motion, age_s) - model_torque(healthy, motion, age_s);
   const MatrixXd found =

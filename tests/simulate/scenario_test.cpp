@@ -152,6 +152,13 @@ TEST(Scenario, AmplitudeScalesTheMotionAboutItsCentre) {
   EXPECT_LT((part.ddq - 0.05 * whole.ddq).cwiseAbs().maxCoeff(), 1e-12);
 }
 
+TEST(Scenario, LongDelaysMakeThePlantsStepCoarser) {
+  const std::string text = test::puma_scenario("", "exact_motion = true") + log_text;
+  const Played late = play("late", text + test::effect_text(2, "delay", "time = 0.02, share = 1"));
+  const Played now = play("now", text);
+  EXPECT_LT((late.truth.tau.bottomRows(1990).col(1) - now.truth.tau.topRows(1990).col(1)).cwiseAbs().maxCoeff(), 1e-9);
+}
+
 class BadScenario : public testing::TestWithParam<test::Bad> {};
 
 TEST_P(BadScenario, IsRefusedWithItsLine) {
@@ -184,6 +191,15 @@ INSTANTIATE_TEST_SUITE_P(
                   scenario("plant = \"mujoco\"", "",
                            test::effect_text(1, "elasticity", "compliance = 1e-4, relaxation = 0.004")),
                   {":9:", "rotor_inertia"}},
+        test::Bad{"delay",
+                  scenario("motion = \"closed_loop\"", "", test::effect_text(1, "delay", "time = 0.01, share = 1")),
+                  {":9:", "0.0075 s at most"}},
+        test::Bad{"peer",
+                  scenario("", "", test::effect_text(1, "joint_coupling", "joint = 7, coulomb = 1, viscous = 1")),
+                  {":12:", "another joint of 1 .. 6"}},
+        test::Bad{"self",
+                  scenario("", "", test::effect_text(2, "joint_coupling", "joint = 2, coulomb = 1, viscous = 1")),
+                  {":12:", "another joint of 1 .. 6"}},
         test::Bad{"backlash",
                   scenario("plant = \"mujoco\"\nmotion = \"closed_loop\"", "",
                            test::effect_text(1, "rotor_inertia", "inertia = 1") +

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <string>
 
 #include "host_tools/excite/fourier.hpp"
@@ -20,6 +21,11 @@ inline IdentifiedModel plant_of(const Robot& robot) {
   for (std::size_t j = 0; j < robot.size(); ++j)
     plant.inertia.push_back(to_link_inertia(*robot.joints[j].inertial, chain.urdf_in_dh[j]));
   return plant;
+}
+
+inline bool slides(const Robot& robot) {
+  return std::any_of(robot.joints.begin(), robot.joints.end(),
+                     [](const Joint& joint) { return joint.type == JointType::prismatic; });
 }
 
 inline EffectFit effect(std::string name, std::vector<double> shape, std::vector<double> linear) {
