@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 
 #include "host_tools/diagnose/diagnose.hpp"
+#include "host_tools/diagnose/evidence.hpp"
+#include "host_tools/diagnose/plots.hpp"
 #include "host_tools/error.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/export/proof.hpp"
@@ -190,10 +192,18 @@ void Pipeline::diagnose() {
   IdentifiedModel model = diagnosis.model;
   model.stage = "diagnosed";
   model.notes = data().notes;
-  progress_.stage("errors on all logs", 2);
+  progress_.stage("errors on all logs, fixed point, closed loop, plots", 4);
   json stages = json::array({stage_metrics(diagnosis.nominal, "friction")});
   progress_.step();
   stages.push_back(stage_metrics(model, "diagnosed"));
+  progress_.step();
+  // Nothing was fitted on these.
+  std::vector<ProcessedLog> held_out = logs(Role::test);
+  if (held_out.empty()) held_out = logs(Role::validate);
+  json report = diagnosis.report;
+  report["evidence"] = evidence_json(diagnosis.nominal, model, held_out);
+  progress_.step();
+  write_diagnosis_plots(diagnosis.nominal, model, held_out, report, directory_);
   progress_.step();
   progress_.done();
   const json metrics = {{"schema", "fxdyn.metrics/1"},          {"gate", diagnosis.report.at("gate")},
@@ -202,7 +212,7 @@ void Pipeline::diagnose() {
   write_file(directory_ / "nominal.json", to_json(diagnosis.nominal).dump(1) + "\n");
   write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
   write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
-  write_file(directory_ / "diagnosis.json", diagnosis.report.dump(1) + "\n");
+  write_file(directory_ / "diagnosis.json", report.dump(1) + "\n");
 }
 
 void Pipeline::train() {

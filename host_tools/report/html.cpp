@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
+#include "host_tools/diagnose/section.hpp"
 #include "host_tools/files.hpp"
 #include "host_tools/model/evaluator.hpp"
+#include "host_tools/report/page.hpp"
 #include "host_tools/report/plot.hpp"
 #include "host_tools/report/report.hpp"
 #include "host_tools/report/results.hpp"
@@ -9,6 +11,7 @@
 namespace fxdyn {
 namespace {
 
+using namespace page;
 using nlohmann::json;
 namespace fs = std::filesystem;
 
@@ -23,35 +26,6 @@ td.bad { background: #fde5e0; } td.good { background: #e6f4e6; } .split { column
 .split tr { break-inside: avoid; } svg { width: 100%; height: auto; } .scroll { overflow-x: auto; }
 )";
 
-std::string escape(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
-
-struct Cell {
-  std::string text;
-  const char* kind = "";  ///< CSS classes: n (number), bad, good
-};
-Cell number(double value, int digits = 4) { return {fmt::format("{:.{}g}", value, digits), "n"}; }
-Cell percent(double share) { return {fmt::format("{:.2f} %", 100 * share), "n"}; }
 /// Standard deviation over value: small ones with two digits, large ones without decimals or exponents.
 std::string uncertainty(double share) {
   return share > 10    ? "> 1000 %"
@@ -59,26 +33,7 @@ std::string uncertainty(double share) {
                        : fmt::format("{:.0f} %", 100 * share);
 }
 
-class Table {
- public:
-  explicit Table(const std::vector<Cell>& header) { row("th", header); }
-  void add(const std::vector<Cell>& cells) { row("td", cells); }
-  std::string html() const { return "<div class=\"scroll\">" + bare_html() + "</div>\n"; }
-  std::string bare_html() const { return "<table>\n" + rows_ + "</table>"; }
-
- private:
-  void row(const char* tag, const std::vector<Cell>& cells) {
-    rows_ += "<tr>";
-    for (const Cell& cell : cells)
-      rows_ += fmt::format("<{0} class=\"{1}\">{2}</{0}>", tag, cell.kind, escape(cell.text));
-    rows_ += "</tr>\n";
-  }
-  std::string rows_;
-};
-
 std::string text(const json& value) { return value.get<std::string>(); }
-std::string paragraph(const std::string& words) { return "<p>" + escape(words) + "</p>\n"; }
-std::string section(const std::string& title) { return "<h2>" + escape(title) + "</h2>\n"; }
 
 std::string header(const json& model, const json& metrics) {
   const json& robot = model.at("robot");
@@ -397,6 +352,7 @@ void write_report(const IdentifiedModel& fitted, const std::vector<ProcessedLog>
   page += header(model, results.metrics);
   page += data_section(model, results.metrics, results.role);
   page += error_section(model, results);
+  if (!results.diagnosis.is_null()) page += diagnosis_section(results.diagnosis, directory);
   page += bls_section(model, results.metrics);
   page += effects_section(model);
   page += base_section(model);

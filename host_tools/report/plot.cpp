@@ -89,6 +89,25 @@ std::string curve(const Eigen::VectorXd& t, const Eigen::VectorXd& y, Eigen::Ind
   return text + "\n\n";
 }
 
+/// Every n-th point of a curve that may go back and forth; NaN breaks it.
+std::string path(const Eigen::VectorXd& x, const Eigen::VectorXd& y, Eigen::Index points) {
+  std::string text;
+  const Eigen::Index stride = std::max<Eigen::Index>(1, (y.size() + points - 1) / points);
+  for (Eigen::Index k = 0; k < y.size(); ++k) {
+    if (std::isnan(y[k]))
+      text += "\n";
+    else if (k % stride == 0)
+      text += fmt::format("{:.4g} {:.4g}\n", x[k], y[k]);
+  }
+  return text + "\n\n";
+}
+
+/// As it can stand in gnuplot's quotes.
+std::string quoted(std::string words) {
+  std::replace(words.begin(), words.end(), '\'', ' ');
+  return words;
+}
+
 constexpr const char* settings =
     R"(set terminal svg size 1000,420 dynamic noenhanced font 'sans-serif,13' background '#ffffff'
 set encoding utf8
@@ -202,16 +221,44 @@ std::string draw(const std::vector<Panel>& panels, const std::vector<std::string
     std::string data, lines;
     for (Eigen::Index c = 0; c < panel.columns.cols(); ++c) {
       const auto i = static_cast<std::size_t>(c);
-      std::string name = names[i];
-      std::replace(name.begin(), name.end(), '\'', ' ');  // it stands in quotes
       data += curve(panel.t, panel.columns.col(c), panel_points);
       lines += fmt::format("{}'{}.dat' index {} with lines lw 1.4 lc rgb '{}' title '{}'", c > 0 ? ", " : "", p, c,
-                           colours[i % colours.size()], name);
+                           colours[i % colours.size()], quoted(names[i]));
     }
     write_file(directory.path() / fmt::format("{}.dat", p), data);
     script += fmt::format("set xrange [{:.6g}:{:.6g}]\nset ylabel '{}'\nset xlabel '{}'\nplot {}\n", panel.t[0],
                           panel.t[panel.t.size() - 1], panel.label, p + 1 == panels.size() ? "time [s]" : "", lines);
     script += "unset key\n";  // one is enough
+  }
+  write_file(directory.path() / "script.gp", script + "unset multiplot\nunset output\n");
+  run_gnuplot(directory.path());
+  return element(read_file(directory.path() / "0.svg"));
+}
+
+std::string draw(const std::vector<Chart>& charts, int columns) {
+  constexpr int row_height = 300;
+  constexpr Eigen::Index chart_points = 1500;
+  const int rows = (static_cast<int>(charts.size()) + columns - 1) / columns;
+  const TemporaryDirectory directory;
+  std::string script = settings;
+  script += fmt::format(
+      "set terminal svg size 1000,{} dynamic noenhanced font 'sans-serif,12' background '#ffffff'\nset tmargin 2\nset "
+      "output '0.svg'\nset multiplot layout {},{}\n",
+      row_height * rows, rows, columns);
+  for (std::size_t c = 0; c < charts.size(); ++c) {
+    const Chart& chart = charts[c];
+    std::string lines;
+    for (std::size_t i = 0; i < chart.curves.size(); ++i) {
+      const Curve& one = chart.curves[i];
+      const std::string file = fmt::format("{}_{}.dat", c, i);
+      write_file(directory.path() / file,
+                 one.path ? path(one.x, one.y, chart_points) : curve(one.x, one.y, chart_points));
+      lines += fmt::format("{}'{}' with lines lw {} lc rgb '{}' {}", i > 0 ? ", " : "", file, one.width, one.colour,
+                           one.title.empty() ? "notitle" : "title '" + quoted(one.title) + "'");
+    }
+    script += fmt::format("{} logscale y\nset format y '{}'\nset xlabel '{}'\nset ylabel '{}'\nplot {}\n",
+                          chart.logarithmic ? "set" : "unset", chart.logarithmic ? "%.0e" : "%g", quoted(chart.x_label),
+                          quoted(chart.y_label), lines);
   }
   write_file(directory.path() / "script.gp", script + "unset multiplot\nunset output\n");
   run_gnuplot(directory.path());

@@ -28,4 +28,24 @@ struct Panel {
 /// @throws InputError where gnuplot is missing or fails.
 std::string draw(const std::vector<Panel>& panels, const std::vector<std::string>& names);
 
+/// One curve of a chart. Of curves over a growing abscissa the extremes of what is left out are kept; a `path` may go
+/// back and forth; every n-th point of it is drawn, and NaN in y breaks the line.
+struct Curve {
+  Eigen::VectorXd x, y;
+  std::string colour;  ///< #RRGGBB, or #AARRGGBB with AA = 00 for solid .. ff for nothing
+  double width = 1.2;
+  std::string title = {};  ///< empty: not in the key
+  bool path = false;
+};
+
+struct Chart {
+  std::string x_label, y_label;  ///< with unit
+  std::vector<Curve> curves;
+  bool logarithmic = false;  ///< y
+};
+
+/// Charts side by side, `columns` in a row, as an <svg> element.
+/// @throws InputError where gnuplot is missing or fails.
+std::string draw(const std::vector<Chart>& charts, int columns);
+
 }  // namespace fxdyn

@@ -24,6 +24,15 @@ json read_of_tables(const fs::path& file, const json& model) {
   return same ? content : json();
 }
 
+/// diagnosis.json, if nominal.json, from which it started, is of the model's project and logs.
+json read_diagnosis(const fs::path& directory, const json& model) {
+  const json nominal = read_json(directory / "nominal.json");
+  for (const char* key : {"project_hash", "logs"}) {
+    if (nominal.contains(key) && model.contains(key) && nominal.at(key) != model.at(key)) return {};
+  }
+  return read_json(directory / "diagnosis.json");
+}
+
 std::string shown_role(const json& logs) {
   for (const char* role : {"test", "validate"}) {
     for (const json& log : logs) {
@@ -50,6 +59,7 @@ Results read_results(const fs::path& directory) {
   const json model = read_json(directory / "model.json");
   results.exported = read_of_tables(directory / "export.json", model);
   results.replayed = read_of_tables(directory / "replay.json", model);
+  results.diagnosis = read_diagnosis(directory, model);
   if (!results.metrics.is_null()) results.role = shown_role(results.metrics.at("logs"));
   return results;
 }

@@ -7,9 +7,9 @@
 namespace fxdyn {
 
 /// What the stages left in DIR, as far as it belongs together: an export or a replay of other tables
-/// than the model's (CRC) counts as missing (null).
+/// than the model's (CRC) counts as missing (null), and so does a diagnosis of other logs or another project.
 struct Results {
-  nlohmann::json metrics, exported, replayed;
+  nlohmann::json metrics, exported, replayed, diagnosis;
   std::string role;  ///< of the logs that a reader wants to see: test, else validate, else train
 };
 Results read_results(const std::filesystem::path& directory);

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "host_tools/diagnose/terminal.hpp"
 #include "host_tools/report/report.hpp"
 #include "host_tools/report/results.hpp"
 
@@ -36,8 +37,9 @@ std::string replay_line(const json& replayed) {
 }  // namespace
 
 std::string summary_table(const fs::path& directory) {
-  const auto [metrics, exported, replayed, role] = read_results(directory);
-  if (metrics.is_null()) return "";
+  const auto [metrics, exported, replayed, diagnosis, role] = read_results(directory);
+  const std::string diagnosed = diagnosis.is_null() ? "" : diagnosis_table(diagnosis);
+  if (metrics.is_null()) return diagnosed;
   const json& stages = metrics.at("stages");
   const json& joints = metrics.at("logs").at(0).at("joints");
   std::size_t width = 8;
@@ -62,6 +64,7 @@ std::string summary_table(const fs::path& directory) {
     }
     out += "\n";
   }
+  out += diagnosed;
   if (!replayed.is_null()) out += replay_line(replayed);
   if (const fs::path report = directory / "report.html"; fs::exists(report)) {
     out += fmt::format("report: {}\n", fs::absolute(report).lexically_normal().string());

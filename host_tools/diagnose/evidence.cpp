@@ -1,0 +1,108 @@
+#include "host_tools/diagnose/evidence.hpp"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "host_tools/diagnose/forward.hpp"
+#include "host_tools/error.hpp"
+#include "host_tools/export/export.hpp"
+#include "host_tools/report/metrics.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+using nlohmann::json;
+
+/// Sums of squares over the logs, one a joint.
+struct Pooled {
+  VectorXd squares;
+  Index logs = 0;
+  void add(const std::vector<JointMetrics>& metrics, double JointMetrics::*of) {
+    if (squares.size() == 0) squares.setZero(static_cast<Index>(metrics.size()));
+    for (std::size_t j = 0; j < metrics.size(); ++j) squares[static_cast<Index>(j)] += metrics[j].*of * metrics[j].*of;
+    ++logs;
+  }
+  /// null where a log is missing or a figure is not finite.
+  json rms(std::size_t joint, std::size_t of_logs) const {
+    if (logs == 0 || static_cast<std::size_t>(logs) != of_logs) return nullptr;
+    const double value = std::sqrt(squares[static_cast<Index>(joint)] / static_cast<double>(logs));
+    return std::isfinite(value) ? json(value) : json(nullptr);
+  }
+};
+
+/// Torque over logs as the fixed-point firmware computes it: at the drive's ticks, back to the log's samples, with the
+/// log's known load and at the times at which its torque column shows it, samples x joints [N*m | N].
+class Firmware {
+ public:
+  explicit Firmware(const IdentifiedModel& model) : model_(model) {}
+  /// @throws DataError where no formats can be chosen for the model.
+  Eigen::MatrixXd operator()(const ProcessedLog& log) {
+    const IdentifiedModel model = with_load_of(log, model_);
+    if (!log.load && !unloaded_) unloaded_ = choose_formats(model);
+    const Formats formats = log.load ? choose_formats(model) : *unloaded_;
+    const TickStates ticks = at_ticks(log, model.tick_s, true);
+    return at_other_times(interpolate(predict_fixed(model, formats, ticks), ticks.t, log.t),
+                          model.filter.torque_lead_s / log.step_s);
+  }
+
+ private:
+  const IdentifiedModel& model_;
+  std::optional<Formats> unloaded_;
+};
+
+json log_json(const ProcessedLog& log) {
+  return {{"file", log.name}, {"role", to_string(log.role)}, {"from_s", log.from_s}, {"to_s", log.to_s}};
+}
+
+}  // namespace
+
+json evidence_json(const IdentifiedModel& nominal, const IdentifiedModel& diagnosed,
+                   const std::vector<ProcessedLog>& held_out) {
+  json logs = json::array(), joints = json::array();
+  Pooled before, after, fixed, noise;
+  Firmware firmware(diagnosed);
+  std::vector<const ProcessedLog*> judged;
+  std::optional<std::string> why_not_fixed;
+  for (const ProcessedLog& log : held_out) {
+    if (log.tau.size() == 0) continue;
+    judged.push_back(&log);
+    logs.push_back(log_json(log));
+    before.add(judge(log, predict(nominal, log)), &JointMetrics::rmse);
+    const auto with_effects = judge(log, predict(diagnosed, log));
+    after.add(with_effects, &JointMetrics::rmse);
+    noise.add(with_effects, &JointMetrics::noise_floor);
+    if (why_not_fixed) continue;
+    // A model that fixed point can't hold is still a diagnosis.
+    try {
+      fixed.add(judge(log, firmware(log)), &JointMetrics::rmse);
+    } catch (const DataError& error) {
+      why_not_fixed = error.what();
+    } catch (const InputError& error) {
+      why_not_fixed = error.what();
+    }
+  }
+  for (std::size_t j = 0; j < diagnosed.robot.size() && !judged.empty(); ++j) {
+    joints.push_back({{"joint", diagnosed.robot.joints[j].name},
+                      {"index", j + 1},
+                      {"unit", diagnosed.robot.joints[j].torque_unit()},
+                      {"rms_before", before.rms(j, judged.size())},
+                      {"rms_after", after.rms(j, judged.size())},
+                      {"rms_after_fixed", fixed.rms(j, judged.size())},
+                      {"noise_floor", noise.rms(j, judged.size())}});
+  }
+  json out = {{"held_out", logs}, {"joints", joints}, {"fixed_point", {{"computed", !why_not_fixed}}}};
+  if (why_not_fixed) out["fixed_point"]["why_not"] = *why_not_fixed;
+  if (judged.empty()) {
+    out["note"] = "no log was held out: nothing that the search has not seen";
+    out["fixed_point"] = {{"computed", false}, {"why_not", "no log was held out"}};
+    out["forward"] = nullptr;
+  } else {
+    out["forward"] = forward_json(nominal, diagnosed, judged);
+  }
+  return out;
+}
+
+}  // namespace fxdyn

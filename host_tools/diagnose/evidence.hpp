@@ -1,0 +1,23 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <vector>
+
+#include "host_tools/identify/dataset.hpp"
+
+namespace fxdyn {
+
+/// What a diagnosis is worth on logs that its search never saw: the key "evidence" of diagnosis.json.
+///
+/// joints: RMS of measured minus model torque with the model before and after, both torques filtered alike at the
+/// torque cut-off, edges dropped (judge()), logs pooled like pooled_error(): the root of the mean of their squares. The
+/// same after, with the torque that the fixed-point firmware would compute. null where it can't be told; "fixed_point"
+/// then says why.
+///
+/// forward: see forward_json().
+///
+/// Torque-less logs are left out. Without any log the lists are empty and "note" says so.
+nlohmann::json evidence_json(const IdentifiedModel& nominal, const IdentifiedModel& diagnosed,
+                             const std::vector<ProcessedLog>& held_out);
+
+}  // namespace fxdyn

@@ -1,0 +1,120 @@
+#include "host_tools/diagnose/forward.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "host_tools/error.hpp"
+#include "host_tools/model/effects.hpp"
+#include "host_tools/parallel.hpp"
+#include "host_tools/simulate/closed_loop.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using nlohmann::json;
+
+constexpr double longest_s = 20;
+/// The plant's friction states start at rest and its motion starts beside the recorded one.
+constexpr double settling_s = 1;
+
+/// Without the effects that run_closed_loop() leaves out.
+IdentifiedModel moving(IdentifiedModel model) {
+  for (JointFit& joint : model.joints) {
+    std::erase_if(joint.effects, [](const EffectFit& fit) {
+      const EffectInfo* info = find_effect(fit.effect);
+      return info != nullptr && (info->needs_total || info->acts_on == ActsOn::position);
+    });
+  }
+  return model;
+}
+
+std::size_t effects_of(const IdentifiedModel& model) {
+  std::size_t count = 0;
+  for (const JointFit& joint : model.joints) count += joint.effects.size();
+  return count;
+}
+
+/// The log's torque as far as it moves the plant, filtered, at the times of the motion.
+MatrixXd recorded_torque(const IdentifiedModel& model, const ProcessedLog& log) {
+  MatrixXd torque = log.tau;
+  const IdentifiedModel plant = moving(model);
+  if (effects_of(plant) != effects_of(model)) torque -= predict(model, log) - predict(plant, log);
+  // The torque column shows the torque of the motion torque_lead_s later.
+  const double lead = model.filter.torque_lead_s / log.step_s;
+  return log.filter_columns(lead == 0 ? torque : at_other_times(torque, -lead));
+}
+
+/// RMS per joint.
+struct Differences {
+  VectorXd tracking;  ///< of the position [rad | m]
+  VectorXd torque;    ///< that the PD added [N*m | N]
+};
+
+Differences play(const IdentifiedModel& model, const ProcessedLog& log, Index count) {
+  const MotionRows motion = log.motion(log.first, count);
+  const MatrixXd feedforward = recorded_torque(model, log).middleRows(log.first, count);
+  ClosedLoopSettings settings;
+  settings.age_s = static_cast<double>(log.first) * log.step_s;  // as in predict(): new when the log begins
+  const ClosedLoopRun run =
+      run_closed_loop(with_load_of(log, model), {log.step_s, motion.q, motion.dq, motion.ddq, feedforward}, settings);
+  if (!run.q.allFinite() || !run.tau.allFinite()) throw DataError("the simulated motion grows without bound");
+  const auto settled = std::min<Index>(count / 4, static_cast<Index>(settling_s / log.step_s));
+  const Index judged = count - settled;
+  const auto rms = [&](const MatrixXd& error) -> VectorXd {
+    return error.bottomRows(judged).colwise().norm().transpose() / std::sqrt(static_cast<double>(judged));
+  };
+  return {rms(run.q - motion.q), rms(log.filter_columns(run.tau - feedforward))};
+}
+
+json at(const VectorXd& values, Index j) { return values.size() > 0 ? json(values[j]) : json(nullptr); }
+
+}  // namespace
+
+json forward_json(const IdentifiedModel& nominal, const IdentifiedModel& diagnosed,
+                  const std::vector<const ProcessedLog*>& logs) {
+  const auto length = [](const ProcessedLog* log) { return static_cast<double>(log->last - log->first) * log->step_s; };
+  const ProcessedLog& log =
+      **std::max_element(logs.begin(), logs.end(), [&](auto* a, auto* b) { return length(a) < length(b); });
+  const Index count = std::min(log.last - log.first, static_cast<Index>(std::floor(longest_s / log.step_s + 1e-9)));
+  const std::array<const IdentifiedModel*, 2> models{&nominal, &diagnosed};
+  std::array<Differences, 2> runs;
+  std::array<std::string, 2> why;
+  parallel_for(2, [&](std::size_t i) {
+    // Not every model is a plant: one that no body of matter has can't be moved forward.
+    try {
+      runs[i] = play(*models[i], log, count);
+    } catch (const DataError& error) {
+      why[i] = error.what();
+    } catch (const InputError& error) {
+      why[i] = error.what();
+    }
+  });
+  const auto& [before, after] = runs;
+  json joints = json::array();
+  for (std::size_t j = 0; j < diagnosed.robot.size(); ++j) {
+    const Joint& joint = diagnosed.robot.joints[j];
+    const auto k = static_cast<Index>(j);
+    joints.push_back({{"joint", joint.name},
+                      {"index", j + 1},
+                      {"tracking_before", at(before.tracking, k)},
+                      {"tracking_after", at(after.tracking, k)},
+                      {"tracking_unit", joint.position_unit()},
+                      {"torque_before", at(before.torque, k)},
+                      {"torque_after", at(after.torque, k)},
+                      {"torque_unit", joint.torque_unit()}});
+  }
+  json out = {{"log", log.name},
+              {"from_s", log.t[log.first]},
+              {"seconds", static_cast<double>(count) * log.step_s},
+              {"joints", joints}};
+  if (!why[0].empty()) out["failed"]["before"] = why[0];
+  if (!why[1].empty()) out["failed"]["after"] = why[1];
+  return out;
+}
+
+}  // namespace fxdyn

@@ -1,0 +1,185 @@
+#include "host_tools/diagnose/plots.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+#include "host_tools/files.hpp"
+#include "host_tools/log/spectrum.hpp"
+#include "host_tools/report/plot.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+// Before in blue, after in orange; the cloud of the samples is mostly transparent behind their means.
+constexpr const char* before_colour = "#2e6fb7";
+constexpr const char* after_colour = "#e4572e";
+constexpr const char* before_cloud = "#b82e6fb7";
+constexpr const char* after_cloud = "#b8e4572e";
+constexpr const char* floor_colour = "#888888";
+
+/// One log without its edges, samples x joints.
+struct Residuals {
+  const ProcessedLog* log;
+  VectorXd t;
+  MatrixXd q, dq, before, after;
+};
+
+Residuals residuals(const ProcessedLog& log, const IdentifiedModel& nominal, const IdentifiedModel& diagnosed) {
+  const Index count = log.last - log.first;
+  const auto inside = [&](const MatrixXd& m) { return MatrixXd(m.middleRows(log.first, count)); };
+  const MotionRows motion = log.motion(log.first, count);
+  const auto left = [&](const IdentifiedModel& model) {
+    return inside(log.filter_columns(log.tau - predict(model, log)));
+  };
+  return {&log, log.t.segment(log.first, count), motion.q, motion.dq, left(nominal), left(diagnosed)};
+}
+
+/// One column of all logs, NaN between them.
+VectorXd joined(const std::vector<Residuals>& logs, MatrixXd Residuals::*of, Index joint) {
+  Index rows = 0;
+  for (const Residuals& one : logs) rows += one.t.size() + 1;
+  VectorXd out = VectorXd::Constant(rows, std::numeric_limits<double>::quiet_NaN());
+  Index row = 0;
+  for (const Residuals& one : logs) {
+    out.segment(row, one.t.size()) = (one.*of).col(joint);
+    row += one.t.size() + 1;
+  }
+  return out;
+}
+
+struct Means {
+  VectorXd x, y;
+};
+/// Means of y over classes of x with equally many samples.
+Means means(const VectorXd& x, const VectorXd& y) {
+  constexpr Index classes = 80;
+  std::vector<Index> order;
+  for (Index k = 0; k < x.size(); ++k) {
+    if (!std::isnan(x[k])) order.push_back(k);
+  }
+  std::sort(order.begin(), order.end(), [&](Index a, Index b) { return x[a] < x[b]; });
+  const auto count = static_cast<Index>(order.size()), bins = std::min(classes, count);
+  Means out{VectorXd::Zero(bins), VectorXd::Zero(bins)};
+  for (Index b = 0; b < bins; ++b) {
+    const Index from = b * count / bins, to = (b + 1) * count / bins;
+    for (Index k = from; k < to; ++k) {
+      out.x[b] += x[order[static_cast<std::size_t>(k)]] / static_cast<double>(to - from);
+      out.y[b] += y[order[static_cast<std::size_t>(k)]] / static_cast<double>(to - from);
+    }
+  }
+  return out;
+}
+
+Chart against(const std::vector<Residuals>& logs, MatrixXd Residuals::*of, Index joint, const std::string& x_label,
+              const std::string& y_label) {
+  const VectorXd x = joined(logs, of, joint);
+  const VectorXd before = joined(logs, &Residuals::before, joint), after = joined(logs, &Residuals::after, joint);
+  const Means mean_before = means(x, before), mean_after = means(x, after);
+  return {x_label,
+          y_label,
+          {{x, before, before_cloud, 0.6, {}, true},
+           {x, after, after_cloud, 0.6, {}, true},
+           {mean_before.x, mean_before.y, before_colour, 2.2, "mean before"},
+           {mean_after.x, mean_after.y, after_colour, 2.2, "mean after"}}};
+}
+
+/// Root of the power spectral density of the residuals up to 1.5 times the cut-off, and the noise floor as white noise
+/// below it: noise^2 = density * cut-off.
+Chart spectra(const Residuals& log, Index joint, const std::string& unit) {
+  const double step = log.log->step_s, cutoff = log.log->filter.torque_cutoff_hz;
+  const auto curve_of = [&](const VectorXd& residual, const char* colour, const char* title) {
+    const Spectrum spectrum = welch(residual, step);
+    const Index bins =
+        std::min(spectrum.density.size() - 1, static_cast<Index>(1.5 * cutoff / spectrum.resolution_hz) + 1);
+    Curve out{VectorXd(bins), VectorXd(bins), colour, 1.4, title};
+    for (Index k = 0; k < bins; ++k) {
+      out.x[k] = spectrum.frequency(k + 1);
+      out.y[k] = std::sqrt(std::max(spectrum.density[k + 1], 1e-30));
+    }
+    return out;
+  };
+  Chart chart{
+      fmt::format("frequency [Hz] in {}", log.log->name),
+      fmt::format("residual [{}/Hz^0.5]", unit),
+      {curve_of(log.before.col(joint), before_colour, "before"), curve_of(log.after.col(joint), after_colour, "after")},
+      true};
+  const double noise = log.log->torque_noise[joint];
+  if (noise > 0 && cutoff > 0) {
+    const double level = noise / std::sqrt(std::min(cutoff, 0.5 / step));
+    chart.curves.push_back({Eigen::Vector2d(0, cutoff), Eigen::Vector2d(level, level), floor_colour, 1.4, "noise"});
+  }
+  return chart;
+}
+
+/// On which joints there is something to see.
+std::vector<std::size_t> shown_joints(const json& diagnosis, std::size_t joints) {
+  std::vector<bool> shown(joints, false);
+  const auto mark = [&](const json& index) {
+    if (index.is_number_integer() && index >= 1 && index <= joints) shown[index.get<std::size_t>() - 1] = true;
+  };
+  const json entries = diagnosis.value("joints", json::array());
+  for (std::size_t j = 0; j < entries.size(); ++j) {
+    const std::string verdict = entries[j].value("verdict", "");
+    if (verdict == "effects_found" || verdict == "unexplained") mark(entries[j].value("index", json(j + 1)));
+  }
+  for (const json& effect : diagnosis.value("robot_effects", json::array())) {
+    for (const json& index : effect.value("joints", json::array())) mark(index);
+  }
+  std::vector<std::size_t> out;
+  for (std::size_t j = 0; j < joints; ++j) {
+    if (shown[j]) out.push_back(j);
+  }
+  return out;
+}
+
+}  // namespace
+
+fs::path diagnosis_plot(const fs::path& directory, std::size_t joint) {
+  return directory / "plots" / fmt::format("diagnosis_joint_{}.svg", joint + 1);
+}
+
+std::vector<fs::path> write_diagnosis_plots(const IdentifiedModel& nominal, const IdentifiedModel& diagnosed,
+                                            const std::vector<ProcessedLog>& held_out, const json& diagnosis,
+                                            const fs::path& directory) {
+  for (std::size_t j = 0; j < diagnosed.robot.size(); ++j) fs::remove(diagnosis_plot(directory, j));
+  std::vector<Residuals> logs;
+  for (const ProcessedLog& log : held_out) {
+    if (log.tau.size() > 0) logs.push_back(residuals(log, nominal, diagnosed));
+  }
+  std::vector<fs::path> files;
+  if (logs.empty()) return files;
+  for (const std::size_t j : shown_joints(diagnosis, diagnosed.robot.size())) {
+    const Joint& joint = diagnosed.robot.joints[j];
+    const auto k = static_cast<Index>(j);
+    const auto gain = [&](const Residuals& log) {
+      return log.log->step_s * (log.before.col(k).squaredNorm() - log.after.col(k).squaredNorm());
+    };
+    const Residuals& telling =
+        *std::max_element(logs.begin(), logs.end(), [&](auto& a, auto& b) { return gain(a) < gain(b); });
+    const std::string left = fmt::format("residual [{}]", joint.torque_unit());
+    const std::vector<Chart> charts{
+        {fmt::format("time [s] in {}", telling.log->name),
+         left,
+         {{telling.t, telling.before.col(k), before_colour, 1, "before"},
+          {telling.t, telling.after.col(k), after_colour, 1, "after"}}},
+        spectra(telling, k, joint.torque_unit()),
+        against(logs, &Residuals::dq, k, fmt::format("velocity [{}/s]", joint.position_unit()), left),
+        against(logs, &Residuals::q, k, fmt::format("position [{}]", joint.position_unit()), left)};
+    files.push_back(diagnosis_plot(directory, j));
+    write_file(files.back(), draw(charts, 2) + "\n");
+  }
+  return files;
+}
+
+}  // namespace fxdyn

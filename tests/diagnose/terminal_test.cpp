@@ -1,0 +1,86 @@
+#include "host_tools/diagnose/terminal.hpp"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "tests/diagnose/example.hpp"
+
+namespace fxdyn {
+namespace {
+
+using nlohmann::json;
+
+void expect_parts(const std::string& table, const std::vector<std::string>& parts) {
+  for (const std::string& part : parts) EXPECT_NE(table.find(part), std::string::npos) << part << " not in\n" << table;
+}
+
+std::size_t widest(const std::string& text) {
+  std::size_t width = 0;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) width = std::max(width, line.size());
+  return width;
+}
+
+/// Lines joined, runs of blanks as one: wrapped text can be searched.
+std::string flat(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    const char one = c == '\n' ? ' ' : c;
+    if (one != ' ' || out.empty() || out.back() != ' ') out += one;
+  }
+  return out;
+}
+
+TEST(DiagnosisTable, SaysEveryVerdictAndWhatWasFound) {
+  const std::string table = diagnosis_table(test::diagnosis());
+  expect_parts(flat(table), {"diagnosis: unexplained",
+                             "gaps on test logs; change since the baseline",
+                             "elbow: saturation",
+                             "robot: gravity_tilt",
+                             "effects found",
+                             "nothing missing",
+                             "unexplained",
+                             "not excited",
+                             "1.9 -> 0.4",
+                             "0.35",
+                             "83 %",
+                             "amplitude 2.1+-0.05 N*m",
+                             "velocity 0.04+-0.01 rad/s",
+                             "61 % of the gap at velocity -0.05 .. 0.05 rad/s",
+                             "elbow: 70 % of the gap at time 3 .. 4 s; 90 % of the gap at negative velocity",
+                             "could as well be presliding",
+                             "payload: mass 2+-0.1 kg",
+                             "seen on joints 2, 3, 4; closes 80 % of the gap",
+                             "spring",
+                             "next: slow reversals of joint 1 through +-0.02 rad would separate stribeck from"});
+}
+
+TEST(DiagnosisTable, ShowsFixedPointAndClosedLoop) {
+  const std::string table = diagnosis_table(test::diagnosis());
+  expect_parts(flat(table), {"1.88 -> 0.41 0.42 N*m", "0.002 -> 0.0003 rad", "1.5 -> 0.2"});
+}
+
+TEST(DiagnosisTable, IsAtMostAHundredColumnsWideWhateverTheNames) {
+  json diagnosis = test::diagnosis();
+  EXPECT_LE(widest(diagnosis_table(diagnosis)), 100U);
+  diagnosis["joints"][0]["joint"] = std::string(60, 'j');
+  diagnosis["joints"][0]["gap_before"] = -1.2345e-100;
+  diagnosis["joints"][0]["effects"][0]["effect"] = std::string(150, 'e');
+  diagnosis["joints"][0]["effects"].push_back(diagnosis["joints"][0]["effects"][0]);
+  diagnosis["next_experiment"] = std::string(250, 'n');
+  EXPECT_LE(widest(diagnosis_table(diagnosis)), 100U) << diagnosis_table(diagnosis);
+}
+
+TEST(DiagnosisTable, ManagesWithWhatIsThere) {
+  const std::string table = diagnosis_table(
+      json::parse(R"({"verdict":"nothing_missing","joints":[{"joint":"a","index":1,"verdict":"nothing_missing",
+                     "gap_before":null,"where":null,"effects":[]}],"robot_effects":[],"evidence":{"forward":null}})"));
+  expect_parts(table, {"nothing missing", "- -> -"});
+  EXPECT_EQ(table.find("where"), std::string::npos);
+  EXPECT_EQ(table.find("next"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace fxdyn
