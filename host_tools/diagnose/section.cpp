@@ -69,7 +69,7 @@ std::string joint_table(const json& joints) {
                n(words::figure(joint, "gap_before")),
                n(words::figure(joint, "gap_after")),
                n(words::figure(joint, "noise_floor")),
-               n(words::share(joint, "closure")),
+               n(words::closure(joint)),
                {regions},
                {words::list(joint.value("not_identifiable", json::array()))}});
   }

@@ -80,7 +80,7 @@ std::string joint_rows(const json& joints) {
     const json& joint = joints[j];
     const std::string left =
         row(shortened(words::joint(joint, j)), words::verdict(joint), change(joint, "gap_before", "gap_after"),
-            joint.value("unit", ""), words::figure(joint, "noise_floor"), words::share(joint, "closure"));
+            joint.value("unit", ""), words::figure(joint, "noise_floor"), words::closure(joint));
     const std::vector<std::string> lines = wrap(all_effects(joint), page_width - head.size());
     for (std::size_t i = 0; i < lines.size(); ++i) {
       std::string line = (i == 0 ? left : std::string(head.size(), ' ')) + lines[i];

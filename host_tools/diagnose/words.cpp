@@ -63,6 +63,10 @@ std::string share(const json& of, const char* key) {
   return has_number(of, key) ? fmt::format("{:.0f} %", 100 * of.at(key).get<double>()) : "-";
 }
 
+std::string closure(const json& joint) {
+  return text(joint, "verdict") == "nothing_missing" ? "-" : share(joint, "closure");
+}
+
 std::string parameters(const json& of, const char* plus_minus) {
   std::string out;
   for (const json& p : of.value("parameters", json::array())) {

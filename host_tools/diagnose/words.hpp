@@ -13,6 +13,8 @@ std::string verdict(const nlohmann::json& of);
 std::string figure(const nlohmann::json& of, const char* key);
 /// "83 %", or "-".
 std::string share(const nlohmann::json& of, const char* key);
+/// Share of the joint's gap that is closed, or "-" where there was none to close.
+std::string closure(const nlohmann::json& joint);
 /// "stribeck amplitude 2.1+-0.05 N*m, velocity 0.03 rad/s"; `plus_minus`: "+-" or " ± ".
 std::string effect(const nlohmann::json& of, const char* plus_minus);
 /// "amplitude 2.1+-0.05 N*m, ..": the effect's parameters alone.

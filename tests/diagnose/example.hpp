@@ -23,7 +23,7 @@ inline nlohmann::json diagnosis() {
              {"signal": "direction", "from": -1, "to": 0, "share_of_gap": 0.9}],
    "resembles": ["saturation"], "effects": [], "not_identifiable": []},
   {"joint": "roll", "index": 3, "unit": "N*m", "verdict": "nothing_missing", "gap_before": 0.1, "gap_after": 0.1,
-   "noise_floor": 0.1, "closure": null, "where": [], "effects": [], "not_identifiable": []},
+   "noise_floor": 0.1, "closure": 1.0, "where": [], "effects": [], "not_identifiable": []},
   {"joint": "slide", "index": 4, "unit": "N", "verdict": "not_excited", "gap_before": 3.0, "gap_after": 3.0,
    "noise_floor": 2.9, "closure": null, "where": [], "effects": [], "not_identifiable": []}],
  "robot_effects": [{"effect": "payload", "joints": [2, 3, 4], "held_out_closure": 0.8,

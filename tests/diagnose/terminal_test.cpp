@@ -44,6 +44,7 @@ TEST(DiagnosisTable, SaysEveryVerdictAndWhatWasFound) {
                              "unexplained",
                              "not excited",
                              "1.9 -> 0.4",
+                             "roll nothing missing 0.1 -> 0.1 N*m 0.1 - ",
                              "0.35",
                              "83 %",
                              "amplitude 2.1+-0.05 N*m",
