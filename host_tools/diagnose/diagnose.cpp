@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "host_tools/diagnose/deflection.hpp"
 #include "host_tools/diagnose/lack_of_fit.hpp"
 #include "host_tools/diagnose/linearised.hpp"
 #include "host_tools/diagnose/refit.hpp"
@@ -33,9 +34,11 @@ constexpr double least_closure = 0.5;
 constexpr double sure_closure = 0.8;
 /// Rows a period of the torque cut-off: two would be Nyquist's.
 constexpr double rows_per_period = 2.5;
+/// Faster than this there is nothing that these rules could name, and many rows.
+constexpr double highest_cutoff_hz = 40;
 /// Squared share of a column that is left: less can't be told from the nominal model.
 constexpr double nothing_left = 1e-5;
-constexpr int most_passes = 3;
+constexpr int most_passes = 2;
 
 std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before,
                                  const std::vector<ProcessedLog>& test) {
@@ -50,9 +53,11 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
   std::vector<SessionLog> out;
   const auto add = [&](const ProcessedLog& log, bool healthy, double start) {
     SessionLog entry{log, healthy, healthy || log.role == Role::train, std::max(0.0, log.t[0] - start)};
+    double& cutoff = entry.log.filter.torque_cutoff_hz;
+    cutoff = std::min(cutoff, highest_cutoff_hz);
     entry.log.decimation = std::max<Index>(
         log.decimation > 8 ? log.decimation / 8 : 1,
-        static_cast<Index>(1 / (log.step_s * rows_per_period * log.filter.torque_cutoff_hz)));
+        static_cast<Index>(1 / (log.step_s * rows_per_period * cutoff)));
     out.push_back(std::move(entry));
   };
   for (const ProcessedLog& log : now) add(log, false, one ? windows.front()[0] : log.t[0]);
@@ -265,11 +270,15 @@ json parameters_json(const EffectFit& fit, const Joint& joint) {
 void add_deviations(Models& models, const Linearised& at) {
   std::vector<Index> columns;
   for (Index c = 0; c < static_cast<Index>(at.unknowns().size()); ++c) columns.push_back(c);
+  for (const Index c : at.nuisance()) {
+    if (c >= static_cast<Index>(at.unknowns().size())) columns.push_back(c);  // background
+  }
   const LinearFit fit = at.solve(columns);
   const MatrixXd covariance = SymmetricSolver(fit.information).inverse();
   IdentifiedModel& model = models.current;
   for (JointFit& joint : model.joints) {
     for (EffectFit& effect : joint.effects) {
+      if (find_effect(effect.effect)->acts_on == ActsOn::position && !effect.linear_std.empty()) continue;  // from a link encoder
       effect.linear_std.assign(effect.linear.size(), 0.0);
       effect.shape_std.assign(effect.shape.size(), 0.0);
     }
@@ -342,14 +351,42 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
   settings.max_effects = static_cast<std::size_t>(project.diagnose.max_effects);
   std::vector<SessionLog> logs = sessions(data.logs, baseline, test);
   std::vector<std::string> notes;
+  // A link encoder shows what bends before any torque is looked at.
+  std::vector<EffectCandidate> never;
+  Deflections deflections;
+  std::vector<DeflectionEffect> bent_already;
+  const auto look_at_links = [&](const IdentifiedModel& model) {
+    deflections = find_deflections(model, data.logs, baseline, bent_already);
+    notes.insert(notes.end(), deflections.notes.begin(), deflections.notes.end());
+    for (const DeflectionEffect& effect : bent_already) {
+      notes.push_back(fmt::format("{}: the baseline has {} already", project.robot.joints[effect.joint].name, effect.fit.effect));
+      models.fixed.push_back({effect.fit.effect, effect.joint, effect.fit.shape});
+    }
+    for (const DeflectionEffect& effect : deflections.found) models.fixed.push_back({effect.fit.effect, effect.joint, effect.fit.shape});
+    for (std::size_t j = 0; j < n; ++j) {
+      const bool encoded = std::all_of(data.logs.begin(), data.logs.end(), [&](const ProcessedLog& log) { return log.qlink.size() > 0 && log.has_link[j]; });
+      if (!encoded) continue;
+      for (const std::string_view effect : {Elasticity::name, Backlash::name, Eccentricity::name}) never.push_back({std::string(effect), j, {}});
+    }
+  };
+  const auto bend_already = [&](IdentifiedModel& model) {
+    for (const DeflectionEffect& effect : bent_already) {
+      model.joints[effect.joint].effects.push_back(effect.fit);
+      model.joints[effect.joint].effects.back().named = false;
+    }
+  };
   if (models.has_baseline) {
     GateData healthy = data;
     healthy.logs = baseline;
     healthy.notes.clear();
     models.healthy = nominal_model(project, healthy, progress);
     models.healthy.logs = data.references;
+    look_at_links(models.healthy);
+    bend_already(models.healthy);
     // What the healthy session has that is not nominal is its background: learned, not reported.
-    Models alone{{}, models.healthy, false};
+    Models alone;
+    alone.current = models.healthy;
+    alone.fixed = models.fixed;
     std::vector<SessionLog> before;
     for (const SessionLog& log : logs) {
       if (!log.healthy) continue;
@@ -362,13 +399,14 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
     look_for_lack(background);
     const bool structured = std::any_of(background.lack.begin(), background.lack.end(), [](const LackOfFit& l) { return l.structured(); });
     if (structured) {
-      background = explore(alone, before, settings, {}, progress);
+      background = explore(alone, before, settings, never, progress);
       alone = background.models;
       for (std::size_t j = 0; j < n; ++j) {
         for (EffectFit& fit : alone.current.joints[j].effects) {
           if (fit.named) notes.push_back(fmt::format("{}: the baseline has {} already", project.robot.joints[j].name, fit.effect));
           fit.named = false;
         }
+        if (background.lack[j].structured()) models.background.push_back(j);
         if (background.lack[j].structured())
           notes.push_back(fmt::format("{}: the baseline has structure that no effect explains", project.robot.joints[j].name));
       }
@@ -379,7 +417,9 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
     data.notes.insert(data.notes.end(), healthy.notes.begin(), healthy.notes.end());
   } else {
     models.current = nominal_model(project, data, progress);
+    look_at_links(models.current);
   }
+  for (const DeflectionEffect& effect : deflections.found) models.current.joints[effect.joint].effects.push_back(effect.fit);
   refit(models, logs, {}, 8);
   Diagnosis result;
   {
@@ -387,9 +427,10 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
     Models with = models;
     add_deviations(with, at);
     result.nominal = with.current;
+    for (JointFit& joint : result.nominal.joints) std::erase_if(joint.effects, [](const EffectFit& fit) { return fit.named; });
   }
 
-  Outcome outcome = explore(models, logs, settings, {}, progress);
+  Outcome outcome = explore(models, logs, settings, never, progress);
   // Names that do not hold on data that did not fit them go first.
   std::vector<std::size_t> groups = in_model(*outcome.at);
   HeldOut held = hold_out(outcome, groups);
@@ -442,7 +483,12 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
 
   // Models: what is not named stays as an unnamed column, since the gate data says it helps.
   for (std::size_t j = 0; j < n; ++j) {
-    for (EffectFit& fit : found.current.joints[j].effects) fit.named &= accepted[j];
+    for (EffectFit& fit : found.current.joints[j].effects) {
+      const bool fixed = std::any_of(models.fixed.begin(), models.fixed.end(), [&](const EffectCandidate& c) {
+        return c.joint == j && c.effect == fit.effect;
+      });
+      if (!fixed) fit.named &= accepted[j];
+    }
   }
   for (EffectFit& fit : found.current.body) fit.named &= robot_named;
   result.model = found.current;
@@ -541,6 +587,16 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
       json one = effect_json(fit, j, f, gap[k] > 0 ? held.alone_by_joint[i][k] / gap[k] : 0);
       one["model_share"] = share_of_model(fit, j);
       effects.push_back(std::move(one));
+    }
+    for (const DeflectionEffect& seen : deflections.found) {
+      if (seen.joint != j) continue;
+      effects.push_back({{"effect", seen.fit.effect},
+                         {"parameters", parameters_json(seen.fit, project.robot.joints[j])},
+                         {"score", seen.score},
+                         {"held_out_closure", seen.closure},
+                         {"signal", "q - qlink"},
+                         {"alternatives", json::array()},
+                         {"model_share", share_of_model(seen.fit, j)}});
     }
     const bool unexplained = (outcome.lack[j].structured() && (effects.empty() || remains[j])) || !resembles.empty();
     const std::string verdict = unexplained ? "unexplained" : !effects.empty() ? "effects_found" : "nothing_missing";

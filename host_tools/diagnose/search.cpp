@@ -172,7 +172,7 @@ Choice Search::evaluate(const std::vector<std::size_t>& groups) const {
 
 std::vector<Search::Scored> Search::score_all(const Choice& state, bool with_thresholds) {
   const std::vector<Index>& s = state.fit.columns;
-  const auto from = static_cast<Index>(at_.nuisance().size());
+  const auto from = static_cast<Index>(at_.unknowns().size());
   VectorXd weights(static_cast<Index>(at_.joints()));
   for (Index j = 0; j < weights.size(); ++j)
     weights[j] = state.fit.rows[j] / std::max(state.fit.square[j], 1e-12 * state.fit.rows[j] / at_.weights()[j]);
@@ -319,7 +319,9 @@ std::size_t Search::refine(const Choice& state, std::size_t g) {
   std::vector<MatrixXd> best_columns, made;
   best = try_shape(centre, best_columns);
   const double first = best;
-  for (int round = 0; round < 4; ++round, ratio = std::sqrt(ratio)) {
+  // A column of an effect on the position costs a simulation.
+  const int rounds = info.acts_on == ActsOn::torque ? 4 : 2;
+  for (int round = 0; round < rounds; ++round, ratio = std::sqrt(ratio)) {
     const double lower = std::max(info.shape[index].lower, centre / ratio);
     double upper = std::min(info.shape[index].upper, centre * ratio);
     if (info.shape[index].name == "time")
@@ -360,7 +362,7 @@ Choice Search::run(std::vector<std::size_t> start, Progress& progress) {
   std::vector<Choice> beam{evaluate(start)};
   Choice best = beam.front();
   for (int level = 0; level < 64; ++level) {
-    find_ripples(beam.front());
+    if (level < 2) find_ripples(beam.front());
     std::vector<Choice> next;
     std::set<std::vector<std::size_t>> seen;
     const std::size_t width = level < 3 ? beam.size() : 1;
@@ -402,7 +404,6 @@ Choice Search::run(std::vector<std::size_t> start, Progress& progress) {
         changed = true;
         break;
       }
-      find_ripples(without);
       std::size_t tried = 0;
       std::set<std::pair<std::string, std::size_t>> names;
       for (const Scored& one : score_all(without, false)) {
@@ -438,7 +439,7 @@ std::vector<Found> Search::explain(const Choice& choice) {
     std::size_t tried = 0;
     for (const Scored& one : score_all(without, false)) {
       const Group group = at_.groups()[one.group];
-      if (tried >= 6 || one.score < found.score - std::max(25.0, 0.1 * found.score)) break;
+      if (tried >= 4 || one.score < found.score - std::max(25.0, 0.1 * found.score)) break;
       if (!names.insert({group.candidate.effect, group.on_body ? 0 : group.candidate.joint}).second) continue;
       ++tried;
       std::vector<std::size_t> groups = others;
