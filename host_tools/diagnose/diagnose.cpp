@@ -39,6 +39,8 @@ constexpr double highest_cutoff_hz = 40;
 /// Squared share of a column that is left: less can't be told from the nominal model.
 constexpr double nothing_left = 1e-5;
 constexpr int most_passes = 2;
+/// A residual of that many times the noise is mostly gap.
+constexpr double much_more = 3;
 
 std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before,
                                  const std::vector<ProcessedLog>& test) {
@@ -152,11 +154,27 @@ std::vector<std::vector<std::string>> blind_spots(const Linearised& at, const Se
   return out;
 }
 
+/// Without a healthy session the noise's colour comes from a residual that holds the gap too: taken as noise, a slow gap
+/// would be whitened away. So only where the residual is not much more than the noise above the torque's band.
+std::vector<VectorXd> colours(const Models& models, const std::vector<SessionLog>& logs) {
+  if (models.has_baseline) return {};
+  const std::size_t n = models.current.joints.size();
+  const std::vector<VectorXd> white(n, VectorXd::Zero(1));
+  const Linearised in_band(models, logs, white), coloured(models, logs);
+  std::vector<VectorXd> out = coloured.whitening();
+  for (std::size_t j = 0; j < n; ++j) {
+    double noise = 0;
+    for (const SessionLog& entry : logs) noise = std::max(noise, entry.log.torque_noise[static_cast<Index>(j)]);
+    if (1 / std::sqrt(in_band.weights()[static_cast<Index>(j)]) > much_more * noise) out[j] = white[j];
+  }
+  return out;
+}
+
 /// Search, name, fit again around what was named; until nothing changes.
 Outcome explore(Models models, const std::vector<SessionLog>& logs, const SearchSettings& settings,
                 const std::vector<EffectCandidate>& never, Progress& progress) {
   Outcome out;
-  std::vector<VectorXd> whitening;
+  std::vector<VectorXd> whitening = colours(models, logs);
   for (int pass = 0; pass < most_passes; ++pass) {
     progress.stage(pass == 0 ? "looking for what is missing" : "looking again, around what was found", 8);
     Linearised at(models, logs, whitening);
@@ -192,8 +210,8 @@ Outcome explore(Models models, const std::vector<SessionLog>& logs, const Search
     out.models = models;
     // Without a baseline the gap was part of what looked like noise.
     const bool better = changed && !models.has_baseline;
-    if (better) whitening.clear();
-    if (!better) whitening = at.whitening();
+    whitening = better ? colours(models, logs) : at.whitening();
+    out.whitening = whitening.empty() ? at.whitening() : whitening;
     out.at = std::make_unique<Linearised>(models, logs, whitening);
     // What the search found, by its group in the new linearisation.
     std::vector<Found> found;
@@ -225,8 +243,7 @@ struct HeldOut {
   VectorXd rows;
 };
 
-HeldOut hold_out(const Outcome& outcome, const std::vector<std::size_t>& groups) {
-  const Linearised& at = *outcome.at;
+HeldOut hold_out(const Linearised& at, const std::vector<MatrixXd>& features, const std::vector<std::size_t>& groups) {
   const auto n = static_cast<Index>(at.joints());
   HeldOut out{VectorXd::Zero(n), VectorXd::Zero(n), VectorXd::Zero(n), std::vector<double>(groups.size(), 0.0),
               std::vector<VectorXd>(groups.size(), VectorXd::Zero(n)), VectorXd::Zero(n)};
@@ -238,7 +255,7 @@ HeldOut hold_out(const Outcome& outcome, const std::vector<std::size_t>& groups)
     out.after += after;
     for (Index j = 0; j < n; ++j) {
       out.leftover[j] += after[j] * structured_share(at, static_cast<std::size_t>(j), all,
-                                                     outcome.features[static_cast<std::size_t>(j)], fold.judge);
+                                                     features[static_cast<std::size_t>(j)], fold.judge);
     }
     out.before += at.square(at.solve(at.nuisance(), fold.fit), fold.judge).cwiseProduct(w);
     for (std::size_t i = 0; i < groups.size(); ++i) {
@@ -420,7 +437,8 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
     look_at_links(models.current);
   }
   for (const DeflectionEffect& effect : deflections.found) models.current.joints[effect.joint].effects.push_back(effect.fit);
-  refit(models, logs, {}, 8);
+  const std::vector<VectorXd> plain(n, VectorXd::Zero(1));
+  refit(models, logs, plain, 8);
   Diagnosis result;
   {
     const Linearised at(models, logs);
@@ -431,9 +449,55 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
   }
 
   Outcome outcome = explore(models, logs, settings, never, progress);
-  // Names that do not hold on data that did not fit them go first.
+  // Names that do not hold on data that did not fit them go first. Where structure remains, what counts is the error in
+  // the whole band: whitening would weigh it by how fast it is.
+  const auto judge = [&] {
+    const std::vector<std::size_t> groups = in_model(*outcome.at);
+    HeldOut held = hold_out(*outcome.at, outcome.features, groups);
+    if (std::none_of(outcome.lack.begin(), outcome.lack.end(), [](const LackOfFit& l) { return l.structured(); })) return held;
+    const Linearised at(outcome.models, logs, plain);
+    std::vector<MatrixXd> in_band(n);
+    parallel_for(n, [&](std::size_t j) { in_band[j] = features(at, j); });
+    const HeldOut band = hold_out(at, in_band, groups);
+    for (std::size_t j = 0; j < n; ++j) {
+      if (!outcome.lack[j].structured()) continue;
+      const auto k = static_cast<Index>(j);
+      held.before[k] = band.before[k];
+      held.after[k] = band.after[k];
+      held.leftover[k] = band.leftover[k];
+      for (std::size_t i = 0; i < groups.size(); ++i) held.alone_by_joint[i][k] = band.alone_by_joint[i][k];
+    }
+    for (std::size_t i = 0; i < groups.size(); ++i) held.alone[i] = held.alone_by_joint[i].sum();
+    return held;
+  };
+  // How fast drift comes to its end shows on the data that follow.
+  bool drifted = false;
+  for (std::size_t j = 0; j < n; ++j) {
+    for (std::size_t e = 0; e < outcome.models.current.joints[j].effects.size(); ++e) {
+      if (outcome.models.current.joints[j].effects[e].effect != FrictionDrift::name || !outcome.models.current.joints[j].effects[e].named) continue;
+      const double found = outcome.models.current.joints[j].effects[e].shape[0];
+      double best = found, least = 1e300;
+      for (const double factor : {1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 2.0}) {
+        Models other = outcome.models;
+        other.current.joints[j].effects[e].shape[0] = std::clamp(found * factor, 0.1, 1e4);
+        const Linearised at(other, logs, outcome.whitening);
+        double sum = 0;
+        for (const Fold& fold : at.folds()) sum += at.square(at.solve(columns_of(at, in_model(at)), fold.fit), fold.judge)[static_cast<Index>(j)];
+        if (sum >= least) continue;
+        least = sum;
+        best = other.current.joints[j].effects[e].shape[0];
+      }
+      outcome.models.current.joints[j].effects[e].shape[0] = best;
+      drifted = true;
+    }
+  }
+  if (drifted) {
+    refit(outcome.models, logs, outcome.whitening, 4);
+    outcome.at = std::make_unique<Linearised>(outcome.models, logs, outcome.whitening);
+    look_for_lack(outcome);
+  }
   std::vector<std::size_t> groups = in_model(*outcome.at);
-  HeldOut held = hold_out(outcome, groups);
+  HeldOut held = judge();
   for (bool again = true; again && !groups.empty();) {
     again = false;
     std::size_t worst = 0;
@@ -457,23 +521,32 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
       }
     }
     look_for_lack(outcome);
-    held = hold_out(outcome, groups);
+    held = judge();
     again = true;
   }
 
   const Linearised& at = *outcome.at;
   Models& found = outcome.models;
+  const bool remainder = std::any_of(outcome.lack.begin(), outcome.lack.end(), [](const LackOfFit& l) { return l.structured(); });
+  if (groups.empty() && deflections.found.empty()) {
+    found.current = models.current;
+  } else if (remainder) {
+    refit(found, logs, plain, 4);
+  }
   add_deviations(found, at);
   const VectorXd gap = (held.before - held.after).cwiseMax(0.0) + held.leftover;
   VectorXd closure(static_cast<Index>(n));
   for (Index j = 0; j < closure.size(); ++j) closure[j] = gap[j] > 0 ? (held.before[j] - held.after[j]) / gap[j] : 0;
-  double robot_gap = 0, robot_closed = 0;
-  for (const std::size_t g : groups) {
-    if (!at.groups()[g].on_body) continue;
-    robot_gap = gap.sum();
-    robot_closed = (held.before - held.after).sum();
+  // An effect on the robot: what comes back without it against what it leaves on the joints that it reaches.
+  std::vector<double> robot_closure(groups.size(), 0.0);
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    if (!at.groups()[groups[i]].on_body) continue;
+    double left = 0;
+    for (Index j = 0; j < gap.size(); ++j) {
+      if (held.alone_by_joint[i][j] > 6) left += held.leftover[j];
+    }
+    robot_closure[i] = held.alone[i] / std::max(held.alone[i] + left, 1e-300);
   }
-  const bool robot_named = robot_gap > 0 && robot_closed >= least_closure * robot_gap;
   std::vector<bool> accepted(n), remains(n);
   for (std::size_t j = 0; j < n; ++j) {
     const auto k = static_cast<Index>(j);
@@ -490,7 +563,10 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
       if (!fixed) fit.named &= accepted[j];
     }
   }
-  for (EffectFit& fit : found.current.body) fit.named &= robot_named;
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    if (!at.groups()[groups[i]].on_body || robot_closure[i] >= least_closure) continue;
+    for (EffectFit& fit : found.current.body) fit.named &= fit.effect != at.groups()[groups[i]].candidate.effect;
+  }
   result.model = found.current;
 
   // Figures on logs that decided nothing, where there are any.
@@ -569,9 +645,9 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
     }
     if (blocks_only) {
       // In-sample errors, by the ratio of judged to fitted ones.
-      const LinearFit plain = at.solve(at.nuisance()), all = at.solve(columns_of(at, groups));
+      const LinearFit without = at.solve(at.nuisance()), all = at.solve(columns_of(at, groups));
       const VectorXd rows = at.row_count(at.fit_blocks());
-      before *= held.before[k] / std::max(held.rows[k], 1.0) / (at.weights()[k] * plain.square[k] / rows[k]);
+      before *= held.before[k] / std::max(held.rows[k], 1.0) / (at.weights()[k] * without.square[k] / rows[k]);
       after *= held.after[k] / std::max(held.rows[k], 1.0) / (at.weights()[k] * all.square[k] / rows[k]);
     }
     const double rms_before = std::sqrt(before / std::max(count, 1.0)), rms_after = std::sqrt(after / std::max(count, 1.0));
@@ -631,7 +707,7 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
   for (const EffectFit& fit : found.current.body) {
     const auto [f, i] = found_of(fit, 0, true);
     if (i >= groups.size() || !fit.named) continue;
-    json one = effect_json(fit, 0, f, robot_gap > 0 ? held.alone[i] / robot_gap : 0);
+    json one = effect_json(fit, 0, f, robot_closure[i]);
     json which = json::array();
     for (std::size_t j = 0; j < n; ++j) {
       if (held.alone_by_joint[i][static_cast<Index>(j)] > 6) which.push_back(j + 1);

@@ -31,7 +31,8 @@ constexpr double difference = 1e-3;
 constexpr int blocks_of_one_log = 5;
 
 bool is_shape_free(const EffectInfo& info, std::size_t i) {
-  return info.shape[i].name != "joint" && info.shape[i].name != "ratio";
+  // A time constant from one session's start is a guess by its end: the gate chooses it.
+  return info.shape[i].name != "joint" && info.shape[i].name != "ratio" && info.shape[i].name != "time_constant";
 }
 
 /// Columns that come from differences of predict() rather than from phi.

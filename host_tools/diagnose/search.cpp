@@ -18,6 +18,8 @@ using Eigen::VectorXd;
 
 /// What an effect must bring at least.
 constexpr double least_score = 8;
+/// .. and at most: a residual full of structure looks like more than noise at other times too.
+constexpr double most_score = 25;
 /// Less of a column than this (squared) is nothing.
 constexpr double nothing_left = 1e-5;
 constexpr std::size_t beam_width = 3;
@@ -122,6 +124,14 @@ std::vector<Index> Search::columns(const std::vector<std::size_t>& groups) const
 bool Search::allowed(const Choice& state, std::size_t g) const {
   const Group& group = at_.groups()[g];
   if (group.noise_limited) return false;
+  if (!group.in_model && !group.on_body && find_effect(group.candidate.effect)->needs_total) {
+    // The total that its column is made of has the model's named effects in it: one that is left out would be stood in
+    // for.
+    for (std::size_t i = 0; i < at_.groups().size() && at_.groups()[i].in_model; ++i) {
+      const bool elsewhere = !at_.groups()[i].on_body && at_.groups()[i].candidate.joint != group.candidate.joint;
+      if (!elsewhere && std::find(state.groups.begin(), state.groups.end(), i) == state.groups.end()) return false;
+    }
+  }
   std::size_t here = 0, robot = 0;
   for (const std::size_t other : state.groups) {
     const Group& o = at_.groups()[other];
@@ -259,7 +269,7 @@ std::vector<Search::Scored> Search::score_all(const Choice& state, bool with_thr
       // Gumbel's distribution of the largest, by moments
       const double mean = most.mean(), std = std::sqrt((most.array() - mean).square().sum() / (shifts - 1));
       const double beta = std * 0.7797, mode = mean - 0.5772 * beta;
-      result[j] = std::max(least_score, mode - beta * std::log(-std::log1p(-false_alarm)));
+      result[j] = std::clamp(mode - beta * std::log(-std::log1p(-false_alarm)), least_score, most_score);
     });
     for (std::size_t j = 0; j < result.size(); ++j) thresholds_[static_cast<Index>(j)] = result[j];
   }
