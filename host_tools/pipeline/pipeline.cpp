@@ -247,7 +247,8 @@ void Pipeline::train() {
   const IdentifiedModel diagnosed = read_model(directory_ / "model.json");
   json stages = json::array();
   if (const fs::path file = directory_ / "metrics.json"; fs::exists(file)) {
-    for (const json& stage : json::parse(read_file(file)).at("stages")) {
+    const json before = json::parse(read_file(file));
+    for (const json& stage : before.at("stages")) {
       if (stage.at("stage") == "friction" || stage.at("stage") == "diagnosed") stages.push_back(stage);
     }
   }
