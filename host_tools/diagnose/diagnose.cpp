@@ -81,15 +81,31 @@ std::vector<bool> still_joints(const GateData& data, const std::vector<Processed
   return out;
 }
 
+bool any(const std::vector<bool>& joints) { return std::find(joints.begin(), joints.end(), true) != joints.end(); }
+
+/// Keeps the joints out of the fit. Where one stands still its encoder's noise is no motion.
 void leave_out(std::vector<ProcessedLog>& logs, const std::vector<bool>& joints) {
-  for (ProcessedLog& log : logs) log.left_out = joints;
+  if (!any(joints)) return;
+  for (ProcessedLog& log : logs) {
+    log.left_out = joints;
+    ProcessedLog alone = log;
+    alone.role = Role::train;
+    const std::vector<bool> moving = moving_joints({alone});
+    for (std::size_t j = 0; j < joints.size(); ++j) {
+      if (!joints[j] || moving[j]) continue;
+      const auto k = static_cast<Index>(j);
+      log.q.col(k).setConstant(log.q.col(k).mean());
+      if (log.measured_dq.size() > 0) log.measured_dq.col(k).setZero();
+      if (log.measured_ddq.size() > 0) log.measured_ddq.col(k).setZero();
+    }
+  }
 }
 
 /// A joint that stands still holds any torque up to its stiction: what was measured says nothing. The model's own torque
 /// takes its place, under so much white noise that the joint counts next to nothing in what all joints share.
 void mute(std::vector<SessionLog>& logs, const IdentifiedModel& model, const std::vector<bool>& joints) {
-  constexpr double noise = 0.2;  // of rated torque
-  if (std::find(joints.begin(), joints.end(), true) == joints.end()) return;
+  constexpr double noise = 0.1;  // of rated torque
+  if (!any(joints)) return;
   for (std::size_t l = 0; l < logs.size(); ++l) {
     ProcessedLog& log = logs[l].log;
     const MatrixXd torque = predict(model, log);
@@ -389,9 +405,25 @@ void check_same_robot(const Models& models, const std::vector<SessionLog>& logs,
 
 }  // namespace
 
-Diagnosis diagnose(const Project& project, GateData& data, const std::vector<ProcessedLog>& baseline,
+Diagnosis diagnose(const Project& project, GateData& given, const std::vector<ProcessedLog>& given_baseline,
                    const std::vector<ProcessedLog>& test, Progress& progress) {
   const std::size_t n = project.robot.size();
+  const std::vector<bool> still = still_joints(given, given_baseline);
+  if (std::find(still.begin(), still.end(), false) == still.end()) {
+    throw DataError(
+        "not_excited: no joint moves in the train logs (and in the baseline) by more than its encoder's noise; record "
+        "logs in which they do");
+  }
+  std::optional<GateData> frozen;
+  std::vector<ProcessedLog> frozen_baseline;
+  if (any(still)) {
+    frozen = given;
+    frozen_baseline = given_baseline;
+    leave_out(frozen->logs, still);
+    leave_out(frozen_baseline, still);
+  }
+  GateData& data = frozen ? *frozen : given;
+  const std::vector<ProcessedLog>& baseline = frozen ? frozen_baseline : given_baseline;
   Models models;
   models.has_baseline = !baseline.empty();
   SearchSettings settings;
@@ -399,12 +431,6 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
   std::optional<Session> session;
   std::vector<SessionLog> logs = sessions(data.logs, baseline, test, session);
   std::vector<std::string> notes;
-  const std::vector<bool> still = still_joints(data, baseline);
-  if (std::find(still.begin(), still.end(), false) == still.end()) {
-    throw DataError(
-        "not_excited: no joint moves in the train logs (and in the baseline) by more than its encoder's noise; record "
-        "logs in which they do");
-  }
   std::vector<EffectCandidate> never;
   for (std::size_t j = 0; j < n; ++j) {
     if (!still[j]) continue;
@@ -413,7 +439,6 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
   if (models.has_baseline) {
     GateData healthy = data;
     healthy.logs = baseline;
-    leave_out(healthy.logs, still);
     healthy.notes.clear();
     models.healthy = nominal_model(project, healthy, progress);
     mute(logs, models.healthy, still);
@@ -448,9 +473,7 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
     check_same_robot(models, logs, still);
     data.notes.insert(data.notes.end(), healthy.notes.begin(), healthy.notes.end());
   } else {
-    leave_out(data.logs, still);
     models.current = nominal_model(project, data, progress);
-    leave_out(data.logs, {});
     mute(logs, models.current, still);
   }
   models.current.session = session;
@@ -700,6 +723,7 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
                    {"baseline", models.has_baseline},
                    {"notes", notes}};
   data.notes.insert(data.notes.end(), notes.begin(), notes.end());
+  given.notes = data.notes;
   progress.done();
   return result;
 }

@@ -459,7 +459,8 @@ Estimate finish_model(const Fitter& fitter, const Project& project, const GateDa
   std::string untold;
   Eigen::Index to_move = 0;
   for (const WeakParameter& one : out.weak) {
-    if (one.identifiable || data.logs.front().is_left_out(one.joint)) continue;
+    // With a joint at rest the bodies on either side of it can't be told apart; that is asked for.
+    if (one.identifiable || !data.logs.front().left_out.empty()) continue;
     untold += (untold.empty() ? "" : ", ") + one.name;
     to_move = one.joint;
   }
