@@ -82,13 +82,13 @@ int run(int argc, char** argv) {
     verb->add_option("--out", out, "directory for the results")->required();
     return verb;
   };
-  const CLI::App* run_verb = stage("run", "identify, train, export and report in one go.");
+  const CLI::App* run_verb = stage("run", "identify, diagnose, train, export and report in one go.");
   const CLI::App* identify_verb =
       stage("identify", "Structure and friction from the train logs: model.json, metrics.json.");
   const CLI::App* diagnose_verb =
       stage("diagnose", "Find and name what the nominal model lacks, add it: diagnosis.json, model.json.");
   const CLI::App* train_verb =
-      stage("train", "Fit a Broad Learning System on what is left; keep it where validation improves.");
+      stage("train", "Fit a Broad Learning System on what diagnosis left; keep it where validation improves.");
   const CLI::App* export_verb =
       stage("export", "Choose fixed-point formats, write tables.hpp, tables.bin, export.json.");
   const CLI::App* report_verb = stage("report", "Draw report.html from what the other stages wrote.");

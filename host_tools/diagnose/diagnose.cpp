@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <optional>
 #include <set>
 
 #include "host_tools/diagnose/deflection.hpp"
@@ -17,6 +19,7 @@
 #include "host_tools/identify/solver.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/parallel.hpp"
+#include "host_tools/random.hpp"
 #include "host_tools/report/metrics.hpp"
 
 namespace fxdyn {
@@ -42,9 +45,10 @@ constexpr int most_passes = 2;
 /// A residual of that many times the noise is mostly gap.
 constexpr double much_more = 3;
 
+/// The logs with their ages, and the session that all of them but the healthy ones belong to: one where no two windows
+/// overlap in time; else every log starts its own.
 std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before,
-                                 const std::vector<ProcessedLog>& test) {
-  // One session where no two windows overlap in time; else every log starts its own.
+                                 const std::vector<ProcessedLog>& test, std::optional<Session>& session) {
   std::vector<std::array<double, 2>> windows;
   for (const auto* logs : {&now, &test}) {
     for (const ProcessedLog& log : *logs) windows.push_back({log.t[0], log.t[log.t.size() - 1]});
@@ -52,6 +56,7 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
   std::sort(windows.begin(), windows.end());
   bool one = true;
   for (std::size_t i = 1; i < windows.size(); ++i) one &= windows[i][0] > windows[i - 1][1] - 1e-9;
+  if (one) session = {windows.front()[0], windows.back()[1]};
   std::vector<SessionLog> out;
   const auto add = [&](const ProcessedLog& log, bool healthy, double start) {
     SessionLog entry{log, healthy, healthy || log.role == Role::train, std::max(0.0, log.t[0] - start)};
@@ -65,6 +70,60 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
   for (const ProcessedLog& log : now) add(log, false, one ? windows.front()[0] : log.t[0]);
   for (const ProcessedLog& log : before) add(log, true, log.t[0]);
   return out;
+}
+
+/// Joints that this motion tells nothing of: they stand still, or as good as, beside what the encoder's noise looks like.
+std::vector<bool> still_joints(const GateData& data, const std::vector<ProcessedLog>& baseline) {
+  constexpr double times_noise = 6;
+  std::vector<bool> out = moving_joints(data.logs);
+  const std::vector<bool> before = baseline.empty() ? out : moving_joints(baseline);
+  const ProcessedLog& log = data.logs.front();
+  for (std::size_t j = 0; j < out.size(); ++j) {
+    const FilterFit& filter = data.filter;
+    const double noise = std::max(filter.position_noise[j], filter.encoder_step[j] / std::sqrt(12.0));
+    const double cutoff = std::min(filter.position_cutoff_hz, 0.5 / log.step_s);
+    const double noise_dq = 2 * std::numbers::pi * noise * std::sqrt(2 * log.step_s * cutoff * cutoff * cutoff / 3);
+    out[j] = !out[j] || !before[j] || !(data.dq[static_cast<Index>(j)] > times_noise * noise_dq);
+  }
+  return out;
+}
+
+bool any(const std::vector<bool>& joints) { return std::find(joints.begin(), joints.end(), true) != joints.end(); }
+
+/// Keeps the joints out of the fit. Where one stands still its encoder's noise is no motion.
+void leave_out(std::vector<ProcessedLog>& logs, const std::vector<bool>& joints) {
+  if (!any(joints)) return;
+  for (ProcessedLog& log : logs) {
+    log.left_out = joints;
+    ProcessedLog alone = log;
+    alone.role = Role::train;
+    const std::vector<bool> moving = moving_joints({alone});
+    for (std::size_t j = 0; j < joints.size(); ++j) {
+      if (!joints[j] || moving[j]) continue;
+      const auto k = static_cast<Index>(j);
+      log.q.col(k).setConstant(log.q.col(k).mean());
+      if (log.measured_dq.size() > 0) log.measured_dq.col(k).setZero();
+      if (log.measured_ddq.size() > 0) log.measured_ddq.col(k).setZero();
+    }
+  }
+}
+
+/// A joint that stands still holds any torque up to its stiction: what was measured says nothing. The model's own torque
+/// takes its place, under so much white noise that the joint counts next to nothing in what all joints share.
+void mute(std::vector<SessionLog>& logs, const IdentifiedModel& model, const std::vector<bool>& joints) {
+  constexpr double noise = 0.1;  // of rated torque
+  if (!any(joints)) return;
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    ProcessedLog& log = logs[l].log;
+    const MatrixXd torque = predict(model, log);
+    Random random(l + 1);
+    for (std::size_t j = 0; j < joints.size(); ++j) {
+      if (!joints[j]) continue;
+      const auto k = static_cast<Index>(j);
+      for (Index i = 0; i < log.samples(); ++i)
+        log.tau(i, k) = torque(i, k) + noise * model.joints[j].rated_torque * random.normal();
+    }
+  }
 }
 
 IdentifiedModel nominal_model(Project project, GateData& data, Progress& progress) {
@@ -328,45 +387,75 @@ VectorXd error_of(const ProcessedLog& log, const MatrixXd& torque, std::size_t j
   return log.filter_columns(log.tau.col(j) - torque.col(j)).col(0);
 }
 
-void check_same_robot(const Models& models, const std::vector<SessionLog>& logs, const IdentifiedModel& own) {
-  // Base parameters of the baseline with friction of their own against what the logs themselves fit.
-  const Linearised at(models, logs, std::vector<VectorXd>(models.current.joints.size(), VectorXd::Zero(1)));
-  (void)own;
-  const LinearFit fit = at.solve(at.nuisance());
-  std::vector<std::size_t> now;
-  for (const std::size_t b : at.fit_blocks()) {
-    if (!at.blocks()[b].healthy) now.push_back(b);
+/// Base parameters of the baseline with friction, load and tilt of their own against what both sessions measured.
+void check_same_robot(const Models& models, const std::vector<SessionLog>& logs, const std::vector<bool>& still) {
+  constexpr double most = 0.2;  // of the torque's power that no fit explains
+  Linearised at(models, logs, std::vector<VectorXd>(models.current.joints.size(), VectorXd::Zero(1)));
+  const auto first = static_cast<Index>(at.nuisance().size());
+  for (const EffectInfo& info : effect_infos()) {
+    if (info.acts_on != ActsOn::body) continue;
+    Group group;
+    group.candidate = {std::string(info.name), 0, {}};
+    group.on_body = true;
+    at.add(group, at.make(group.candidate));
   }
-  const VectorXd square = at.square(fit, now);
-  std::size_t strange = 0;
+  std::vector<Index> columns = at.nuisance();
+  for (Index c = first; c < at.columns(); ++c) columns.push_back(c);
+  const LinearFit fit = at.solve(columns);
+  std::size_t strange = 0, judged = 0;
   for (std::size_t j = 0; j < at.joints(); ++j) {
-    double whole = 0;
-    for (const std::size_t l : {std::size_t{0}}) (void)l;
-    for (const SessionLog& entry : logs) {
-      if (entry.healthy || !entry.fits) continue;
-      const MatrixXd tau = entry.log.decimate(entry.log.filter_columns(entry.log.tau.col(static_cast<Index>(j))));
-      whole += tau.squaredNorm();
+    if (still[j]) continue;
+    ++judged;
+    bool explained = true;
+    for (const bool healthy : {false, true}) {
+      std::vector<std::size_t> blocks;
+      double whole = 0;
+      for (const std::size_t b : at.fit_blocks()) {
+        if (at.blocks()[b].healthy == healthy) blocks.push_back(b);
+      }
+      for (const SessionLog& entry : logs) {
+        if (entry.healthy != healthy || !entry.fits) continue;
+        whole += entry.log.decimate(entry.log.filter_columns(entry.log.tau.col(static_cast<Index>(j)))).squaredNorm();
+      }
+      explained &= at.square(fit, blocks)[static_cast<Index>(j)] <= most * whole;
     }
-    strange += square[static_cast<Index>(j)] > 0.2 * whole;
+    strange += !explained;
   }
-  if (2 * strange > at.joints()) {
+  if (2 * strange > judged) {
     throw DataError(
-        fmt::format("the baseline explains the torque of {} of {} joints not at all: a log of another robot, other units or "
-                    "columns; remove it (role = \"baseline\") or correct it",
-                    strange, at.joints()));
+        fmt::format("the baseline and these logs can't be of one robot: nothing explains both at {} of {} joints; other "
+                    "units, columns or gains? Correct the baseline or remove it (role = \"baseline\")",
+                    strange, judged));
   }
 }
 
 }  // namespace
 
-Diagnosis diagnose(const Project& project, GateData& data, const std::vector<ProcessedLog>& baseline,
+Diagnosis diagnose(const Project& project, GateData& given, const std::vector<ProcessedLog>& given_baseline,
                    const std::vector<ProcessedLog>& test, Progress& progress) {
   const std::size_t n = project.robot.size();
+  const std::vector<bool> still = still_joints(given, given_baseline);
+  if (std::find(still.begin(), still.end(), false) == still.end()) {
+    throw DataError(
+        "not_excited: no joint moves in the train logs (and in the baseline) by more than its encoder's noise; record "
+        "logs in which they do");
+  }
+  std::optional<GateData> frozen;
+  std::vector<ProcessedLog> frozen_baseline;
+  if (any(still)) {
+    frozen = given;
+    frozen_baseline = given_baseline;
+    leave_out(frozen->logs, still);
+    leave_out(frozen_baseline, still);
+  }
+  GateData& data = frozen ? *frozen : given;
+  const std::vector<ProcessedLog>& baseline = frozen ? frozen_baseline : given_baseline;
   Models models;
   models.has_baseline = !baseline.empty();
   SearchSettings settings;
   settings.max_effects = static_cast<std::size_t>(project.diagnose.max_effects);
-  std::vector<SessionLog> logs = sessions(data.logs, baseline, test);
+  std::optional<Session> session;
+  std::vector<SessionLog> logs = sessions(data.logs, baseline, test, session);
   std::vector<std::string> notes;
   // A link encoder shows what bends before any torque is looked at.
   std::vector<EffectCandidate> never;
@@ -392,11 +481,16 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
       model.joints[effect.joint].effects.back().named = false;
     }
   };
+  for (std::size_t j = 0; j < n; ++j) {
+    if (!still[j]) continue;
+    for (const std::string_view effect : joint_effect_names()) never.push_back({std::string(effect), j, {}});
+  }
   if (models.has_baseline) {
     GateData healthy = data;
     healthy.logs = baseline;
     healthy.notes.clear();
     models.healthy = nominal_model(project, healthy, progress);
+    mute(logs, models.healthy, still);
     models.healthy.logs = data.references;
     look_at_links(models.healthy);
     bend_already(models.healthy);
@@ -430,12 +524,14 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
       for (EffectFit& fit : alone.current.body) fit.named = false;
     }
     models.healthy = models.current = alone.current;
-    check_same_robot(models, logs, models.current);
+    check_same_robot(models, logs, still);
     data.notes.insert(data.notes.end(), healthy.notes.begin(), healthy.notes.end());
   } else {
     models.current = nominal_model(project, data, progress);
+    mute(logs, models.current, still);
     look_at_links(models.current);
   }
+  models.current.session = session;
   for (const DeflectionEffect& effect : deflections.found) models.current.joints[effect.joint].effects.push_back(effect.fit);
   const std::vector<VectorXd> plain(n, VectorXd::Zero(1));
   refit(models, logs, plain, 8);
@@ -550,18 +646,20 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
   std::vector<bool> accepted(n), remains(n);
   for (std::size_t j = 0; j < n; ++j) {
     const auto k = static_cast<Index>(j);
-    remains[j] = outcome.lack[j].structured() && held.leftover[k] > (1 - sure_closure) * gap[k];
+    remains[j] = !still[j] && outcome.lack[j].structured() && held.leftover[k] > (1 - sure_closure) * gap[k];
     accepted[j] = closure[k] >= (remains[j] ? sure_closure : least_closure);
   }
 
   // Models: what is not named stays as an unnamed column, since the gate data says it helps.
   for (std::size_t j = 0; j < n; ++j) {
-    for (EffectFit& fit : found.current.joints[j].effects) {
+    auto& effects = found.current.joints[j].effects;
+    for (EffectFit& fit : effects) {
       const bool fixed = std::any_of(models.fixed.begin(), models.fixed.end(), [&](const EffectCandidate& c) {
         return c.joint == j && c.effect == fit.effect;
       });
       if (!fixed) fit.named &= accepted[j];
     }
+    if (still[j]) effects.clear();
   }
   for (std::size_t i = 0; i < groups.size(); ++i) {
     if (!at.groups()[groups[i]].on_body || robot_closure[i] >= least_closure) continue;
@@ -590,7 +688,7 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
     torque_after[l] = predict(result.model, *shown[l]);
   });
   json joints = json::array();
-  bool any_effect = false, any_unexplained = false;
+  bool any_effect = false, any_unexplained = false, any_still = false;
   std::string next;
   const auto advise = [&](const std::string& text) {
     if (!text.empty() && next.find(text) == std::string::npos) next += (next.empty() ? "" : "; ") + text;
@@ -633,6 +731,25 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
   };
   for (std::size_t j = 0; j < n; ++j) {
     const auto k = static_cast<Index>(j);
+    if (still[j]) {
+      json unseen = json::array();
+      for (const std::string_view effect : joint_effect_names()) unseen.push_back(effect);
+      joints.push_back({{"joint", project.robot.joints[j].name},
+                        {"index", j + 1},
+                        {"unit", project.robot.joints[j].torque_unit()},
+                        {"verdict", "not_excited"},
+                        {"gap_before", nullptr},
+                        {"gap_after", nullptr},
+                        {"noise_floor", nullptr},
+                        {"closure", nullptr},
+                        {"where", json::array()},
+                        {"effects", json::array()},
+                        {"resembles", json::array()},
+                        {"not_identifiable", unseen}});
+      advise(fmt::format("record a log in which joint {} moves", j + 1));
+      any_still = true;
+      continue;
+    }
     double before = 0, after = 0, count = 0;
     std::vector<VectorXd> errors;
     for (std::size_t l = 0; l < shown.size(); ++l) {
@@ -725,7 +842,7 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
       if (reached && joint["verdict"] == "nothing_missing") joint["verdict"] = "effects_found";
     }
   }
-  const std::string verdict = any_unexplained ? "unexplained" : any_effect ? "effects_found" : "nothing_missing";
+  const std::string verdict = any_unexplained ? "unexplained" : any_effect ? "effects_found" : any_still ? "not_excited" : "nothing_missing";
   result.report = {{"schema", "fxdyn.diagnosis/1"},
                    {"verdict", verdict},
                    {"joints", joints},
@@ -737,6 +854,7 @@ Diagnosis diagnose(const Project& project, GateData& data, const std::vector<Pro
                    {"baseline", models.has_baseline},
                    {"notes", notes}};
   data.notes.insert(data.notes.end(), notes.begin(), notes.end());
+  given.notes = data.notes;
   progress.done();
   return result;
 }

@@ -44,7 +44,7 @@ class Firmware {
     if (!log.load && !unloaded_) unloaded_ = choose_formats(model);
     const Formats formats = log.load ? choose_formats(model) : *unloaded_;
     const TickStates ticks = at_ticks(log, model.tick_s, true);
-    return at_other_times(interpolate(predict_fixed(model, formats, ticks), ticks.t, log.t),
+    return at_other_times(interpolate(predict_fixed(model, formats, ticks, age_of(model, log)), ticks.t, log.t),
                           model.filter.torque_lead_s / log.step_s);
   }
 

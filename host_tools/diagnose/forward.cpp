@@ -59,7 +59,7 @@ Differences play(const IdentifiedModel& model, const ProcessedLog& log, Index co
   const MotionRows motion = log.motion(log.first, count);
   const MatrixXd feedforward = recorded_torque(model, log).middleRows(log.first, count);
   ClosedLoopSettings settings;
-  settings.age_s = static_cast<double>(log.first) * log.step_s;  // as in predict(): new when the log begins
+  settings.age_s = age_of(model, log) + static_cast<double>(log.first) * log.step_s;  // as in predict()
   const ClosedLoopRun run =
       run_closed_loop(with_load_of(log, model), {log.step_s, motion.q, motion.dq, motion.ddq, feedforward}, settings);
   if (!run.q.allFinite() || !run.tau.allFinite()) throw DataError("the simulated motion grows without bound");

@@ -42,6 +42,8 @@ class FixedModel {
   /// Indices of the joints whose torques tick() gives.
   const std::vector<std::size_t>& outputs() const { return output_joints_; }
   void reset() { evaluator_.reset(); }
+  /// Evaluator::warm_up(); call it before the first tick.
+  void warm_up(double seconds);
   /// One tick: raw states in (see raw_states), raw torques out.
   std::vector<std::int32_t> tick(const std::vector<std::int32_t>& states, Saturations& saturations);
   /// The parameter words of the tables, and the layout that they have.
@@ -71,7 +73,9 @@ QuantisationError quantisation_error(const IdentifiedModel& model, const Formats
                                      const std::vector<TickStates>& states);
 
 /// Torques of the fixed-point model over a log at its own states, samples x joints [N*m | N].
-Eigen::MatrixXd predict_fixed(const IdentifiedModel& model, const Formats& formats, const TickStates& states);
+/// @param age_s how long the robot has run when they begin, see age_of() [s]
+Eigen::MatrixXd predict_fixed(const IdentifiedModel& model, const Formats& formats, const TickStates& states,
+                              double age_s = 0);
 
 /// Writes tables.hpp and tables.bin for a drive that puts out the torques of the joints in `outputs` (bit i: joint
 /// i+1); returns the CRC-32 of the parameters. `proven`: bound of |fixed - double| of each joint.

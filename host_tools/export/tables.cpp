@@ -202,6 +202,11 @@ FixedModel::FixedModel(const IdentifiedModel& model, const Formats& formats, std
   }
 }
 
+void FixedModel::warm_up(double seconds) {
+  const FormatScope scope(formats_);
+  evaluator_.warm_up(seconds);
+}
+
 std::vector<std::int32_t> FixedModel::tick(const std::vector<std::int32_t>& states, Saturations& saturations) {
   const FormatScope scope(formats_);
   std::vector<JointState<RunTimeNumbers>> joints(evaluator_.joints());
@@ -288,8 +293,10 @@ QuantisationError quantisation_error(const IdentifiedModel& model, const Formats
   return out;
 }
 
-Eigen::MatrixXd predict_fixed(const IdentifiedModel& model, const Formats& formats, const TickStates& states) {
+Eigen::MatrixXd predict_fixed(const IdentifiedModel& model, const Formats& formats, const TickStates& states,
+                              double age_s) {
   FixedModel fixed(model, formats);
+  if (age_s > 0) fixed.warm_up(age_s);
   Eigen::MatrixXd out(states.q.rows(), states.q.cols());
   Saturations ignored;
   for (Eigen::Index k = 0; k < out.rows(); ++k) {

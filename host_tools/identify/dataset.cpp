@@ -10,6 +10,7 @@
 #include "host_tools/error.hpp"
 #include "host_tools/log/spectrum.hpp"
 #include "host_tools/model/evaluator.hpp"
+#include "model/catalogue.hpp"
 
 namespace fxdyn {
 namespace {
@@ -142,6 +143,7 @@ MotionRows ProcessedLog::joint_motion(Index joint) const {
 }
 
 bool ProcessedLog::is_saturated(Index joint, Index row) const {
+  if (is_left_out(joint)) return true;
   const auto& runs = saturated[static_cast<std::size_t>(joint)];
   // The filter spreads a sample over about one period of its cut-off.
   const auto reach = static_cast<Index>(1 / (filter.torque_cutoff_hz * step_s));
@@ -304,8 +306,36 @@ IdentifiedModel with_load_of(const ProcessedLog& log, IdentifiedModel model) {
   return model;
 }
 
+double age_of(const IdentifiedModel& model, const ProcessedLog& log) {
+  constexpr double constants_till_cold = 3;
+  if (!model.session || log.t.size() == 0) return 0;
+  double longest = 0;
+  for (const JointFit& joint : model.joints) {
+    for (const EffectFit& fit : joint.effects) {
+      if (fit.effect == FrictionDrift::name) longest = std::max(longest, fit.shape[0]);
+    }
+  }
+  const double start = log.t[0];
+  const bool belongs =
+      start >= model.session->start_s && start <= model.session->end_s + constants_till_cold * longest;
+  return longest > 0 && belongs ? start - model.session->start_s : 0;
+}
+
+std::vector<bool> moving_joints(const std::vector<ProcessedLog>& logs) {
+  std::vector<bool> out(static_cast<std::size_t>(logs.front().q.cols()), false);
+  for (const ProcessedLog& log : logs) {
+    if (log.role != Role::train) continue;
+    // Noise alone looks like motion of a few times what the filter took out.
+    for (std::size_t j = 0; j < out.size(); ++j) {
+      const auto k = static_cast<Index>(j);
+      out[j] = out[j] || log.q_range[k] > std::max(1e-4, 20 * log.q_noise[k]);
+    }
+  }
+  return out;
+}
+
 MatrixXd predict(const IdentifiedModel& model, const ProcessedLog& log) {
-  Predictor predictor(with_load_of(log, model), log.step_s);
+  Predictor predictor(with_load_of(log, model), log.step_s, age_of(model, log));
   constexpr Index block = 8192;
   MatrixXd tau(log.samples(), log.q.cols());
   for (Index from = 0; from < log.samples(); from += block) {

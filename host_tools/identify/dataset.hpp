@@ -34,6 +34,8 @@ struct ProcessedLog {
   Eigen::VectorXd torque_noise;               ///< per joint: noise that stays in the filtered torque, see noise_floor()
   /// Per joint, [from, to) of samples that `identify` must not use: the drive was at its limit.
   std::vector<std::vector<std::array<Eigen::Index, 2>>> saturated;
+  /// Per joint: the fit uses none of its rows, as it stands still in every log; empty: it uses all joints.
+  std::vector<bool> left_out;
   Eigen::Index first = 0, last = 0;  ///< [first, last) is free of filter transients
   Eigen::Index decimation = 1;       ///< rows for fitting: first, first + decimation, ...
   FilterFit filter;
@@ -47,6 +49,7 @@ struct ProcessedLog {
   MotionRows link_motion(Eigen::Index from, Eigen::Index count) const;
   /// One joint's motion, all samples.
   MotionRows joint_motion(Eigen::Index joint) const;
+  bool is_left_out(Eigen::Index joint) const { return !left_out.empty() && left_out[static_cast<std::size_t>(joint)]; }
   /// Whether decimated row `row` of the joint is next to a saturated sample.
   bool is_saturated(Eigen::Index joint, Eigen::Index row) const;
 
@@ -89,8 +92,16 @@ ProcessedLog process(Log log, const FilterFit& filter, const ProcessSettings& se
 /// The model with the log's known load on the flange.
 IdentifiedModel with_load_of(const ProcessedLog& log, IdentifiedModel model);
 
-/// Torques of the model over a log, block by block, with the log's known load and at the times at which the log's
-/// torque column shows them (torque_lead_s of the model's filter): samples x joints [N*m | N].
+/// How long the robot has run when the log begins: since the start of the model's session, where the log's time stamps
+/// say that it belongs to it (up to three of the drift's time constants after its end) and the model drifts; else 0 [s].
+double age_of(const IdentifiedModel& model, const ProcessedLog& log);
+
+/// Whether each joint moves in the train logs by more than its encoder's noise.
+std::vector<bool> moving_joints(const std::vector<ProcessedLog>& logs);
+
+/// Torques of the model over a log, block by block, with the log's known load, as warm as the robot was
+/// (age_of()), and at the times at which the log's torque column shows them (torque_lead_s of the model's filter):
+/// samples x joints [N*m | N].
 Eigen::MatrixXd predict(const IdentifiedModel& model, const ProcessedLog& log);
 
 }  // namespace fxdyn

@@ -41,6 +41,7 @@ std::vector<WeakParameter> weak_in_logs(const Fitter& fitter, const Solution& so
   for (const ProcessedLog& log : fitter.logs()) {
     if (log.role != Role::train) continue;
     for (Index j = 0; j < n; ++j) {
+      if (log.is_left_out(j)) continue;
       const JointFit& joint = fitter.design(static_cast<std::size_t>(j));
       const double fastest = log.joint_motion(j).dq.cwiseAbs().maxCoeff();
       movement[j] = std::max(movement[j], log.q_range[j] / (joint.q_upper - joint.q_lower) * fastest / joint.dq_limit);

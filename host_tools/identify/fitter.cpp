@@ -85,16 +85,11 @@ Fitter::Fitter(const Robot& robot, const std::vector<ProcessedLog>& logs, std::v
   const auto nb = static_cast<Eigen::Index>(columns.size());
   const auto per_link = static_cast<Eigen::Index>(parameters_per_link);
 
+  const std::vector<bool> moving = moving_joints(logs);
   for (Eigen::Index j = 0; j < n; ++j) {
-    double range = 0;
-    bool moves = false;
-    for (const ProcessedLog& log : logs) {
-      if (log.role != Role::train) continue;
-      range = std::max(range, log.q_range[j]);
-      // Noise alone looks like motion of a few times what the filter took out.
-      moves |= log.q_range[j] > std::max(1e-4, 20 * log.q_noise[j]);
-    }
-    if (!moves) {
+    if (!moving[static_cast<std::size_t>(j)] && !logs.front().is_left_out(j)) {
+      double range = 0;
+      for (const ProcessedLog& log : logs) range = std::max(range, log.role == Role::train ? log.q_range[j] : 0.0);
       throw DataError(
           fmt::format("joint {} ({}) never moves in the train logs (range {:.1e} {}): record a log in which it does",
                       j + 1, robot.joints[static_cast<std::size_t>(j)].name, range,
@@ -165,6 +160,8 @@ Fitter::Fitter(const Robot& robot, const std::vector<ProcessedLog>& logs, std::v
   });
   for (std::size_t l = 0; l < logs.size(); ++l) {
     for (Eigen::Index j = 0; j < n; ++j) {
+      if (logs[l].is_left_out(j))
+        data->usable[static_cast<std::size_t>(j)].segment(data->first_row[l], logs[l].rows()).setZero();
       if (logs[l].saturated[static_cast<std::size_t>(j)].empty()) continue;
       for (Eigen::Index r = 0; r < logs[l].rows(); ++r) {
         if (logs[l].is_saturated(j, r)) data->usable[static_cast<std::size_t>(j)][data->first_row[l] + r] = 0;

@@ -272,7 +272,7 @@ std::vector<JointFit> initial_joints(const Project& project, const GateData& dat
         joint.q_upper = std::max(urdf->upper, data.q_upper[k]);
       }
     }
-    joint.sign_width = 0.01 * data.dq[k];
+    joint.sign_width = std::max(0.01 * data.dq[k], 1e-6);  // of a joint at rest
   }
   return joints;
 }
@@ -308,6 +308,7 @@ std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progres
   for (std::size_t j = 0; j < n; ++j) {
     const auto k = static_cast<Eigen::Index>(j);
     scales.push_back({data.dq[k], data.q_upper[k] - data.q_lower[k]});
+    if (data.logs.front().is_left_out(k)) continue;
     for (const std::string& effect : nominal) {
       if (effect == "rotor_inertia" && rotor_inertia_is_absorbed(chain, base, k)) continue;
       if (find_effect(effect)->shape.empty()) {
@@ -322,7 +323,7 @@ std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progres
   const std::vector<Eigen::Index> saturated = fitter->saturated_rows();
   for (std::size_t j = 0; j < n; ++j) {
     const double share = static_cast<double>(saturated[j]) / static_cast<double>(fitter->rows());
-    if (share < most_saturated) continue;
+    if (share < most_saturated || data.logs.front().is_left_out(static_cast<Eigen::Index>(j))) continue;
     throw DataError(fmt::format(
         "torque of joint {} ({}) is at its limit for {:.0f} % of the logs: record with less load or speed, or "
         "check torque_gain",
@@ -349,11 +350,13 @@ std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progres
     progress.stage(stage, n);
     const std::vector<Judgement> before = fitter->held_out();
     std::vector<Candidate> best(n);
+    const auto left_out = [&](std::size_t j) { return data.logs.front().is_left_out(static_cast<Eigen::Index>(j)); };
     parallel_for(n, [&](std::size_t j) {
-      best[j] = propose(j);
+      if (!left_out(j)) best[j] = propose(j);
       progress.step();
     });
     for (std::size_t j = 0; j < n; ++j) {
+      if (left_out(j)) continue;
       if (always || best[j].judgement.beats(before[j], worth_keeping)) fitter->set_design(j, best[j].design);
     }
     if (weighted) fitter->reweight();
@@ -456,7 +459,8 @@ Estimate finish_model(const Fitter& fitter, const Project& project, const GateDa
   std::string untold;
   Eigen::Index to_move = 0;
   for (const WeakParameter& one : out.weak) {
-    if (one.identifiable) continue;
+    // With a joint at rest the bodies on either side of it can't be told apart; that is asked for.
+    if (one.identifiable || !data.logs.front().left_out.empty()) continue;
     untold += (untold.empty() ? "" : ", ") + one.name;
     to_move = one.joint;
   }

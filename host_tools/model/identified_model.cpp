@@ -296,6 +296,7 @@ json to_json(const IdentifiedModel& model) {
               {"log_formats", log_formats},
               {"logs", logs},
               {"notes", model.notes}};
+  if (model.session) out["session"] = {{"start_s", model.session->start_s}, {"end_s", model.session->end_s}};
   if (model.formats) {
     out["formats"] = formats_json(*model.formats);
     out["tables_crc"] = model.tables_crc;
@@ -341,6 +342,7 @@ IdentifiedModel read_model(const std::filesystem::path& file) {
                                  format.at("torque_gain").get<std::vector<double>>()};
     }
     model.stage = j.at("stage");
+    if (j.contains("session")) model.session = {j.at("session").at("start_s"), j.at("session").at("end_s")};
     model.notes = j.value("notes", std::vector<std::string>{});
     if (j.contains("formats")) {
       model.formats = to_formats(j.at("formats"));

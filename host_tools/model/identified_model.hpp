@@ -82,6 +82,11 @@ struct LogReference {
   double from_s = 0, to_s = 0;
 };
 
+/// When the robot ran, by the logs' own time stamps: what drifts has done so since the start.
+struct Session {
+  double start_s = 0, end_s = 0;
+};
+
 /// Everything that predict, export and simulate need: the content of model.json.
 struct IdentifiedModel {
   Robot robot;
@@ -97,7 +102,8 @@ struct IdentifiedModel {
   std::string project, project_hash;
   std::vector<LogReference> logs;
   std::vector<std::string> notes;    ///< what a reader should know of data and fit
-  std::string stage = "identified";  ///< or "trained"
+  std::string stage = "identified";  ///< or "diagnosed", "trained"
+  std::optional<Session> session;    ///< of the diagnosed logs, where their windows do not overlap
   /// Of the exported tables; a stage that changes the model drops them.
   std::optional<Formats> formats;
   std::uint32_t tables_crc = 0;

@@ -15,6 +15,7 @@
 #include "host_tools/report/metrics.hpp"
 #include "host_tools/report/report.hpp"
 #include "host_tools/robot/write_urdf.hpp"
+#include "host_tools/train/kept_effects.hpp"
 #include "host_tools/train/train.hpp"
 
 namespace fxdyn {
@@ -73,18 +74,45 @@ GateData& Pipeline::data() {
   if (!data_) {
     progress_.stage("reading and filtering the logs", 1);
     data_ = std::make_unique<GateData>(read_gate_data(project_, directory_));
+    data_notes_ = data_->notes;
     progress_.step();
     progress_.done();
   }
   return *data_;
 }
 
-bool Pipeline::is_current(const IdentifiedModel& model) {
-  if (model.project_hash != project_hash(project_) || model.logs.size() != data().references.size()) return false;
-  for (std::size_t i = 0; i < model.logs.size(); ++i) {
-    if (model.logs[i].hash != data().references[i].hash) return false;
+const std::vector<LogReference>& Pipeline::diagnosed_logs() {
+  if (!diagnosed_logs_) {
+    diagnosed_logs_ = data().references;
+    for (const Log& log : read_logs(project_, Role::baseline, directory_))
+      diagnosed_logs_->push_back(
+          {log.file.filename().string(), to_string(log.role), hash_of_file(log.file), log.from_s, log.to_s});
   }
-  return true;
+  return *diagnosed_logs_;
+}
+
+bool Pipeline::is_current(const IdentifiedModel& model) {
+  if (model.project_hash != project_hash(project_)) return false;
+  const auto& made_from = model.stage == "identified" ? data().references : diagnosed_logs();
+  return std::equal(model.logs.begin(), model.logs.end(), made_from.begin(), made_from.end(),
+                    [](const LogReference& a, const LogReference& b) { return a.hash == b.hash; });
+}
+
+std::optional<IdentifiedModel> Pipeline::written(std::initializer_list<std::string_view> stages) {
+  const fs::path file = directory_ / "model.json";
+  if (!fs::exists(file)) return {};
+  IdentifiedModel model = read_model(file);
+  const bool wanted = std::find(stages.begin(), stages.end(), model.stage) != stages.end();
+  return wanted && is_current(model) ? std::optional(std::move(model)) : std::nullopt;
+}
+
+void Pipeline::check_motion() {
+  const std::vector<bool> moving = moving_joints(data().logs);
+  for (std::size_t j = 0; j < moving.size(); ++j) {
+    if (moving[j]) continue;
+    throw DataError(fmt::format("joint {} ({}) never moves in the train logs: record a log in which it does", j + 1,
+                                project_.robot.joints[j].name));
+  }
 }
 
 std::vector<ProcessedLog> Pipeline::logs(Role role) {
@@ -103,41 +131,22 @@ json Pipeline::stage_metrics(const IdentifiedModel& model, const std::string& st
   return {{"stage", stage}, {"logs", list}};
 }
 
-void Pipeline::finish(const Fitter& fitter, Stage stage, const json& training) {
-  progress_.stage("fit, standard deviations, possible bodies", 1);
-  Estimate estimate = finish_model(fitter, project_, data());
-  progress_.step();
-  IdentifiedModel& model = estimate.model;
-  if (stage == Stage::identified) data().notes = model.notes;
-  if (const std::string weak = weak_note(estimate.weak, project_.robot); stage == Stage::identified && !weak.empty()) {
-    data().notes.push_back(weak);
-    model.notes.push_back(weak);
+/// The same structure without effects and BLS, refitted.
+json Pipeline::rigid_metrics(Fitter fitter) {
+  for (std::size_t j = 0; j < fitter.joints(); ++j) {
+    JointFit design = fitter.design(j);
+    design.bls.reset();
+    design.effects.clear();
+    fitter.set_design(j, design);
   }
-  model.stage = stage == Stage::trained ? "trained" : "identified";
-  // The same structure with less: what friction and BLS are worth is seen on the same logs.
-  const auto reduced = [&](bool friction) {
-    Fitter less = fitter;
-    for (std::size_t j = 0; j < less.joints(); ++j) {
-      JointFit design = less.design(j);
-      design.bls.reset();
-      if (!friction) design.effects.clear();
-      less.set_design(j, design);
-    }
-    weigh(less, project_.identify);
-    IdentifiedModel out = friction ? finish_model(less, project_, data()).model : less.to_model(less.estimate());
-    out.filter = model.filter;
-    return out;
-  };
-  progress_.stage("errors on all logs", stage == Stage::trained ? 3 : 2);
-  json stages = json::array({stage_metrics(reduced(false), "rigid")});
-  progress_.step();
-  stages.push_back(stage_metrics(stage == Stage::trained ? reduced(true) : model, "friction"));
-  progress_.step();
-  if (stage == Stage::trained) {
-    stages.push_back(stage_metrics(model, "bls"));
-    progress_.step();
-  }
-  progress_.done();
+  weigh(fitter, project_.identify);
+  IdentifiedModel rigid = fitter.to_model(fitter.estimate());
+  rigid.filter = data().filter;
+  rigid.filter.torque_lead_s = fitter.torque_lead_s();
+  return stage_metrics(rigid, "rigid");
+}
+
+json Pipeline::fit_metrics(const Fitter& fitter, const Estimate& estimate, const json& stages) {
   json metrics = {
       {"schema", "fxdyn.metrics/1"}, {"gate", fitter.gate()},         {"base_parameters", fitter.base().columns.size()},
       {"notes", data().notes},       {"logs", stages.back()["logs"]}, {"stages", stages}};
@@ -152,37 +161,38 @@ void Pipeline::finish(const Fitter& fitter, Stage stage, const json& training) {
   }
   const std::vector<Eigen::Index> saturated = fitter.saturated_rows();
   metrics["saturated_rows"] = std::vector<std::int64_t>(saturated.begin(), saturated.end());
-  if (estimate.physical) metrics["physical"] = physical_json(project_.robot, to_dh(project_.robot), *estimate.physical);
-  if (estimate.recursion) metrics["recursive"] = recursion_json(*estimate.recursion, project_.identify.forgetting);
-  if (!training.is_null()) metrics["training"] = training;
   if (estimate.physical) {
+    metrics["physical"] = physical_json(project_.robot, to_dh(project_.robot), *estimate.physical);
     write_urdf(project_.urdf, directory_ / "identified.urdf", project_.robot, to_dh(project_.robot),
                estimate.physical->inertia);
   }
-  write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
-  write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
-  if (stage == Stage::identified) {
-    for (const std::string& note : data().notes) fmt::print(stderr, "note: {}\n", note);
-  }
-}
-
-std::unique_ptr<Fitter> Pipeline::fitter_from(const IdentifiedModel& model) {
-  // What a link encoder gave is found again from it.
-  std::vector<JointFit> design = model.joints;
-  for (JointFit& joint : design)
-    std::erase_if(joint.effects, [](const EffectFit& fit) { return fit.effect == Elasticity::name; });
-  auto fitter = std::make_unique<Fitter>(project_.robot, data().logs, design);
-  fitter->set_torque_lead(model.filter.torque_lead_s);
-  weigh(*fitter, project_.identify);
-  return fitter;
+  if (estimate.recursion) metrics["recursive"] = recursion_json(*estimate.recursion, project_.identify.forgetting);
+  return metrics;
 }
 
 void Pipeline::identify() {
+  data().notes = data_notes_;
   const auto fitter = fxdyn::identify(project_, data(), progress_);
-  finish(*fitter, Stage::identified, {});
+  progress_.stage("fit, standard deviations, possible bodies", 1);
+  Estimate estimate = finish_model(*fitter, project_, data());
+  progress_.step();
+  IdentifiedModel& model = estimate.model;
+  if (const std::string weak = weak_note(estimate.weak, project_.robot); !weak.empty()) model.notes.push_back(weak);
+  data().notes = model.notes;
+  progress_.stage("errors on all logs", 2);
+  json stages = json::array({rigid_metrics(*fitter)});
+  progress_.step();
+  stages.push_back(stage_metrics(model, "friction"));
+  progress_.step();
+  progress_.done();
+  const json metrics = fit_metrics(*fitter, estimate, stages);
+  write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
+  write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
+  for (const std::string& note : data().notes) fmt::print(stderr, "note: {}\n", note);
 }
 
 void Pipeline::diagnose() {
+  data().notes = data_notes_;
   std::vector<ProcessedLog> baseline;
   for (Log& log : read_logs(project_, Role::baseline, directory_)) {
     log.role = Role::train;  // what the healthy session is fitted on
@@ -192,8 +202,10 @@ void Pipeline::diagnose() {
   IdentifiedModel model = diagnosis.model;
   model.stage = "diagnosed";
   model.notes = data().notes;
+  IdentifiedModel nominal = diagnosis.nominal;
+  model.logs = nominal.logs = diagnosed_logs();
   progress_.stage("errors on all logs, fixed point, closed loop, plots", 4);
-  json stages = json::array({stage_metrics(diagnosis.nominal, "friction")});
+  json stages = json::array({stage_metrics(nominal, "friction")});
   progress_.step();
   stages.push_back(stage_metrics(model, "diagnosed"));
   progress_.step();
@@ -201,18 +213,25 @@ void Pipeline::diagnose() {
   std::vector<ProcessedLog> held_out = logs(Role::test);
   if (held_out.empty()) held_out = logs(Role::validate);
   json report = diagnosis.report;
-  report["evidence"] = evidence_json(diagnosis.nominal, model, held_out);
+  report["evidence"] = evidence_json(nominal, model, held_out);
   progress_.step();
-  write_diagnosis_plots(diagnosis.nominal, model, held_out, report, directory_);
-  progress_.step();
-  progress_.done();
   const json metrics = {{"schema", "fxdyn.metrics/1"},          {"gate", diagnosis.report.at("gate")},
                         {"base_parameters", model.base.size()}, {"notes", data().notes},
                         {"logs", stages.back()["logs"]},        {"stages", stages}};
-  write_file(directory_ / "nominal.json", to_json(diagnosis.nominal).dump(1) + "\n");
-  write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
+  write_file(directory_ / "nominal.json", to_json(nominal).dump(1) + "\n");
   write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
   write_file(directory_ / "diagnosis.json", report.dump(1) + "\n");
+  write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
+  std::string no_plots;
+  try {
+    write_diagnosis_plots(nominal, model, held_out, report, directory_);
+  } catch (const InputError& error) {
+    no_plots = error.what();  // the answer stands without them
+  }
+  progress_.step();
+  progress_.done();
+  for (const std::string& note : data().notes) fmt::print(stderr, "note: {}\n", note);
+  if (!no_plots.empty()) fmt::print(stderr, "note: no plots of the diagnosis: {}\n", no_plots);
 }
 
 void Pipeline::train() {
@@ -222,16 +241,35 @@ void Pipeline::train() {
         fmt::format("{}: train.inputs = \"{}\" with activation \"{}\" is not built yet; use \"physical\" and \"tanh\"",
                     project_.file.string(), settings.inputs, settings.activation));
   }
-  const fs::path file = directory_ / "model.json";
-  if (!fs::exists(file) || !is_current(read_model(file))) identify();
-  // Always from the file: `fxdyn run` gives the same bytes as the verbs one by one.
-  IdentifiedModel identified = read_model(file);
-  for (JointFit& joint : identified.joints) joint.bls.reset();
-  data().notes = identified.notes;
-  const auto fitter = fitter_from(identified);
+  check_motion();
+  if (!written({"diagnosed", "trained"})) diagnose();
+  // Always from the files: `fxdyn run` gives the same bytes as the verbs one by one.
+  const IdentifiedModel diagnosed = read_model(directory_ / "model.json");
+  json stages = json::array();
+  if (const fs::path file = directory_ / "metrics.json"; fs::exists(file)) {
+    const json before = json::parse(read_file(file));
+    for (const json& stage : before.at("stages")) {
+      if (stage.at("stage") == "friction" || stage.at("stage") == "diagnosed") stages.push_back(stage);
+    }
+  }
+  data().notes = diagnosed.notes;
+  const KeptEffects kept(diagnosed, data().logs);
+  kept.mark_hidden(data().logs);
+  progress_.stage("building the regressor", 1);
+  Fitter fitter(project_.robot, data().logs, kept.design());
+  fitter.set_torque_lead(diagnosed.filter.torque_lead_s);
+  weigh(fitter, project_.identify);
+  progress_.step();
+  const json rigid = rigid_metrics(fitter);
+  // The kept effects follow the rigid body that is fitted beside them.
+  const auto follow = [&](const IdentifiedModel& model) {
+    fitter.set_torque_lead(diagnosed.filter.torque_lead_s, kept.torque(model, data().logs));
+    weigh(fitter, project_.identify);
+  };
+  follow(diagnosed);
   json training = json::array();
-  if (project_.train.enabled) {
-    const auto outcomes = fxdyn::train(*fitter, project_.train, progress_);
+  if (settings.enabled) {
+    const auto outcomes = fxdyn::train(fitter, settings, progress_);
     for (std::size_t j = 0; j < outcomes.size(); ++j) {
       training.push_back({{"joint", project_.robot.joints[j].name},
                           {"index", j + 1},
@@ -240,19 +278,32 @@ void Pipeline::train() {
                           {"held_out_with", outcomes[j].error_with},
                           {"kept", outcomes[j].kept}});
     }
-    weigh(*fitter, project_.identify);
   }
-  finish(*fitter, Stage::trained, training);
+  progress_.stage("fit, standard deviations, possible bodies", 2);
+  IdentifiedModel fitted = kept.restore(fitter.to_model(fitter.estimate()));
+  fitted.filter = diagnosed.filter;
+  follow(fitted);
+  progress_.step();
+  Estimate estimate = finish_model(fitter, project_, data());
+  IdentifiedModel& model = estimate.model;
+  model = kept.restore(std::move(model));
+  model.stage = "trained";
+  progress_.step();
+  progress_.stage("errors on all logs", 1);
+  stages.insert(stages.begin(), rigid);
+  stages.push_back(stage_metrics(model, "bls"));
+  progress_.step();
+  progress_.done();
+  json metrics = fit_metrics(fitter, estimate, stages);
+  metrics["training"] = training;
+  write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
+  write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
 }
 
 IdentifiedModel Pipeline::model() {
-  const fs::path file = directory_ / "model.json";
-  if (fs::exists(file)) {
-    IdentifiedModel model = read_model(file);
-    if (is_current(model) && model.stage == "trained") return model;
-  }
+  if (auto model = written({"trained"})) return *std::move(model);
   train();
-  return read_model(file);
+  return read_model(directory_ / "model.json");
 }
 
 void Pipeline::export_tables() {
@@ -355,7 +406,8 @@ void Pipeline::report() {
 
 void Pipeline::run() {
   fs::create_directories(directory_);  // fails now rather than after the work
-  identify();
+  check_motion();
+  diagnose();
   train();
   export_tables();
   report();
@@ -401,7 +453,7 @@ void predict_log(const fs::path& model_file, const fs::path& log_file, bool fixe
       throw InputError(fmt::format("{}: has no fixed-point formats; run `fxdyn export` first", model_file.string()));
     // At the drive's ticks, as the firmware computes; then back to the log's samples.
     const TickStates ticks = at_ticks(processed, model.tick_s, true);
-    torque = at_other_times(interpolate(predict_fixed(model, *model.formats, ticks), ticks.t, processed.t),
+    torque = at_other_times(interpolate(predict_fixed(model, *model.formats, ticks, age_of(model, processed)), ticks.t, processed.t),
                             model.filter.torque_lead_s / processed.step_s);
   } else {
     torque = predict(model, processed);

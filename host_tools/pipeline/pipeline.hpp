@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 
 #include "host_tools/identify/identify.hpp"
 
@@ -16,9 +17,12 @@ class Pipeline {
   void identify();
   /// Always from base parameters and nominal effects; needs nothing of the stages before.
   void diagnose();
+  /// From the diagnosed model.
   void train();
   void export_tables();
   void report();
+  /// The bytes of all stages one after another. What identify writes, diagnose writes anew without reading it: that
+  /// stage is left out.
   void run();
 
   const Project& project() const { return project_; }
@@ -29,16 +33,23 @@ class Pipeline {
   std::vector<ProcessedLog> logs(Role role);
 
  private:
-  enum class Stage { identified, trained };
   GateData& data();
+  /// References of train, validate and baseline logs: what a diagnosed model depends on.
+  const std::vector<LogReference>& diagnosed_logs();
   bool is_current(const IdentifiedModel& model);
-  std::unique_ptr<Fitter> fitter_from(const IdentifiedModel& model);
-  void finish(const Fitter& fitter, Stage stage, const nlohmann::json& training);
+  /// DIR/model.json, if it is current and one of these stages made it.
+  std::optional<IdentifiedModel> written(std::initializer_list<std::string_view> stages);
+  void check_motion();
   nlohmann::json stage_metrics(const IdentifiedModel& model, const std::string& stage);
+  nlohmann::json rigid_metrics(Fitter fitter);
+  /// Of a fit: what metrics.json and DIR hold beside the model.
+  nlohmann::json fit_metrics(const Fitter& fitter, const Estimate& estimate, const nlohmann::json& stages);
 
   Project project_;
   std::filesystem::path directory_;
   std::unique_ptr<GateData> data_;
+  std::vector<std::string> data_notes_;  ///< of reading the logs alone
+  std::optional<std::vector<LogReference>> diagnosed_logs_;
   Progress progress_;
 };
 

@@ -13,10 +13,10 @@ namespace fs = std::filesystem;
 /// What the BLS did to a joint's error on the shown logs: "-85 %", or "not kept" where validation said no.
 std::string bls_verdict(const json& metrics, const std::string& role, std::size_t joint) {
   const json& stages = metrics.at("stages");
-  if (!metrics.contains("training") || joint >= metrics.at("training").size() || stages.size() < 3) return "";
+  if (!metrics.contains("training") || joint >= metrics.at("training").size() || stages.size() < 2) return "";
   if (!metrics.at("training").at(joint).at("kept").get<bool>()) return "not kept";
-  const double before = pooled_error(stages.at(1).at("logs"), role, joint).rmse;
-  const double after = pooled_error(stages.at(2).at("logs"), role, joint).rmse;
+  const double before = pooled_error(stages.at(stages.size() - 2).at("logs"), role, joint).rmse;
+  const double after = pooled_error(stages.back().at("logs"), role, joint).rmse;
   return before > 0 ? fmt::format("{:+.0f} %", 100 * (after / before - 1)) : "";
 }
 

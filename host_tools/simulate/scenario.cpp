@@ -47,7 +47,8 @@ void read_effect(Table table, Scenario& scenario) {
       joint_value.place().fail(fmt::format("the robot has {} joints", scenario.plant.robot.size()));
     }
     target = &scenario.plant.joints[joint - 1];
-    if (target->find(fit.effect) != nullptr)
+    const bool several = fit.effect == Ripple::name || fit.effect == JointCoupling::name;
+    if (!several && target->find(fit.effect) != nullptr)
       joint_value.place().fail(fmt::format("joint {} has {} already", joint, fit.effect));
   }
   Table parameters(table.need("parameters", "as in { amplitude = 2.0 }"));
