@@ -126,14 +126,14 @@ void mute(std::vector<SessionLog>& logs, const IdentifiedModel& model, const std
   }
 }
 
-IdentifiedModel nominal_model(Project project, GateData& data, Progress& progress) {
+IdentifiedModel nominal_model(Project project, GateData& data, bool healthy, Progress& progress) {
   if (!project.identify.effects) project.identify.effects = {"viscous", "coulomb", "offset", "rotor_inertia"};
   project.identify.physical = false;
   project.identify.essential = false;
   if (project.identify.method == "rls") project.identify.method = "wls";
   const auto fitter = identify(project, data, progress);
-  if (fitter->torque_lead_s() < 0 && !project.signals.torque_lead_s) {
-    // Torque that comes late is an effect with a name.
+  if (fitter->torque_lead_s() < 0 && !project.signals.torque_lead_s && !healthy) {
+    // Torque that comes late is an effect with a name; but for a healthy robot it is how its signals are sampled.
     fitter->set_torque_lead(0);
     weigh(*fitter, project.identify);
     std::erase_if(data.notes, [](const std::string& note) { return note.starts_with("the torque column is"); });
@@ -454,6 +454,10 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
   models.has_baseline = !baseline.empty();
   SearchSettings settings;
   settings.max_effects = static_cast<std::size_t>(project.diagnose.max_effects);
+  settings.most = 2 + 2 * n;
+  SearchSettings modest = settings;  // a background need not be named, only taken out
+  modest.max_effects = std::min<std::size_t>(2, settings.max_effects);
+  modest.most = std::max<std::size_t>(2, n);
   std::optional<Session> session;
   std::vector<SessionLog> logs = sessions(data.logs, baseline, test, session);
   std::vector<std::string> notes;
@@ -489,7 +493,7 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
     GateData healthy = data;
     healthy.logs = baseline;
     healthy.notes.clear();
-    models.healthy = nominal_model(project, healthy, progress);
+    models.healthy = nominal_model(project, healthy, true, progress);
     mute(logs, models.healthy, still);
     models.healthy.logs = data.references;
     look_at_links(models.healthy);
@@ -510,7 +514,7 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
     look_for_lack(background);
     const bool structured = std::any_of(background.lack.begin(), background.lack.end(), [](const LackOfFit& l) { return l.structured(); });
     if (structured) {
-      background = explore(alone, before, settings, never, progress);
+      background = explore(alone, before, modest, never, progress);
       alone = background.models;
       for (std::size_t j = 0; j < n; ++j) {
         for (EffectFit& fit : alone.current.joints[j].effects) {
@@ -527,7 +531,7 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
     check_same_robot(models, logs, still);
     data.notes.insert(data.notes.end(), healthy.notes.begin(), healthy.notes.end());
   } else {
-    models.current = nominal_model(project, data, progress);
+    models.current = nominal_model(project, data, false, progress);
     mute(logs, models.current, still);
     look_at_links(models.current);
   }

@@ -132,6 +132,7 @@ bool Search::allowed(const Choice& state, std::size_t g) const {
       if (!elsewhere && std::find(state.groups.begin(), state.groups.end(), i) == state.groups.end()) return false;
     }
   }
+  if (state.groups.size() >= settings_.most) return false;
   std::size_t here = 0, robot = 0;
   for (const std::size_t other : state.groups) {
     const Group& o = at_.groups()[other];
