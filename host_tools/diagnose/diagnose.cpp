@@ -39,6 +39,8 @@ constexpr double rows_per_period = 2.5;
 /// Squared share of a column that is left: less can't be told from the nominal model.
 constexpr double nothing_left = 1e-5;
 constexpr int most_passes = 3;
+/// Into which a single log is cut, as the search does.
+constexpr int blocks_of_one_log = 5;
 
 /// The logs with their ages, and the session that all of them but the healthy ones belong to: one where no two windows
 /// overlap in time; else every log starts its own.
@@ -63,6 +65,19 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
   for (const ProcessedLog& log : now) add(log, false, one ? windows.front()[0] : log.t[0]);
   for (const ProcessedLog& log : before) add(log, true, log.t[0]);
   return out;
+}
+
+/// Without a log that judges and with one trajectory only, its blocks have to.
+void check_splits(const std::vector<ProcessedLog>& logs) {
+  constexpr double shortest_s = 1;
+  if (logs.size() > 1) return;
+  const ProcessedLog& log = logs.front();
+  const double seconds = static_cast<double>(log.last - log.first) * log.step_s;
+  if (seconds >= blocks_of_one_log * shortest_s) return;
+  throw DataError(
+      fmt::format("{}: {:.1f} s (after filtering) are too short to split into {} blocks that judge one another: record "
+                  "{:.0f} s or more, or add a log with role = \"validate\"",
+                  log.name, seconds, blocks_of_one_log, 4 * blocks_of_one_log * shortest_s));
 }
 
 /// Joints that this motion tells nothing of: they stand still, or as good as, beside what the encoder's noise looks like.
@@ -440,7 +455,11 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
     GateData healthy = data;
     healthy.logs = baseline;
     healthy.notes.clear();
-    models.healthy = nominal_model(project, healthy, progress);
+    try {
+      models.healthy = nominal_model(project, healthy, progress);
+    } catch (const DataError& error) {
+      throw DataError(fmt::format("role = \"baseline\": {}", error.what()));
+    }
     mute(logs, models.healthy, still);
     models.healthy.logs = data.references;
     // What the healthy session has that is not nominal is its background: learned, not reported.
@@ -476,6 +495,7 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
     models.current = nominal_model(project, data, progress);
     mute(logs, models.current, still);
   }
+  check_splits(data.logs);
   models.current.session = session;
   refit(models, logs, {}, 8);
   Diagnosis result;
