@@ -4,7 +4,7 @@
 set -u
 fxdyn=$1
 work=$(mktemp -d)
-trap "echo $work" EXIT
+trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
 failures=0
 fail() {
@@ -77,15 +77,12 @@ for effect in presliding delay payload; do named run/model.json $effect 1; done
 grep -q '"stage": "trained"' run/model.json || fail "not trained"
 for stage in rigid friction diagnosed bls; do grep -q "\"stage\": \"$stage\"" run/metrics.json || fail "no stage $stage"; done
 "$fxdyn" predict --model run/model.json --log c.csv --numbers fixed --out prediction >/dev/null 2>&1 || fail "predict"
-for numbers in prediction/metrics.json; do
-  worst=$(grep -o '"relative": [0-9.e-]*' $numbers | awk '{ if ($2 > w) w = $2 } END { print w }')
-  awk -v w="$worst" 'BEGIN { exit !(w < 0.02) }' || fail "fixed point: relative error $worst with the named effects"
-done
+worst=$(grep -o '"relative": [0-9.e-]*' prediction/metrics.json | awk '{ if ($2 > w) w = $2 } END { print w }')
+awk -v w="$worst" 'BEGIN { exit !(w < 0.02) }' || fail "fixed point: relative error $worst with the named effects"
 # A changed baseline makes the model another one.
-before=$(grep -c . run/model.json)
 project good a.csv train b.csv validate c.csv test h.csv baseline
 "$fxdyn" export good.toml --out run >/dev/null 2>&1 || fail "export after the project changed"
-[ "$(grep -c '"role": "baseline"' run/model.json)" -eq 1 ] || fail "the model is not of the project's baseline ($before)"
+[ "$(grep -c '"role": "baseline"' run/model.json)" -eq 1 ] || fail "the model is not of the project's baseline"
 
 # No log that judges: blocks of the train log, and it says so.
 project blocks a.csv train

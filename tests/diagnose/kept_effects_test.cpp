@@ -78,7 +78,7 @@ TEST(KeptEffects, ComeBackInTheirPlacesWithTheirStandardDeviations) {
   EffectFit& ripple = fitted.joints[1].effects.back();
   ASSERT_EQ(ripple.effect, "ripple");
   ripple.linear = {0.5, 0.2};
-  ripple.shape_std.clear();  // not estimated by the fit
+  ripple.shape_std.clear();                                                // not estimated by the fit
   fitted.joints[0].effects.push_back(named("elasticity", {0.1}, {5e-3}));  // a link encoder's
   const IdentifiedModel model = kept.restore(fitted);
   ASSERT_EQ(model.body.size(), 2U);
