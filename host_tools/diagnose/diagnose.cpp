@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 
+#include "host_tools/diagnose/deflection.hpp"
 #include "host_tools/diagnose/lack_of_fit.hpp"
 #include "host_tools/diagnose/linearised.hpp"
 #include "host_tools/diagnose/refit.hpp"
@@ -36,9 +37,13 @@ constexpr double least_closure = 0.5;
 constexpr double sure_closure = 0.8;
 /// Rows a period of the torque cut-off: two would be Nyquist's.
 constexpr double rows_per_period = 2.5;
+/// Faster than this there is nothing that these rules could name, and many rows.
+constexpr double highest_cutoff_hz = 40;
 /// Squared share of a column that is left: less can't be told from the nominal model.
 constexpr double nothing_left = 1e-5;
-constexpr int most_passes = 3;
+constexpr int most_passes = 2;
+/// A residual of that many times the noise is mostly gap.
+constexpr double much_more = 3;
 /// Into which a single log is cut, as the search does.
 constexpr int blocks_of_one_log = 5;
 
@@ -57,9 +62,11 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
   std::vector<SessionLog> out;
   const auto add = [&](const ProcessedLog& log, bool healthy, double start) {
     SessionLog entry{log, healthy, healthy || log.role == Role::train, std::max(0.0, log.t[0] - start)};
+    double& cutoff = entry.log.filter.torque_cutoff_hz;
+    cutoff = std::min(cutoff, highest_cutoff_hz);
     entry.log.decimation = std::max<Index>(
         log.decimation > 8 ? log.decimation / 8 : 1,
-        static_cast<Index>(1 / (log.step_s * rows_per_period * log.filter.torque_cutoff_hz)));
+        static_cast<Index>(1 / (log.step_s * rows_per_period * cutoff)));
     out.push_back(std::move(entry));
   };
   for (const ProcessedLog& log : now) add(log, false, one ? windows.front()[0] : log.t[0]);
@@ -221,11 +228,27 @@ std::vector<std::vector<std::string>> blind_spots(const Linearised& at, const Se
   return out;
 }
 
+/// Without a healthy session the noise's colour comes from a residual that holds the gap too: taken as noise, a slow gap
+/// would be whitened away. So only where the residual is not much more than the noise above the torque's band.
+std::vector<VectorXd> colours(const Models& models, const std::vector<SessionLog>& logs) {
+  if (models.has_baseline) return {};
+  const std::size_t n = models.current.joints.size();
+  const std::vector<VectorXd> white(n, VectorXd::Zero(1));
+  const Linearised in_band(models, logs, white), coloured(models, logs);
+  std::vector<VectorXd> out = coloured.whitening();
+  for (std::size_t j = 0; j < n; ++j) {
+    double noise = 0;
+    for (const SessionLog& entry : logs) noise = std::max(noise, entry.log.torque_noise[static_cast<Index>(j)]);
+    if (1 / std::sqrt(in_band.weights()[static_cast<Index>(j)]) > much_more * noise) out[j] = white[j];
+  }
+  return out;
+}
+
 /// Search, name, fit again around what was named; until nothing changes.
 Outcome explore(Models models, const std::vector<SessionLog>& logs, const SearchSettings& settings,
                 const std::vector<EffectCandidate>& never, Progress& progress) {
   Outcome out;
-  std::vector<VectorXd> whitening;
+  std::vector<VectorXd> whitening = colours(models, logs);
   for (int pass = 0; pass < most_passes; ++pass) {
     progress.stage(pass == 0 ? "looking for what is missing" : "looking again, around what was found", 8);
     Linearised at(models, logs, whitening);
@@ -261,8 +284,8 @@ Outcome explore(Models models, const std::vector<SessionLog>& logs, const Search
     out.models = models;
     // Without a baseline the gap was part of what looked like noise.
     const bool better = changed && !models.has_baseline;
-    if (better) whitening.clear();
-    if (!better) whitening = at.whitening();
+    whitening = better ? colours(models, logs) : at.whitening();
+    out.whitening = whitening.empty() ? at.whitening() : whitening;
     out.at = std::make_unique<Linearised>(models, logs, whitening);
     // What the search found, by its group in the new linearisation.
     std::vector<Found> found;
@@ -294,8 +317,7 @@ struct HeldOut {
   VectorXd rows;
 };
 
-HeldOut hold_out(const Outcome& outcome, const std::vector<std::size_t>& groups) {
-  const Linearised& at = *outcome.at;
+HeldOut hold_out(const Linearised& at, const std::vector<MatrixXd>& features, const std::vector<std::size_t>& groups) {
   const auto n = static_cast<Index>(at.joints());
   HeldOut out{VectorXd::Zero(n), VectorXd::Zero(n), VectorXd::Zero(n), std::vector<double>(groups.size(), 0.0),
               std::vector<VectorXd>(groups.size(), VectorXd::Zero(n)), VectorXd::Zero(n)};
@@ -307,7 +329,7 @@ HeldOut hold_out(const Outcome& outcome, const std::vector<std::size_t>& groups)
     out.after += after;
     for (Index j = 0; j < n; ++j) {
       out.leftover[j] += after[j] * structured_share(at, static_cast<std::size_t>(j), all,
-                                                     outcome.features[static_cast<std::size_t>(j)], fold.judge);
+                                                     features[static_cast<std::size_t>(j)], fold.judge);
     }
     out.before += at.square(at.solve(at.nuisance(), fold.fit), fold.judge).cwiseProduct(w);
     for (std::size_t i = 0; i < groups.size(); ++i) {
@@ -339,11 +361,15 @@ json parameters_json(const EffectFit& fit, const Joint& joint) {
 void add_deviations(Models& models, const Linearised& at) {
   std::vector<Index> columns;
   for (Index c = 0; c < static_cast<Index>(at.unknowns().size()); ++c) columns.push_back(c);
+  for (const Index c : at.nuisance()) {
+    if (c >= static_cast<Index>(at.unknowns().size())) columns.push_back(c);  // background
+  }
   const LinearFit fit = at.solve(columns);
   const MatrixXd covariance = SymmetricSolver(fit.information).inverse();
   IdentifiedModel& model = models.current;
   for (JointFit& joint : model.joints) {
     for (EffectFit& effect : joint.effects) {
+      if (find_effect(effect.effect)->acts_on == ActsOn::position && !effect.linear_std.empty()) continue;  // from a link encoder
       effect.linear_std.assign(effect.linear.size(), 0.0);
       effect.shape_std.assign(effect.shape.size(), 0.0);
     }
@@ -446,7 +472,30 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
   std::optional<Session> session;
   std::vector<SessionLog> logs = sessions(data.logs, baseline, test, session);
   std::vector<std::string> notes;
+  // A link encoder shows what bends before any torque is looked at.
   std::vector<EffectCandidate> never;
+  Deflections deflections;
+  std::vector<DeflectionEffect> bent_already;
+  const auto look_at_links = [&](const IdentifiedModel& model) {
+    deflections = find_deflections(model, data.logs, baseline, bent_already);
+    notes.insert(notes.end(), deflections.notes.begin(), deflections.notes.end());
+    for (const DeflectionEffect& effect : bent_already) {
+      notes.push_back(fmt::format("{}: the baseline has {} already", project.robot.joints[effect.joint].name, effect.fit.effect));
+      models.fixed.push_back({effect.fit.effect, effect.joint, effect.fit.shape});
+    }
+    for (const DeflectionEffect& effect : deflections.found) models.fixed.push_back({effect.fit.effect, effect.joint, effect.fit.shape});
+    for (std::size_t j = 0; j < n; ++j) {
+      const bool encoded = std::all_of(data.logs.begin(), data.logs.end(), [&](const ProcessedLog& log) { return log.qlink.size() > 0 && log.has_link[j]; });
+      if (!encoded) continue;
+      for (const std::string_view effect : {Elasticity::name, Backlash::name, Eccentricity::name}) never.push_back({std::string(effect), j, {}});
+    }
+  };
+  const auto bend_already = [&](IdentifiedModel& model) {
+    for (const DeflectionEffect& effect : bent_already) {
+      model.joints[effect.joint].effects.push_back(effect.fit);
+      model.joints[effect.joint].effects.back().named = false;
+    }
+  };
   for (std::size_t j = 0; j < n; ++j) {
     if (!still[j]) continue;
     for (const std::string_view effect : joint_effect_names()) never.push_back({std::string(effect), j, {}});
@@ -462,8 +511,12 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
     }
     mute(logs, models.healthy, still);
     models.healthy.logs = data.references;
+    look_at_links(models.healthy);
+    bend_already(models.healthy);
     // What the healthy session has that is not nominal is its background: learned, not reported.
-    Models alone{{}, models.healthy, false};
+    Models alone;
+    alone.current = models.healthy;
+    alone.fixed = models.fixed;
     std::vector<SessionLog> before;
     for (const SessionLog& log : logs) {
       if (!log.healthy) continue;
@@ -483,6 +536,7 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
           if (fit.named) notes.push_back(fmt::format("{}: the baseline has {} already", project.robot.joints[j].name, fit.effect));
           fit.named = false;
         }
+        if (background.lack[j].structured()) models.background.push_back(j);
         if (background.lack[j].structured())
           notes.push_back(fmt::format("{}: the baseline has structure that no effect explains", project.robot.joints[j].name));
       }
@@ -494,22 +548,72 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
   } else {
     models.current = nominal_model(project, data, progress);
     mute(logs, models.current, still);
+    look_at_links(models.current);
   }
   check_splits(data.logs);
   models.current.session = session;
-  refit(models, logs, {}, 8);
+  for (const DeflectionEffect& effect : deflections.found) models.current.joints[effect.joint].effects.push_back(effect.fit);
+  const std::vector<VectorXd> plain(n, VectorXd::Zero(1));
+  refit(models, logs, plain, 8);
   Diagnosis result;
   {
     const Linearised at(models, logs);
     Models with = models;
     add_deviations(with, at);
     result.nominal = with.current;
+    for (JointFit& joint : result.nominal.joints) std::erase_if(joint.effects, [](const EffectFit& fit) { return fit.named; });
   }
 
   Outcome outcome = explore(models, logs, settings, never, progress);
-  // Names that do not hold on data that did not fit them go first.
+  // Names that do not hold on data that did not fit them go first. Where structure remains, what counts is the error in
+  // the whole band: whitening would weigh it by how fast it is.
+  const auto judge = [&] {
+    const std::vector<std::size_t> groups = in_model(*outcome.at);
+    HeldOut held = hold_out(*outcome.at, outcome.features, groups);
+    if (std::none_of(outcome.lack.begin(), outcome.lack.end(), [](const LackOfFit& l) { return l.structured(); })) return held;
+    const Linearised at(outcome.models, logs, plain);
+    std::vector<MatrixXd> in_band(n);
+    parallel_for(n, [&](std::size_t j) { in_band[j] = features(at, j); });
+    const HeldOut band = hold_out(at, in_band, groups);
+    for (std::size_t j = 0; j < n; ++j) {
+      if (!outcome.lack[j].structured()) continue;
+      const auto k = static_cast<Index>(j);
+      held.before[k] = band.before[k];
+      held.after[k] = band.after[k];
+      held.leftover[k] = band.leftover[k];
+      for (std::size_t i = 0; i < groups.size(); ++i) held.alone_by_joint[i][k] = band.alone_by_joint[i][k];
+    }
+    for (std::size_t i = 0; i < groups.size(); ++i) held.alone[i] = held.alone_by_joint[i].sum();
+    return held;
+  };
+  // How fast drift comes to its end shows on the data that follow.
+  bool drifted = false;
+  for (std::size_t j = 0; j < n; ++j) {
+    for (std::size_t e = 0; e < outcome.models.current.joints[j].effects.size(); ++e) {
+      if (outcome.models.current.joints[j].effects[e].effect != FrictionDrift::name || !outcome.models.current.joints[j].effects[e].named) continue;
+      const double found = outcome.models.current.joints[j].effects[e].shape[0];
+      double best = found, least = 1e300;
+      for (const double factor : {1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 2.0}) {
+        Models other = outcome.models;
+        other.current.joints[j].effects[e].shape[0] = std::clamp(found * factor, 0.1, 1e4);
+        const Linearised at(other, logs, outcome.whitening);
+        double sum = 0;
+        for (const Fold& fold : at.folds()) sum += at.square(at.solve(columns_of(at, in_model(at)), fold.fit), fold.judge)[static_cast<Index>(j)];
+        if (sum >= least) continue;
+        least = sum;
+        best = other.current.joints[j].effects[e].shape[0];
+      }
+      outcome.models.current.joints[j].effects[e].shape[0] = best;
+      drifted = true;
+    }
+  }
+  if (drifted) {
+    refit(outcome.models, logs, outcome.whitening, 4);
+    outcome.at = std::make_unique<Linearised>(outcome.models, logs, outcome.whitening);
+    look_for_lack(outcome);
+  }
   std::vector<std::size_t> groups = in_model(*outcome.at);
-  HeldOut held = hold_out(outcome, groups);
+  HeldOut held = judge();
   for (bool again = true; again && !groups.empty();) {
     again = false;
     std::size_t worst = 0;
@@ -533,23 +637,32 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
       }
     }
     look_for_lack(outcome);
-    held = hold_out(outcome, groups);
+    held = judge();
     again = true;
   }
 
   const Linearised& at = *outcome.at;
   Models& found = outcome.models;
+  const bool remainder = std::any_of(outcome.lack.begin(), outcome.lack.end(), [](const LackOfFit& l) { return l.structured(); });
+  if (groups.empty() && deflections.found.empty()) {
+    found.current = models.current;
+  } else if (remainder) {
+    refit(found, logs, plain, 4);
+  }
   add_deviations(found, at);
   const VectorXd gap = (held.before - held.after).cwiseMax(0.0) + held.leftover;
   VectorXd closure(static_cast<Index>(n));
   for (Index j = 0; j < closure.size(); ++j) closure[j] = gap[j] > 0 ? (held.before[j] - held.after[j]) / gap[j] : 0;
-  double robot_gap = 0, robot_closed = 0;
-  for (const std::size_t g : groups) {
-    if (!at.groups()[g].on_body) continue;
-    robot_gap = gap.sum();
-    robot_closed = (held.before - held.after).sum();
+  // An effect on the robot: what comes back without it against what it leaves on the joints that it reaches.
+  std::vector<double> robot_closure(groups.size(), 0.0);
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    if (!at.groups()[groups[i]].on_body) continue;
+    double left = 0;
+    for (Index j = 0; j < gap.size(); ++j) {
+      if (held.alone_by_joint[i][j] > 6) left += held.leftover[j];
+    }
+    robot_closure[i] = held.alone[i] / std::max(held.alone[i] + left, 1e-300);
   }
-  const bool robot_named = robot_gap > 0 && robot_closed >= least_closure * robot_gap;
   std::vector<bool> accepted(n), remains(n);
   for (std::size_t j = 0; j < n; ++j) {
     const auto k = static_cast<Index>(j);
@@ -560,10 +673,18 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
   // Models: what is not named stays as an unnamed column, since the gate data says it helps.
   for (std::size_t j = 0; j < n; ++j) {
     auto& effects = found.current.joints[j].effects;
-    for (EffectFit& fit : effects) fit.named &= accepted[j];
+    for (EffectFit& fit : effects) {
+      const bool fixed = std::any_of(models.fixed.begin(), models.fixed.end(), [&](const EffectCandidate& c) {
+        return c.joint == j && c.effect == fit.effect;
+      });
+      if (!fixed) fit.named &= accepted[j];
+    }
     if (still[j]) effects.clear();
   }
-  for (EffectFit& fit : found.current.body) fit.named &= robot_named;
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    if (!at.groups()[groups[i]].on_body || robot_closure[i] >= least_closure) continue;
+    for (EffectFit& fit : found.current.body) fit.named &= fit.effect != at.groups()[groups[i]].candidate.effect;
+  }
   result.model = found.current;
 
   // Figures on logs that decided nothing, where there are any.
@@ -661,9 +782,9 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
     }
     if (blocks_only) {
       // In-sample errors, by the ratio of judged to fitted ones.
-      const LinearFit plain = at.solve(at.nuisance()), all = at.solve(columns_of(at, groups));
+      const LinearFit without = at.solve(at.nuisance()), all = at.solve(columns_of(at, groups));
       const VectorXd rows = at.row_count(at.fit_blocks());
-      before *= held.before[k] / std::max(held.rows[k], 1.0) / (at.weights()[k] * plain.square[k] / rows[k]);
+      before *= held.before[k] / std::max(held.rows[k], 1.0) / (at.weights()[k] * without.square[k] / rows[k]);
       after *= held.after[k] / std::max(held.rows[k], 1.0) / (at.weights()[k] * all.square[k] / rows[k]);
     }
     const double rms_before = std::sqrt(before / std::max(count, 1.0)), rms_after = std::sqrt(after / std::max(count, 1.0));
@@ -679,6 +800,16 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
       json one = effect_json(fit, j, f, gap[k] > 0 ? held.alone_by_joint[i][k] / gap[k] : 0);
       one["model_share"] = share_of_model(fit, j);
       effects.push_back(std::move(one));
+    }
+    for (const DeflectionEffect& seen : deflections.found) {
+      if (seen.joint != j) continue;
+      effects.push_back({{"effect", seen.fit.effect},
+                         {"parameters", parameters_json(seen.fit, project.robot.joints[j])},
+                         {"score", seen.score},
+                         {"held_out_closure", seen.closure},
+                         {"signal", "q - qlink"},
+                         {"alternatives", json::array()},
+                         {"model_share", share_of_model(seen.fit, j)}});
     }
     const bool unexplained = (outcome.lack[j].structured() && (effects.empty() || remains[j])) || !resembles.empty();
     const std::string verdict = unexplained ? "unexplained" : !effects.empty() ? "effects_found" : "nothing_missing";
@@ -713,7 +844,7 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
   for (const EffectFit& fit : found.current.body) {
     const auto [f, i] = found_of(fit, 0, true);
     if (i >= groups.size() || !fit.named) continue;
-    json one = effect_json(fit, 0, f, robot_gap > 0 ? held.alone[i] / robot_gap : 0);
+    json one = effect_json(fit, 0, f, robot_closure[i]);
     json which = json::array();
     for (std::size_t j = 0; j < n; ++j) {
       if (held.alone_by_joint[i][static_cast<Index>(j)] > 6) which.push_back(j + 1);

@@ -113,6 +113,8 @@ std::vector<Group> dictionary(const Linearised& at, const std::vector<EffectCand
         return c.effect == info.name && (info.acts_on == ActsOn::body || c.joint == j);
       });
       if (skipped) continue;
+      // A balancer's force over the angle of a joint that turns.
+      if (info.name == GravityCompensator::name && at.models().current.robot.joints[j].type != JointType::revolute) continue;
       const Scales s = scales_of(at, j);
       std::vector<std::vector<double>> shapes{{}};
       double continuous = 0;

@@ -114,7 +114,7 @@ double slow_chance(const Linearised& at, const VectorXd& e) {
 
 }  // namespace
 
-MatrixXd features(const Linearised& at, std::size_t joint) {
+MatrixXd features(const Linearised& at, std::size_t joint, bool healthy) {
   const std::size_t n = at.joints();
   const auto j = static_cast<Index>(joint);
   MatrixXd out;
@@ -132,7 +132,7 @@ MatrixXd features(const Linearised& at, std::size_t joint) {
   load = load.max(1e-9);
   const bool turns = at.models().current.robot.joints[joint].type == JointType::revolute;
   for (std::size_t l = 0; l < at.logs().size(); ++l) {
-    if (at.logs()[l].healthy) continue;
+    if (at.logs()[l].healthy && !healthy) continue;
     const Motion& m = at.motion(l);
     const Index samples = m.q.rows();
     std::vector<Eigen::ArrayXd> columns;

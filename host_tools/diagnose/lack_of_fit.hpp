@@ -7,7 +7,7 @@ namespace fxdyn::diagnosis {
 /// Functions of the state that name no effect, for one joint: sines and cosines of all positions, velocities and their
 /// products, paths with memory, random Fourier features of (q, dq, ddq, load). Filtered, decimated and whitened like
 /// everything else; rows x features, zero on the healthy session's rows unless `healthy`.
-Eigen::MatrixXd features(const Linearised& at, std::size_t joint);
+Eigen::MatrixXd features(const Linearised& at, std::size_t joint, bool healthy = false);
 
 struct LackOfFit {
   double state_p = 1;  ///< chance that noise looks as much like a function of the state

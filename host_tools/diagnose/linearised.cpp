@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "host_tools/diagnose/lack_of_fit.hpp"
 #include "host_tools/error.hpp"
 #include "host_tools/identify/solver.hpp"
 #include "host_tools/model/effects.hpp"
@@ -30,7 +31,8 @@ constexpr double difference = 1e-3;
 constexpr int blocks_of_one_log = 5;
 
 bool is_shape_free(const EffectInfo& info, std::size_t i) {
-  return info.shape[i].name != "joint" && info.shape[i].name != "ratio";
+  // A time constant from one session's start is a guess by its end: the gate chooses it.
+  return info.shape[i].name != "joint" && info.shape[i].name != "ratio" && info.shape[i].name != "time_constant";
 }
 
 /// Columns that come from differences of predict() rather than from phi.
@@ -174,6 +176,10 @@ void Linearised::make_blocks() {
 void Linearised::make_unknowns() {
   const IdentifiedModel& now = models_.current;
   const bool two = models_.has_baseline;
+  const auto fixed = [&](std::size_t j, const EffectFit& fit) {
+    return std::any_of(models_.fixed.begin(), models_.fixed.end(),
+                       [&](const EffectCandidate& c) { return c.joint == j && c.effect == fit.effect; });
+  };
   const IdentifiedModel& common = two ? models_.healthy : now;
   for (std::size_t k = 0; k < now.base.size(); ++k) {
     Unknown u;
@@ -194,7 +200,7 @@ void Linearised::make_unknowns() {
     const EffectFit* coulomb = common.joints[j].find(Coulomb::name);
     for (std::size_t e = 0; e < joint.effects.size(); ++e) {
       const EffectFit& fit = joint.effects[e];
-      if (fit.named) continue;
+      if (fit.named || fixed(j, fit)) continue;
       const EffectInfo& info = *find_effect(fit.effect);
       Unknown u;
       u.joint = j;
@@ -261,7 +267,7 @@ void Linearised::make_unknowns() {
   };
   for (std::size_t j = 0; j < now.joints.size(); ++j) {
     for (std::size_t e = 0; e < now.joints[j].effects.size(); ++e) {
-      if (now.joints[j].effects[e].named) named(now.joints[j].effects[e], j, e, false);
+      if (now.joints[j].effects[e].named && !fixed(j, now.joints[j].effects[e])) named(now.joints[j].effects[e], j, e, false);
     }
   }
   for (std::size_t e = 0; e < now.body.size(); ++e) {
@@ -388,9 +394,8 @@ void Linearised::make_rows() {
     for (std::size_t j = 0; j < n; ++j)
       full[j].setZero(log.samples(), static_cast<Index>(rows_[j].column.size()) + 1);
     Regressor regressor(chain_);
-    const MotionRows link = log.link_motion(0, log.samples());
     for (Index k = 0; k < log.samples(); ++k) {
-      const MatrixXd& y = regressor(link.q.row(k), link.dq.row(k), link.ddq.row(k));
+      const MatrixXd& y = regressor(motion.q.row(k), motion.dq.row(k), motion.ddq.row(k));
       for (std::size_t j = 0; j < n; ++j) {
         for (Index c = first_unknown(j), i = 0; c < nb; ++c, ++i)
           full[j](k, i) = y(static_cast<Index>(j), base_.columns[static_cast<std::size_t>(c)]);
@@ -478,6 +483,7 @@ void Linearised::make_rows() {
     x0[c] = u.kind == Unknown::Kind::linear || u.kind == Unknown::Kind::base ? u.value : 0;
   }
   std::vector<Index> all;
+  const Index columns_at_start = columns_;
   for (Index c = 0; c < columns_; ++c) all.push_back(c);
   parallel_for(n, [&](std::size_t j) {
     JointRows& rows = rows_[j];
@@ -498,25 +504,31 @@ void Linearised::make_rows() {
     return solve(all);
   };
   const LinearFit fit = reweight();
-  if (whitening_.empty()) {
-    std::vector<VectorXd> coefficients(n);
-    for (std::size_t j = 0; j < n; ++j) {
-      const VectorXd e = residual(j, fit);
-      std::vector<VectorXd> parts;
-      for (const Block& b : log_rows_) {
-        const bool use = models_.has_baseline ? b.healthy : b.fits;
-        if (use) parts.emplace_back(e.segment(b.first, b.count));
-      }
-      coefficients[j] = yule_walker(parts);
-    }
-    whitening_ = std::move(coefficients);
-  }
+  // What counts for how much comes before the noise's colour: rows near standstill may be far off.
   row_scale_.resize(n);
+  std::vector<VectorXd> coefficients(n);
+  parallel_for(n, [&](std::size_t j) {
+    const VectorXd e = residual(j, fit);
+    // The median: what sticks may be far off without being noise.
+    std::vector<double> magnitude;
+    for (const std::size_t b : fit_blocks_) {
+      for (Index i = 0; i < blocks_[b].count; ++i) magnitude.push_back(std::fabs(e[blocks_[b].first + i]));
+    }
+    std::nth_element(magnitude.begin(), magnitude.begin() + static_cast<std::ptrdiff_t>(magnitude.size() / 2), magnitude.end());
+    const double sigma = std::max(1.4826 * magnitude[magnitude.size() / 2], 1e-12 / std::sqrt(weights_[static_cast<Index>(j)]));
+    row_scale_[j].resize(total);
+    std::vector<VectorXd> parts;
+    for (std::size_t l = 0; l < logs_->size(); ++l) {
+      const Block& b = log_rows_[l];
+      row_scale_[j].segment(b.first, b.count) = certainty(l, j, sigma);
+      const bool use = models_.has_baseline ? b.healthy : b.fits;
+      if (use) parts.emplace_back(e.segment(b.first, b.count).cwiseProduct(row_scale_[j].segment(b.first, b.count)));
+    }
+    coefficients[j] = yule_walker(parts);
+  });
+  if (whitening_.empty()) whitening_ = std::move(coefficients);
   parallel_for(n, [&](std::size_t j) {
     JointRows& rows = rows_[j];
-    row_scale_[j] = VectorXd::Ones(total);
-    const double sigma = 1 / std::sqrt(weights_[static_cast<Index>(j)]);
-    for (std::size_t l = 0; l < logs_->size(); ++l) row_scale_[j].segment(log_rows_[l].first, log_rows_[l].count) = certainty(l, j, sigma);
     for (const Block& b : log_rows_) {
       rows.x.middleRows(b.first, b.count) = whiten(j, rows.x.middleRows(b.first, b.count));
       rows.y.segment(b.first, b.count) = whiten(j, rows.y.segment(b.first, b.count));
@@ -526,7 +538,31 @@ void Linearised::make_rows() {
     rows.sums.clear();
     sum_up(rows, 0);
   });
+  for (const std::size_t j : models_.background) add_background(j);
+  for (Index c = columns_at_start; c < columns_; ++c) all.push_back(c);
   reweight();
+}
+
+/// Functions of the state of both sessions become nuisance: what a healthy joint has that no effect explains.
+void Linearised::add_background(std::size_t joint) {
+  JointRows& rows = rows_[joint];
+  const MatrixXd more = features(*this, joint, true);
+  const Index from = rows.x.cols();
+  rows.x.conservativeResize(Eigen::NoChange, from + more.cols());
+  // Of the size of the noise each at most: friction and base parameters must not hide in it.
+  const VectorXd rms = (more.colwise().norm() / std::sqrt(static_cast<double>(more.rows()))).transpose().array().max(1e-300);
+  rows.x.rightCols(more.cols()) = more * rms.cwiseInverse().asDiagonal();
+  background_information_.resize(joints(), 0.0);
+  background_information_[joint] = 4 * weights_[static_cast<Index>(joint)];
+  background_joint_.resize(static_cast<std::size_t>(more.cols()) + background_joint_.size(), joint);
+  for (Index i = 0; i < more.cols(); ++i) {
+    rows.column.push_back(columns_ + i);
+    nuisance_.push_back(columns_ + i);
+  }
+  columns_ += more.cols();
+  for (JointRows& other : rows_) other.local.resize(static_cast<std::size_t>(columns_), -1);
+  for (Index i = 0; i < more.cols(); ++i) rows.local[static_cast<std::size_t>(columns_ - more.cols() + i)] = from + i;
+  sum_up(rows, from);
 }
 
 void Linearised::sum_up(JointRows& rows, Index from) const {
@@ -640,11 +676,20 @@ void Linearised::normal(const std::vector<Index>& columns, const std::vector<std
   }
   for (Index i = 0; i < p; ++i) {
     const auto c = static_cast<std::size_t>(columns[static_cast<std::size_t>(i)]);
-    if (c >= unknowns_.size() || unknowns_[c].prior_std == 0) continue;
+    if (c >= unknowns_.size()) {
+      gram(i, i) += background_information(static_cast<Index>(c));
+      continue;
+    }
+    if (unknowns_[c].prior_std == 0) continue;
     const double information = 1 / (unknowns_[c].prior_std * unknowns_[c].prior_std);
     gram(i, i) += information;
     projection[i] += information * unknowns_[c].prior;
   }
+}
+
+double Linearised::background_information(Index column) const {
+  const std::size_t at = static_cast<std::size_t>(column) - unknowns_.size();
+  return at < background_joint_.size() ? background_information_[background_joint_[at]] : 0;
 }
 
 LinearFit Linearised::solve(const std::vector<Index>& columns, const std::vector<std::size_t>& blocks) const {

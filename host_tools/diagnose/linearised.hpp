@@ -17,6 +17,8 @@ namespace fxdyn::diagnosis {
 struct Models {
   IdentifiedModel healthy, current;
   bool has_baseline = false;
+  std::vector<EffectCandidate> fixed;  ///< what a link encoder gave: the torque does not change it
+  std::vector<std::size_t> background;  ///< joints whose healthy session has structure that no effect explains
 };
 
 /// A log of one of the two sessions. Rows are decimated to `log.decimation`.
@@ -134,6 +136,8 @@ class Linearised {
   Eigen::VectorXd row_count(const std::vector<std::size_t>& blocks) const;
   /// Whitened residual of a joint, all rows.
   Eigen::VectorXd residual(std::size_t joint, const LinearFit& fit) const;
+  /// Prior information on a column of the background; 0 for others.
+  double background_information(Eigen::Index column) const;
   /// X^T W X and X^T W y.
   void normal(const std::vector<Eigen::Index>& columns, const std::vector<std::size_t>& blocks, Eigen::MatrixXd& gram,
               Eigen::VectorXd& projection) const;
@@ -152,6 +156,7 @@ class Linearised {
   void make_unknowns();
   void make_blocks();
   void make_rows();
+  void add_background(std::size_t joint);
   void sum_up(JointRows& rows, Eigen::Index from) const;
   Eigen::VectorXd certainty(std::size_t log, std::size_t joint, double sigma) const;
   Eigen::MatrixXd whiten(std::size_t joint, Eigen::MatrixXd columns) const;
@@ -176,6 +181,8 @@ class Linearised {
   std::vector<Eigen::VectorXd> whitening_;
   std::vector<Eigen::VectorXd> row_scale_;  ///< per joint, see certainty()
   Eigen::VectorXd weights_;
+  std::vector<std::size_t> background_joint_;  ///< of each column after the unknowns
+  std::vector<double> background_information_;
 };
 
 /// What a fit over nuisance and named effects makes of the models: x at `columns` (places of unknowns).

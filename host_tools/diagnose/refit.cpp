@@ -3,6 +3,7 @@
 #include <cmath>
 #include <memory>
 
+#include "host_tools/identify/solver.hpp"
 #include "host_tools/model/effects.hpp"
 
 namespace fxdyn::diagnosis {
@@ -23,7 +24,26 @@ double misfit(const Linearised& at) {
     now.x[static_cast<Index>(c)] = u.value;
     if (u.prior_std > 0) sum += std::pow((u.value - u.prior) / u.prior_std, 2);
   }
-  const VectorXd square = at.square(now, at.fit_blocks()), rows = at.row_count(at.fit_blocks());
+  VectorXd square = at.square(now, at.fit_blocks());
+  const VectorXd rows = at.row_count(at.fit_blocks());
+  // A background has no values to keep: the best it can do.
+  for (const std::size_t j : at.models().background) {
+    const VectorXd e = at.residual(j, now);
+    std::vector<Index> local, used;
+    for (const Index c : at.nuisance()) {
+      const Index place = at.rows(j).local[static_cast<std::size_t>(c)];
+      if (c >= static_cast<Index>(at.unknowns().size()) && place >= 0) local.push_back(place);
+    }
+    for (const std::size_t b : at.fit_blocks()) {
+      for (Index i = 0; i < at.blocks()[b].count; ++i) used.push_back(at.blocks()[b].first + i);
+    }
+    const Eigen::MatrixXd x = at.rows(j).x(used, local);
+    const VectorXd y = e(used);
+    Eigen::MatrixXd gram = x.transpose() * x;
+    gram.diagonal().array() +=
+        local.empty() ? 0 : at.background_information(at.rows(j).column[static_cast<std::size_t>(local[0])]) / at.weights()[static_cast<Index>(j)];
+    square[static_cast<Index>(j)] = (y - x * SymmetricSolver(gram).solve(x.transpose() * y)).squaredNorm();
+  }
   for (Index j = 0; j < square.size(); ++j) sum += rows[j] * std::log(std::max(square[j], 1e-300));
   return sum;
 }
@@ -54,6 +74,9 @@ void refit(Models& models, const std::vector<SessionLog>& all, const std::vector
       around = std::move(at);
       std::vector<Index> columns;
       for (Index c = 0; c < static_cast<Index>(around->unknowns().size()); ++c) columns.push_back(c);
+      for (const Index c : around->nuisance()) {
+        if (c >= static_cast<Index>(around->unknowns().size())) columns.push_back(c);
+      }
       step = around->solve(columns);
       share = 1;
       halvings = 0;

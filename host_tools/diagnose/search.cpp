@@ -18,6 +18,8 @@ using Eigen::VectorXd;
 
 /// What an effect must bring at least.
 constexpr double least_score = 8;
+/// .. and at most: a residual full of structure looks like more than noise at other times too.
+constexpr double most_score = 25;
 /// Less of a column than this (squared) is nothing.
 constexpr double nothing_left = 1e-5;
 constexpr std::size_t beam_width = 3;
@@ -122,6 +124,14 @@ std::vector<Index> Search::columns(const std::vector<std::size_t>& groups) const
 bool Search::allowed(const Choice& state, std::size_t g) const {
   const Group& group = at_.groups()[g];
   if (group.noise_limited) return false;
+  if (!group.in_model && !group.on_body && find_effect(group.candidate.effect)->needs_total) {
+    // The total that its column is made of has the model's named effects in it: one that is left out would be stood in
+    // for.
+    for (std::size_t i = 0; i < at_.groups().size() && at_.groups()[i].in_model; ++i) {
+      const bool elsewhere = !at_.groups()[i].on_body && at_.groups()[i].candidate.joint != group.candidate.joint;
+      if (!elsewhere && std::find(state.groups.begin(), state.groups.end(), i) == state.groups.end()) return false;
+    }
+  }
   std::size_t here = 0, robot = 0;
   for (const std::size_t other : state.groups) {
     const Group& o = at_.groups()[other];
@@ -172,7 +182,7 @@ Choice Search::evaluate(const std::vector<std::size_t>& groups) const {
 
 std::vector<Search::Scored> Search::score_all(const Choice& state, bool with_thresholds) {
   const std::vector<Index>& s = state.fit.columns;
-  const auto from = static_cast<Index>(at_.nuisance().size());
+  const auto from = static_cast<Index>(at_.unknowns().size());
   VectorXd weights(static_cast<Index>(at_.joints()));
   for (Index j = 0; j < weights.size(); ++j)
     weights[j] = state.fit.rows[j] / std::max(state.fit.square[j], 1e-12 * state.fit.rows[j] / at_.weights()[j]);
@@ -259,7 +269,7 @@ std::vector<Search::Scored> Search::score_all(const Choice& state, bool with_thr
       // Gumbel's distribution of the largest, by moments
       const double mean = most.mean(), std = std::sqrt((most.array() - mean).square().sum() / (shifts - 1));
       const double beta = std * 0.7797, mode = mean - 0.5772 * beta;
-      result[j] = std::max(least_score, mode - beta * std::log(-std::log1p(-false_alarm)));
+      result[j] = std::clamp(mode - beta * std::log(-std::log1p(-false_alarm)), least_score, most_score);
     });
     for (std::size_t j = 0; j < result.size(); ++j) thresholds_[static_cast<Index>(j)] = result[j];
   }
@@ -319,7 +329,9 @@ std::size_t Search::refine(const Choice& state, std::size_t g) {
   std::vector<MatrixXd> best_columns, made;
   best = try_shape(centre, best_columns);
   const double first = best;
-  for (int round = 0; round < 4; ++round, ratio = std::sqrt(ratio)) {
+  // A column of an effect on the position costs a simulation.
+  const int rounds = info.acts_on == ActsOn::torque ? 4 : 2;
+  for (int round = 0; round < rounds; ++round, ratio = std::sqrt(ratio)) {
     const double lower = std::max(info.shape[index].lower, centre / ratio);
     double upper = std::min(info.shape[index].upper, centre * ratio);
     if (info.shape[index].name == "time")
@@ -360,7 +372,7 @@ Choice Search::run(std::vector<std::size_t> start, Progress& progress) {
   std::vector<Choice> beam{evaluate(start)};
   Choice best = beam.front();
   for (int level = 0; level < 64; ++level) {
-    find_ripples(beam.front());
+    if (level < 2) find_ripples(beam.front());
     std::vector<Choice> next;
     std::set<std::vector<std::size_t>> seen;
     const std::size_t width = level < 3 ? beam.size() : 1;
@@ -402,7 +414,6 @@ Choice Search::run(std::vector<std::size_t> start, Progress& progress) {
         changed = true;
         break;
       }
-      find_ripples(without);
       std::size_t tried = 0;
       std::set<std::pair<std::string, std::size_t>> names;
       for (const Scored& one : score_all(without, false)) {
@@ -438,7 +449,7 @@ std::vector<Found> Search::explain(const Choice& choice) {
     std::size_t tried = 0;
     for (const Scored& one : score_all(without, false)) {
       const Group group = at_.groups()[one.group];
-      if (tried >= 6 || one.score < found.score - std::max(25.0, 0.1 * found.score)) break;
+      if (tried >= 4 || one.score < found.score - std::max(25.0, 0.1 * found.score)) break;
       if (!names.insert({group.candidate.effect, group.on_body ? 0 : group.candidate.joint}).second) continue;
       ++tried;
       std::vector<std::size_t> groups = others;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <complex>
 
 #include "host_tools/error.hpp"
@@ -198,7 +199,16 @@ FilterFit choose_filter(const std::vector<Log>& logs, const SignalSettings& sett
       const VectorXd q = log.q.col(j);
       if (!(q.maxCoeff() > q.minCoeff())) continue;
       const VectorXd dq = log.dq.size() > 0 ? VectorXd(log.dq.col(j)) : VectorXd(differentiate(q, log.step_s));
-      const Spectrum velocity = welch(dq, log.step_s), position = welch(q, log.step_s);
+      Spectrum velocity = welch(dq, log.step_s);
+      const Spectrum position = welch(q, log.step_s);
+      if (log.dq.size() == 0) {
+        // What the encoder's noise makes of the velocity is no motion: slow logs would consist of it.
+        const double level = 2 * log.step_s * std::pow(position.noise_rms(), 2);
+        for (Index b = 0; b < velocity.density.size(); ++b) {
+          const double w = 2 * std::numbers::pi * velocity.frequency(b);
+          velocity.density[b] = std::max(0.0, velocity.density[b] - 4 * w * w * level);
+        }
+      }
       const double ceiling = std::min(30.0, 0.4 * rate);
       filter.excited_hz = std::max(filter.excited_hz, velocity.frequency_of_share(0.999, ceiling));
       filter.encoder_step[k] = std::max(filter.encoder_step[k], encoder_step(q));

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "host_tools/identify/dataset.hpp"
+#include "host_tools/model/identified_model.hpp"
+
+namespace fxdyn::diagnosis {
+
+/// An effect seen between motor and link.
+struct DeflectionEffect {
+  std::size_t joint = 0;  ///< from 0
+  EffectFit fit;
+  double score = 0;    ///< N ln(RSS without / RSS with) - penalties
+  double closure = 0;  ///< share of the deflection's power on data that did not fit it
+};
+
+struct Deflections {
+  std::vector<DeflectionEffect> found;
+  std::vector<std::string> notes;
+};
+
+/// Elasticity, backlash and eccentricity of the joints that have a link encoder, from
+///   q - qlink = offset + compliance load + half_gap tanh(structural / scale) + sin sin(q) + cos cos(q),
+/// load the rigid-body torque of `model` through the gear's relaxation: every set of them on an autoregressive noise,
+/// shapes on a grid and refined; the set with the best score. What a healthy session has alike (within a third) is not
+/// reported but returned in `background`.
+/// @param now logs of the current session (train fits, validate judges) @param before healthy ones, may be empty
+Deflections find_deflections(const IdentifiedModel& model, const std::vector<ProcessedLog>& now,
+                             const std::vector<ProcessedLog>& before, std::vector<DeflectionEffect>& background);
+
+}  // namespace fxdyn::diagnosis
