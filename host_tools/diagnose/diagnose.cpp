@@ -403,8 +403,9 @@ VectorXd error_of(const ProcessedLog& log, const MatrixXd& torque, std::size_t j
 }
 
 /// Base parameters of the baseline with friction, load and tilt of their own against what both sessions measured.
-void check_same_robot(const Models& models, const std::vector<SessionLog>& logs, const std::vector<bool>& still) {
+void check_same_robot(Models models, const std::vector<SessionLog>& logs, const std::vector<bool>& still) {
   constexpr double most = 0.2;  // of the torque's power that no fit explains
+  models.background.clear();    // explains anything
   Linearised at(models, logs, std::vector<VectorXd>(models.current.joints.size(), VectorXd::Zero(1)));
   const auto first = static_cast<Index>(at.nuisance().size());
   for (const EffectInfo& info : effect_infos()) {

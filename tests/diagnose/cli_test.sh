@@ -36,7 +36,7 @@ missing() {
   effect ripple 2 'wavenumber = 30.0, cos = 0.5, sin = 0.4'
   effect ripple 2 'wavenumber = 47.0, cos = 0.3, sin = -0.5'
   effect presliding 1 'distance = 0.004, amplitude = 1.5'
-  effect delay 1 'time = 0.006, share = 1.0'
+  effect delay 2 'time = 0.006, share = 1.0'
   effect payload '' 'mass = 1.2, com_x = 0.3, com_y = 0.0, com_z = 0.05'
 }
 { scenario 4 arm.urdf 0.002 0 && missing && log a 1 0 && log b 2 10 && log c 3 20; } >now.toml
