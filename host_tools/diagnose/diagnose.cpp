@@ -44,6 +44,8 @@ constexpr double nothing_left = 1e-5;
 constexpr int most_passes = 2;
 /// A residual of that many times the noise is mostly gap.
 constexpr double much_more = 3;
+/// Into which a single log is cut, as the search does.
+constexpr int blocks_of_one_log = 5;
 
 /// The logs with their ages, and the session that all of them but the healthy ones belong to: one where no two windows
 /// overlap in time; else every log starts its own.
@@ -70,6 +72,19 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
   for (const ProcessedLog& log : now) add(log, false, one ? windows.front()[0] : log.t[0]);
   for (const ProcessedLog& log : before) add(log, true, log.t[0]);
   return out;
+}
+
+/// Without a log that judges and with one trajectory only, its blocks have to.
+void check_splits(const std::vector<ProcessedLog>& logs) {
+  constexpr double shortest_s = 1;
+  if (logs.size() > 1) return;
+  const ProcessedLog& log = logs.front();
+  const double seconds = static_cast<double>(log.last - log.first) * log.step_s;
+  if (seconds >= blocks_of_one_log * shortest_s) return;
+  throw DataError(
+      fmt::format("{}: {:.1f} s (after filtering) are too short to split into {} blocks that judge one another: record "
+                  "{:.0f} s or more, or add a log with role = \"validate\"",
+                  log.name, seconds, blocks_of_one_log, 4 * blocks_of_one_log * shortest_s));
 }
 
 /// Joints that this motion tells nothing of: they stand still, or as good as, beside what the encoder's noise looks like.
@@ -388,8 +403,9 @@ VectorXd error_of(const ProcessedLog& log, const MatrixXd& torque, std::size_t j
 }
 
 /// Base parameters of the baseline with friction, load and tilt of their own against what both sessions measured.
-void check_same_robot(const Models& models, const std::vector<SessionLog>& logs, const std::vector<bool>& still) {
+void check_same_robot(Models models, const std::vector<SessionLog>& logs, const std::vector<bool>& still) {
   constexpr double most = 0.2;  // of the torque's power that no fit explains
+  models.background.clear();    // explains anything
   Linearised at(models, logs, std::vector<VectorXd>(models.current.joints.size(), VectorXd::Zero(1)));
   const auto first = static_cast<Index>(at.nuisance().size());
   for (const EffectInfo& info : effect_infos()) {
@@ -454,7 +470,8 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
   models.has_baseline = !baseline.empty();
   SearchSettings settings;
   settings.max_effects = static_cast<std::size_t>(project.diagnose.max_effects);
-  settings.most = 2 + 2 * n;
+  // Few things change at once; a robot of which nothing is known may lack more.
+  settings.most = models.has_baseline ? 2 + n / 2 : 2 + 2 * n;
   SearchSettings modest = settings;  // a background need not be named, only taken out
   modest.max_effects = std::min<std::size_t>(2, settings.max_effects);
   modest.most = std::max<std::size_t>(2, n);
@@ -493,7 +510,11 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
     GateData healthy = data;
     healthy.logs = baseline;
     healthy.notes.clear();
-    models.healthy = nominal_model(project, healthy, true, progress);
+    try {
+      models.healthy = nominal_model(project, healthy, true, progress);
+    } catch (const DataError& error) {
+      throw DataError(fmt::format("role = \"baseline\": {}", error.what()));
+    }
     mute(logs, models.healthy, still);
     models.healthy.logs = data.references;
     look_at_links(models.healthy);
@@ -535,6 +556,7 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
     mute(logs, models.current, still);
     look_at_links(models.current);
   }
+  check_splits(data.logs);
   models.current.session = session;
   for (const DeflectionEffect& effect : deflections.found) models.current.joints[effect.joint].effects.push_back(effect.fit);
   const std::vector<VectorXd> plain(n, VectorXd::Zero(1));

@@ -142,7 +142,7 @@ void Evaluator<N>::add_effect(std::size_t joint, const EffectFit& fit, double ti
       }
     }
     if constexpr (std::is_same_v<E, Delay>) {
-      if (fit.shape[0] > Delay::largest * tick_s) {
+      if (fit.shape[0] > Delay::largest * tick_s * (1 + 1e-9)) {  // a step from time stamps is off by rounding
         throw InputError(fmt::format("joint {}: delay of {} s: at most {} ticks of {} s", joint + 1, fit.shape[0],
                                      Delay::largest, tick_s));
       }

@@ -53,6 +53,19 @@ std::string weak_note(const std::vector<WeakParameter>& weak, const Robot& robot
       names, 100 * worst->error, worst->joint + 1, robot.joints[static_cast<std::size_t>(worst->joint)].name);
 }
 
+/// Mean logarithm of the errors on the validate logs; NaN where there are none.
+double gate_error(const json& stage) {
+  double sum = 0, count = 0;
+  for (const json& log : stage.at("logs")) {
+    if (log.at("role") != "validate") continue;
+    for (const json& joint : log.at("joints")) {
+      sum += std::log(std::max(joint.at("rmse").get<double>(), 1e-300));
+      ++count;
+    }
+  }
+  return sum / count;
+}
+
 /// Estimates on the way through the logs: one row a moment, base parameters first, then each joint's coefficients.
 json recursion_json(const Fitter::Recursion& recursion, double forgetting) {
   json trace = json::array();
@@ -287,11 +300,27 @@ void Pipeline::train() {
   Estimate estimate = finish_model(fitter, project_, data());
   IdentifiedModel& model = estimate.model;
   model = kept.restore(std::move(model));
-  model.stage = "trained";
   progress_.step();
-  progress_.stage("errors on all logs", 1);
+  progress_.stage("errors on all logs", 2);
+  json trained = stage_metrics(model, "bls");
+  progress_.step();
+  // A baseline taught the diagnosed model what the train logs alone may not: where validation says so, it stays.
+  IdentifiedModel before = diagnosed;
+  for (JointFit& joint : before.joints) joint.bls.reset();
+  const bool possible = !estimate.physical || !estimate.physical->constrained;
+  if (json unchanged = stage_metrics(before, "bls"); possible && gate_error(unchanged) < gate_error(trained)) {
+    const std::string note = "training: the diagnosed model stays as it was, a new fit is worse on the validate logs";
+    if (std::find(before.notes.begin(), before.notes.end(), note) == before.notes.end()) before.notes.push_back(note);
+    data().notes = before.notes;
+    model = std::move(before);
+    model.formats.reset();  // the tables are another model's now
+    model.tables_crc = 0;
+    trained = std::move(unchanged);
+    for (json& joint : training) joint["kept"] = false;
+  }
+  model.stage = "trained";
   stages.insert(stages.begin(), rigid);
-  stages.push_back(stage_metrics(model, "bls"));
+  stages.push_back(trained);
   progress_.step();
   progress_.done();
   json metrics = fit_metrics(fitter, estimate, stages);
@@ -453,8 +482,9 @@ void predict_log(const fs::path& model_file, const fs::path& log_file, bool fixe
       throw InputError(fmt::format("{}: has no fixed-point formats; run `fxdyn export` first", model_file.string()));
     // At the drive's ticks, as the firmware computes; then back to the log's samples.
     const TickStates ticks = at_ticks(processed, model.tick_s, true);
-    torque = at_other_times(interpolate(predict_fixed(model, *model.formats, ticks, age_of(model, processed)), ticks.t, processed.t),
-                            model.filter.torque_lead_s / processed.step_s);
+    torque = at_other_times(
+        interpolate(predict_fixed(model, *model.formats, ticks, age_of(model, processed)), ticks.t, processed.t),
+        model.filter.torque_lead_s / processed.step_s);
   } else {
     torque = predict(model, processed);
   }

@@ -118,9 +118,7 @@ void KeptEffects::mark_hidden(std::vector<ProcessedLog>& logs) const {
     const EffectFit* fit = diagnosed_.joints[j].find(Saturation::name);
     if (fit == nullptr) continue;
     for (ProcessedLog& log : logs) {
-      const auto beyond = [&](Index k) {
-        return std::fabs(log.tau(k, static_cast<Index>(j))) > near * fit->shape[0];
-      };
+      const auto beyond = [&](Index k) { return std::fabs(log.tau(k, static_cast<Index>(j))) > near * fit->shape[0]; };
       for (Index k = 0; k < log.samples();) {
         Index end = k;
         while (end < log.samples() && beyond(end)) ++end;

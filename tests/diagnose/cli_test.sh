@@ -1,0 +1,152 @@
+#!/usr/bin/env bash
+# cli_test.sh FXDYN: what diagnosis names goes through training, tables and prediction; `run` gives the bytes of the verbs
+# one by one; bad input gives exit code 1 or 2, one line that says what is wrong, and no files.
+set -u
+fxdyn=$1
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+failures=0
+fail() {
+  echo "FAILED: $*"
+  failures=$((failures + 1))
+}
+
+cat >arm.urdf <<'URDF'
+<robot name="arm"><link name="base"/>
+<link name="upper"><inertial><origin xyz="0.2 0.01 0"/><mass value="5"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.08" iyz="0" izz="0.08"/></inertial></link>
+<link name="fore"><inertial><origin xyz="0.15 0 0.02"/><mass value="3"/><inertia ixx="0.006" ixy="0" ixz="0" iyy="0.05" iyz="0" izz="0.05"/></inertial></link>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 0.3"/><axis xyz="0 1 0"/><limit lower="-2" upper="2" velocity="2" effort="60"/></joint>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="0.4 0 0"/><axis xyz="0 1 0"/><limit lower="-2" upper="2" velocity="2" effort="60"/></joint>
+</robot>
+URDF
+sed 's/\(elbow.*\)lower="-2" upper="2" velocity="2"/\1lower="0.2999" upper="0.3001" velocity="1e-7"/' arm.urdf >locked.urdf
+
+# scenario SEED URDF SAMPLE_S START_S
+scenario() {
+  printf 'seed = %s\n[sensors]\nencoder_bits = 22\ntorque_noise = 0.002\nsample_s = %s\nstart_s = %s\n[robot]\nurdf = "%s"\nrated_torque = [60, 20]\nacceleration = [8, 8]\n' "$1" "$3" "$4" "$2"
+  for joint in 1 2; do
+    effect viscous $joint 'coefficient = 1.0'
+    effect coulomb $joint 'amplitude = 1.5, width = 0.02'
+  done
+}
+effect() { printf '[[effect]]\nname = "%s"\n%sparameters = { %s }\n' "$1" "${2:+joint = $2$'\n'}" "$3"; }
+log() { printf '[[log]]\nname = "%s"\nduration_s = 10\nperiod_s = 10\nspeed = 0.4\nseed = %s\nstart_s = %s\n' "$1" "$2" "$3"; }
+missing() {
+  effect ripple 2 'wavenumber = 30.0, cos = 0.5, sin = 0.4'
+  effect ripple 2 'wavenumber = 47.0, cos = 0.3, sin = -0.5'
+  effect presliding 1 'distance = 0.004, amplitude = 1.5'
+  effect delay 2 'time = 0.006, share = 1.0'
+  effect payload '' 'mass = 1.2, com_x = 0.3, com_y = 0.0, com_z = 0.05'
+}
+{ scenario 4 arm.urdf 0.002 0 && missing && log a 1 0 && log b 2 10 && log c 3 20; } >now.toml
+{ scenario 5 arm.urdf 0.004 500 && log h 11 0 && log k 12 10; } >healthy.toml
+{ scenario 6 locked.urdf 0.002 0 && effect ripple 1 'wavenumber = 30.0, cos = 0.9, sin = 0.4' && log l 1 0 && log m 2 10; } >locked.toml
+for s in now healthy locked; do "$fxdyn" simulate $s.toml --out . >/dev/null || fail "simulate $s"; done
+
+# project NAME FILE ROLE [FILE ROLE]..
+project() {
+  local name=$1
+  shift
+  printf '[robot]\nurdf = "arm.urdf"\nrated_torque = [60, 20]\n' >"$name.toml"
+  while [ $# -gt 0 ]; do
+    printf '[[log]]\nfile = "%s"\nrole = "%s"\n' "$1" "$2" >>"$name.toml"
+    shift 2
+  done
+}
+now='a.csv train b.csv validate c.csv test'
+# shellcheck disable=SC2086  # a list of words
+project good $now h.csv baseline k.csv baseline
+
+# All in one go, and verb by verb; the second finds what is missing itself.
+"$fxdyn" run good.toml --out run >run.txt 2>&1 || fail "run: $(tail -1 run.txt)"
+for verb in diagnose train export report; do
+  "$fxdyn" $verb good.toml --out verbs >verb.txt 2>&1 || fail "$verb: $(tail -1 verb.txt)"
+done
+for file in model.json nominal.json metrics.json diagnosis.json export.json tables.hpp tables.bin report.html; do
+  cmp -s run/$file verbs/$file || fail "$file: run and the verbs differ"
+done
+# named FILE EFFECT COUNT: effects that are marked as named
+named() {
+  local found
+  found=$(tr -d ' \n' <"$1" | grep -o "\"effect\":\"$2\",\"equation\":\"[^\"]*\",\"origin\":\"named\"" | wc -l)
+  [ "$found" -eq "$3" ] || fail "$1: $found named $2, expected $3"
+}
+named run/model.json ripple 2
+for effect in presliding delay payload; do named run/model.json $effect 1; done
+grep -q '"stage": "trained"' run/model.json || fail "not trained"
+for stage in rigid friction diagnosed bls; do grep -q "\"stage\": \"$stage\"" run/metrics.json || fail "no stage $stage"; done
+"$fxdyn" predict --model run/model.json --log c.csv --numbers fixed --out prediction >/dev/null 2>&1 || fail "predict"
+worst=$(grep -o '"relative": [0-9.e-]*' prediction/metrics.json | awk '{ if ($2 > w) w = $2 } END { print w }')
+awk -v w="$worst" 'BEGIN { exit !(w < 0.02) }' || fail "fixed point: relative error $worst with the named effects"
+# A changed baseline makes the model another one.
+project good a.csv train b.csv validate c.csv test h.csv baseline
+"$fxdyn" export good.toml --out run >/dev/null 2>&1 || fail "export after the project changed"
+[ "$(grep -c '"role": "baseline"' run/model.json)" -eq 1 ] || fail "the model is not of the project's baseline"
+
+# No log that judges: blocks of the train log, and it says so.
+project blocks a.csv train
+"$fxdyn" diagnose blocks.toml --out blocks >blocks.txt 2>&1 || fail "blocks"
+grep -q 'blocks of the train log' blocks.txt || fail "blocks: not said"
+
+# Without gnuplot the answer stands.
+mkdir none && ln -s "$(command -v env)" none/env
+PATH=$work/none "$fxdyn" diagnose blocks.toml --out plain >plain.txt 2>&1 || fail "without gnuplot"
+[ -e plain/diagnosis.json ] && [ -e plain/model.json ] || fail "without gnuplot nothing is written"
+
+# A joint at rest is not excited; the other one is diagnosed; a feedforward for the robot needs both.
+project locked l.csv train m.csv validate
+sed -i s/arm.urdf/locked.urdf/ locked.toml
+"$fxdyn" diagnose locked.toml --out locked >locked.txt 2>&1 || fail "locked: $(tail -1 locked.txt)"
+grep -q 'shoulder *effects found' locked.txt || fail "locked: the shoulder's ripple is not found"
+grep -q 'elbow *not excited' locked.txt || fail "locked: the elbow's verdict"
+
+# expect CODE "part of the message" VERB PROJECT
+expect() {
+  local message status
+  rm -rf out
+  message=$("$fxdyn" "$3" "$4.toml" --out out 2>&1 >/dev/null)
+  status=$?
+  message=$(grep '^fxdyn:' <<<"$message")
+  [ $status -eq "$1" ] && [ "$(wc -l <<<"$message")" -eq 1 ] && grep -qF -- "$2" <<<"$message" ||
+    fail "$3 $4 -> exit $status (expected $1), expected '$2' in: $message"
+  [ -z "$(find out -name '*.json' 2>/dev/null)" ] || fail "$3 $4 left files behind"
+}
+expect 1 "joint 2 (elbow) never moves" run locked
+awk -F, 'BEGIN { OFS = "," } NR > 1 { $2 = $3 = 0.3 } { print }' a.csv >rest.csv
+project rest rest.csv train
+expect 1 "no joint moves" diagnose rest
+head -n 1500 a.csv >part.csv
+project part part.csv train
+expect 1 "too short to split" diagnose part
+head -n 12 a.csv >stub.csv
+project stub stub.csv train
+expect 1 "stub.csv" diagnose stub
+
+# baseline NAME 'awk program': the good project with the healthy log changed
+baseline() {
+  awk -F, "BEGIN { OFS = \",\" } $2" h.csv >"$1.csv"
+  # shellcheck disable=SC2086
+  project "$1" $now "$1.csv" baseline
+}
+baseline joints '{ print $1, $2, $4 }'
+expect 2 "no column 'q2'" diagnose joints
+baseline degrees 'NR > 1 { $2 *= 57.3; $3 *= 57.3 } { print }'
+expect 2 "looks like degrees" diagnose degrees
+baseline milli 'NR > 1 { $4 *= 1000; $5 *= 1000 } { print }'
+expect 1 "baseline" diagnose milli
+baseline another 'NR > 1 { $4 = 20 * sin(NR / 300); $5 = 9 * sin(NR / 170) } { print }'
+expect 1 "baseline" diagnose another
+baseline nan 'NR == 500 { $5 = "nan" } { print }'
+expect 2 "nan.csv:500" diagnose nan
+baseline cut '{ print } END { print "507,0.1" }'
+expect 2 "cut.csv" diagnose cut
+: >empty.csv
+# shellcheck disable=SC2086
+project empty $now empty.csv baseline
+expect 2 "empty.csv" diagnose empty
+baseline short 'NR < 60 { print }'
+expect 1 "short.csv" diagnose short
+
+[ $failures -eq 0 ] && echo "the chain holds, and bad input is refused as it should be"
+exit $failures
