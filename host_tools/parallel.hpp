@@ -11,8 +11,8 @@
 
 namespace fxdyn {
 
-/// FXDYN_THREADS: the most threads that a program takes, for users who run several side by side. Anything but a positive
-/// number leaves it open.
+/// FXDYN_THREADS: the most threads that a program takes, for users who run several side by side. Anything but a
+/// positive number leaves it open.
 inline std::size_t threads_allowed() {
   const char* text = std::getenv("FXDYN_THREADS");
   const unsigned long threads = text != nullptr ? std::strtoul(text, nullptr, 10) : 0;

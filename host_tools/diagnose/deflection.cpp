@@ -112,7 +112,8 @@ VectorXd colour(const Rows& rows, const VectorXd& e) {
   VectorXd r = VectorXd::Zero(order + 1);
   for (std::size_t l = 0; l < rows.logs.size(); ++l) {
     const VectorXd x = e.segment(rows.first[l], rows.count[l]);
-    for (Index lag = 0; lag <= order && lag < x.size(); ++lag) r[lag] += x.head(x.size() - lag).dot(x.tail(x.size() - lag));
+    for (Index lag = 0; lag <= order && lag < x.size(); ++lag)
+      r[lag] += x.head(x.size() - lag).dot(x.tail(x.size() - lag));
   }
   if (!(r[0] > 0)) return VectorXd::Zero(order);
   MatrixXd toeplitz(order, order);
@@ -144,7 +145,8 @@ void fit(const Rows& rows, const VectorXd& a, Set& set) {
   bool possible = true;
   for (const Part& part : set.parts) {
     const EffectInfo& info = *find_effect(part.effect);
-    penalty += static_cast<double>(info.linear.size() + info.shape.size()) * std::log(n) + 2 * std::log(part.shape.empty() ? 1.0 : 4.0);
+    penalty += static_cast<double>(info.linear.size() + info.shape.size()) * std::log(n) +
+               2 * std::log(part.shape.empty() ? 1.0 : 4.0);
     for (const ParameterInfo& p : info.linear) possible &= set.theta[at++] >= p.lower;
   }
   set.score = possible ? -n * std::log(std::max(set.square, 1e-300) / n) - penalty : -1e300;
@@ -156,7 +158,8 @@ Set best_set(const Rows& rows) {
     for (const JointSeries& s : rows.series) most = std::max(most, s.structural.cwiseAbs().maxCoeff());
     return std::max(most, 1e-6);
   }();
-  const std::vector<double> relaxations{0, 1e-3, 3e-3, 8e-3, 2e-2}, scales{0.01 * largest, 0.025 * largest, 0.06 * largest, 0.15 * largest};
+  const std::vector<double> relaxations{0, 1e-3, 3e-3, 8e-3, 2e-2},
+      scales{0.01 * largest, 0.025 * largest, 0.06 * largest, 0.15 * largest};
   const std::vector<Part> full{{std::string(Elasticity::name), {1e-3}},
                                {std::string(Backlash::name), {0.03 * largest}},
                                {std::string(Eccentricity::name), {}}};
@@ -240,7 +243,8 @@ Deflections find_deflections(const IdentifiedModel& model, const std::vector<Pro
     }
     const VectorXd judged_after = residual(judged.offsets(), judged.delta - all);
     // The noise of the two encoders is no gap.
-    const double white = std::max(0.0, std::min(judged_after.squaredNorm(), set.noise * static_cast<double>(judged_after.size())));
+    const double white =
+        std::max(0.0, std::min(judged_after.squaredNorm(), set.noise * static_cast<double>(judged_after.size())));
     const double gap = std::max(judged_before.squaredNorm() - white, 1e-300);
     const double closure = (judged_before.squaredNorm() - judged_after.squaredNorm()) / gap;
     if (closure < least_closure) {
@@ -278,7 +282,8 @@ Deflections find_deflections(const IdentifiedModel& model, const std::vector<Pro
       for (const Part& was : old.parts) {
         const auto old_count = static_cast<Index>(find_effect(was.effect)->linear.size());
         if (was.effect == part.effect) {
-          const double then = size_of(rows, was, old.theta.segment(old_at, old_count)), today = size_of(rows, part, theta);
+          const double then = size_of(rows, was, old.theta.segment(old_at, old_count)),
+                       today = size_of(rows, part, theta);
           alike = std::fabs(today - then) < same_share * then;
         }
         old_at += old_count;

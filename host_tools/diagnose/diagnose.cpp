@@ -64,9 +64,8 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
     SessionLog entry{log, healthy, healthy || log.role == Role::train, std::max(0.0, log.t[0] - start)};
     double& cutoff = entry.log.filter.torque_cutoff_hz;
     cutoff = std::min(cutoff, highest_cutoff_hz);
-    entry.log.decimation = std::max<Index>(
-        log.decimation > 8 ? log.decimation / 8 : 1,
-        static_cast<Index>(1 / (log.step_s * rows_per_period * cutoff)));
+    entry.log.decimation = std::max<Index>(log.decimation > 8 ? log.decimation / 8 : 1,
+                                           static_cast<Index>(1 / (log.step_s * rows_per_period * cutoff)));
     out.push_back(std::move(entry));
   };
   for (const ProcessedLog& log : now) add(log, false, one ? windows.front()[0] : log.t[0]);
@@ -87,7 +86,8 @@ void check_splits(const std::vector<ProcessedLog>& logs) {
                   log.name, seconds, blocks_of_one_log, 4 * blocks_of_one_log * shortest_s));
 }
 
-/// Joints that this motion tells nothing of: they stand still, or as good as, beside what the encoder's noise looks like.
+/// Joints that this motion tells nothing of: they stand still, or as good as, beside what the encoder's noise looks
+/// like.
 std::vector<bool> still_joints(const GateData& data, const std::vector<ProcessedLog>& baseline) {
   constexpr double times_noise = 6;
   std::vector<bool> out = moving_joints(data.logs);
@@ -123,8 +123,8 @@ void leave_out(std::vector<ProcessedLog>& logs, const std::vector<bool>& joints)
   }
 }
 
-/// A joint that stands still holds any torque up to its stiction: what was measured says nothing. The model's own torque
-/// takes its place, under so much white noise that the joint counts next to nothing in what all joints share.
+/// A joint that stands still holds any torque up to its stiction: what was measured says nothing. The model's own
+/// torque takes its place, under so much white noise that the joint counts next to nothing in what all joints share.
 void mute(std::vector<SessionLog>& logs, const IdentifiedModel& model, const std::vector<bool>& joints) {
   constexpr double noise = 0.1;  // of rated torque
   if (!any(joints)) return;
@@ -228,8 +228,8 @@ std::vector<std::vector<std::string>> blind_spots(const Linearised& at, const Se
   return out;
 }
 
-/// Without a healthy session the noise's colour comes from a residual that holds the gap too: taken as noise, a slow gap
-/// would be whitened away. So only where the residual is not much more than the noise above the torque's band.
+/// Without a healthy session the noise's colour comes from a residual that holds the gap too: taken as noise, a slow
+/// gap would be whitened away. So only where the residual is not much more than the noise above the torque's band.
 std::vector<VectorXd> colours(const Models& models, const std::vector<SessionLog>& logs) {
   if (models.has_baseline) return {};
   const std::size_t n = models.current.joints.size();
@@ -293,7 +293,8 @@ Outcome explore(Models models, const std::vector<SessionLog>& logs, const Search
     for (std::size_t i = 0; i < groups.size(); ++i) {
       for (const std::size_t g : in_model(*out.at)) {
         if (taken.contains(g)) continue;
-        if (!same(groups[i].candidate, groups[i].on_body, out.at->groups()[g].candidate, out.at->groups()[g].on_body)) continue;
+        if (!same(groups[i].candidate, groups[i].on_body, out.at->groups()[g].candidate, out.at->groups()[g].on_body))
+          continue;
         taken.insert(g);
         Found f = out.found[i];
         f.group = g;
@@ -303,7 +304,8 @@ Outcome explore(Models models, const std::vector<SessionLog>& logs, const Search
     }
     out.found = std::move(found);
     look_for_lack(out);
-    const bool structured = std::any_of(out.lack.begin(), out.lack.end(), [](const LackOfFit& l) { return l.structured(); });
+    const bool structured =
+        std::any_of(out.lack.begin(), out.lack.end(), [](const LackOfFit& l) { return l.structured(); });
     if (!changed || (!structured && out.found.size() < 2)) break;
   }
   return out;
@@ -319,8 +321,12 @@ struct HeldOut {
 
 HeldOut hold_out(const Linearised& at, const std::vector<MatrixXd>& features, const std::vector<std::size_t>& groups) {
   const auto n = static_cast<Index>(at.joints());
-  HeldOut out{VectorXd::Zero(n), VectorXd::Zero(n), VectorXd::Zero(n), std::vector<double>(groups.size(), 0.0),
-              std::vector<VectorXd>(groups.size(), VectorXd::Zero(n)), VectorXd::Zero(n)};
+  HeldOut out{VectorXd::Zero(n),
+              VectorXd::Zero(n),
+              VectorXd::Zero(n),
+              std::vector<double>(groups.size(), 0.0),
+              std::vector<VectorXd>(groups.size(), VectorXd::Zero(n)),
+              VectorXd::Zero(n)};
   const VectorXd& w = at.weights();
   for (const Fold& fold : at.folds()) {
     out.rows += at.row_count(fold.judge);
@@ -369,7 +375,8 @@ void add_deviations(Models& models, const Linearised& at) {
   IdentifiedModel& model = models.current;
   for (JointFit& joint : model.joints) {
     for (EffectFit& effect : joint.effects) {
-      if (find_effect(effect.effect)->acts_on == ActsOn::position && !effect.linear_std.empty()) continue;  // from a link encoder
+      if (find_effect(effect.effect)->acts_on == ActsOn::position && !effect.linear_std.empty())
+        continue;  // from a link encoder
       effect.linear_std.assign(effect.linear.size(), 0.0);
       effect.shape_std.assign(effect.shape.size(), 0.0);
     }
@@ -438,10 +445,10 @@ void check_same_robot(Models models, const std::vector<SessionLog>& logs, const 
     strange += !explained;
   }
   if (2 * strange > judged) {
-    throw DataError(
-        fmt::format("the baseline and these logs can't be of one robot: nothing explains both at {} of {} joints; other "
-                    "units, columns or gains? Correct the baseline or remove it (role = \"baseline\")",
-                    strange, judged));
+    throw DataError(fmt::format(
+        "the baseline and these logs can't be of one robot: nothing explains both at {} of {} joints; other "
+        "units, columns or gains? Correct the baseline or remove it (role = \"baseline\")",
+        strange, judged));
   }
 }
 
@@ -486,14 +493,19 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
     deflections = find_deflections(model, data.logs, baseline, bent_already);
     notes.insert(notes.end(), deflections.notes.begin(), deflections.notes.end());
     for (const DeflectionEffect& effect : bent_already) {
-      notes.push_back(fmt::format("{}: the baseline has {} already", project.robot.joints[effect.joint].name, effect.fit.effect));
+      notes.push_back(
+          fmt::format("{}: the baseline has {} already", project.robot.joints[effect.joint].name, effect.fit.effect));
       models.fixed.push_back({effect.fit.effect, effect.joint, effect.fit.shape});
     }
-    for (const DeflectionEffect& effect : deflections.found) models.fixed.push_back({effect.fit.effect, effect.joint, effect.fit.shape});
+    for (const DeflectionEffect& effect : deflections.found)
+      models.fixed.push_back({effect.fit.effect, effect.joint, effect.fit.shape});
     for (std::size_t j = 0; j < n; ++j) {
-      const bool encoded = std::all_of(data.logs.begin(), data.logs.end(), [&](const ProcessedLog& log) { return log.qlink.size() > 0 && log.has_link[j]; });
+      const bool encoded = std::all_of(data.logs.begin(), data.logs.end(), [&](const ProcessedLog& log) {
+        return log.qlink.size() > 0 && log.has_link[j];
+      });
       if (!encoded) continue;
-      for (const std::string_view effect : {Elasticity::name, Backlash::name, Eccentricity::name}) never.push_back({std::string(effect), j, {}});
+      for (const std::string_view effect : {Elasticity::name, Backlash::name, Eccentricity::name})
+        never.push_back({std::string(effect), j, {}});
     }
   };
   const auto bend_already = [&](IdentifiedModel& model) {
@@ -529,22 +541,25 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
       before.push_back(log);
       before.back().healthy = false;
     }
-    for (int round = 0; round < 2; ++round) refit(alone, before, {}, 8);
+    for (int round = 0; round < 2; ++round) refit(alone, before, {}, 4);
     Outcome background;
     background.at = std::make_unique<Linearised>(alone, before);
     look_for_lack(background);
-    const bool structured = std::any_of(background.lack.begin(), background.lack.end(), [](const LackOfFit& l) { return l.structured(); });
+    const bool structured =
+        std::any_of(background.lack.begin(), background.lack.end(), [](const LackOfFit& l) { return l.structured(); });
     if (structured) {
       background = explore(alone, before, modest, never, progress);
       alone = background.models;
       for (std::size_t j = 0; j < n; ++j) {
         for (EffectFit& fit : alone.current.joints[j].effects) {
-          if (fit.named) notes.push_back(fmt::format("{}: the baseline has {} already", project.robot.joints[j].name, fit.effect));
+          if (fit.named)
+            notes.push_back(fmt::format("{}: the baseline has {} already", project.robot.joints[j].name, fit.effect));
           fit.named = false;
         }
         if (background.lack[j].structured()) models.background.push_back(j);
         if (background.lack[j].structured())
-          notes.push_back(fmt::format("{}: the baseline has structure that no effect explains", project.robot.joints[j].name));
+          notes.push_back(
+              fmt::format("{}: the baseline has structure that no effect explains", project.robot.joints[j].name));
       }
       for (EffectFit& fit : alone.current.body) fit.named = false;
     }
@@ -558,7 +573,8 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
   }
   check_splits(data.logs);
   models.current.session = session;
-  for (const DeflectionEffect& effect : deflections.found) models.current.joints[effect.joint].effects.push_back(effect.fit);
+  for (const DeflectionEffect& effect : deflections.found)
+    models.current.joints[effect.joint].effects.push_back(effect.fit);
   const std::vector<VectorXd> plain(n, VectorXd::Zero(1));
   refit(models, logs, plain, 8);
   Diagnosis result;
@@ -567,7 +583,8 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
     Models with = models;
     add_deviations(with, at);
     result.nominal = with.current;
-    for (JointFit& joint : result.nominal.joints) std::erase_if(joint.effects, [](const EffectFit& fit) { return fit.named; });
+    for (JointFit& joint : result.nominal.joints)
+      std::erase_if(joint.effects, [](const EffectFit& fit) { return fit.named; });
   }
 
   Outcome outcome = explore(models, logs, settings, never, progress);
@@ -576,7 +593,8 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
   const auto judge = [&] {
     const std::vector<std::size_t> groups = in_model(*outcome.at);
     HeldOut held = hold_out(*outcome.at, outcome.features, groups);
-    if (std::none_of(outcome.lack.begin(), outcome.lack.end(), [](const LackOfFit& l) { return l.structured(); })) return held;
+    if (std::none_of(outcome.lack.begin(), outcome.lack.end(), [](const LackOfFit& l) { return l.structured(); }))
+      return held;
     const Linearised at(outcome.models, logs, plain);
     std::vector<MatrixXd> in_band(n);
     parallel_for(n, [&](std::size_t j) { in_band[j] = features(at, j); });
@@ -596,7 +614,9 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
   bool drifted = false;
   for (std::size_t j = 0; j < n; ++j) {
     for (std::size_t e = 0; e < outcome.models.current.joints[j].effects.size(); ++e) {
-      if (outcome.models.current.joints[j].effects[e].effect != FrictionDrift::name || !outcome.models.current.joints[j].effects[e].named) continue;
+      if (outcome.models.current.joints[j].effects[e].effect != FrictionDrift::name ||
+          !outcome.models.current.joints[j].effects[e].named)
+        continue;
       const double found = outcome.models.current.joints[j].effects[e].shape[0];
       double best = found, least = 1e300;
       for (const double factor : {1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 2.0}) {
@@ -604,7 +624,8 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
         other.current.joints[j].effects[e].shape[0] = std::clamp(found * factor, 0.1, 1e4);
         const Linearised at(other, logs, outcome.whitening);
         double sum = 0;
-        for (const Fold& fold : at.folds()) sum += at.square(at.solve(columns_of(at, in_model(at)), fold.fit), fold.judge)[static_cast<Index>(j)];
+        for (const Fold& fold : at.folds())
+          sum += at.square(at.solve(columns_of(at, in_model(at)), fold.fit), fold.judge)[static_cast<Index>(j)];
         if (sum >= least) continue;
         least = sum;
         best = other.current.joints[j].effects[e].shape[0];
@@ -636,7 +657,9 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
     outcome.found.clear();
     for (const std::size_t g : groups) {
       for (Found f : before) {
-        if (!same(old[f.group].candidate, old[f.group].on_body, outcome.at->groups()[g].candidate, outcome.at->groups()[g].on_body)) continue;
+        if (!same(old[f.group].candidate, old[f.group].on_body, outcome.at->groups()[g].candidate,
+                  outcome.at->groups()[g].on_body))
+          continue;
         f.group = g;
         outcome.found.push_back(f);
         break;
@@ -649,7 +672,8 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
 
   const Linearised& at = *outcome.at;
   Models& found = outcome.models;
-  const bool remainder = std::any_of(outcome.lack.begin(), outcome.lack.end(), [](const LackOfFit& l) { return l.structured(); });
+  const bool remainder =
+      std::any_of(outcome.lack.begin(), outcome.lack.end(), [](const LackOfFit& l) { return l.structured(); });
   if (groups.empty() && deflections.found.empty()) {
     found.current = models.current;
   } else if (remainder) {
@@ -680,9 +704,8 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
   for (std::size_t j = 0; j < n; ++j) {
     auto& effects = found.current.joints[j].effects;
     for (EffectFit& fit : effects) {
-      const bool fixed = std::any_of(models.fixed.begin(), models.fixed.end(), [&](const EffectCandidate& c) {
-        return c.joint == j && c.effect == fit.effect;
-      });
+      const bool fixed = std::any_of(models.fixed.begin(), models.fixed.end(),
+                                     [&](const EffectCandidate& c) { return c.joint == j && c.effect == fit.effect; });
       if (!fixed) fit.named &= accepted[j];
     }
     if (still[j]) effects.clear();
@@ -721,7 +744,8 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
   };
   const auto share_of_model = [&](const EffectFit& fit, std::size_t j) {
     IdentifiedModel less = result.model;
-    std::erase_if(less.joints[j].effects, [&](const EffectFit& f) { return f.effect == fit.effect && f.shape == fit.shape; });
+    std::erase_if(less.joints[j].effects,
+                  [&](const EffectFit& f) { return f.effect == fit.effect && f.shape == fit.shape; });
     const MatrixXd without = predict(less, *shown.front());
     const auto k = static_cast<Index>(j);
     return (torque_after.front() - without).col(k).norm() / std::max(torque_after.front().col(k).norm(), 1e-300);
@@ -734,7 +758,8 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
         if (!body && a.candidate.joint != j) continue;
         if (std::find(alternatives.begin(), alternatives.end(), a.candidate.effect) != alternatives.end()) continue;
         alternatives.push_back(a.candidate.effect);
-        advise(fmt::format("{} or {} at joint {}: {}", fit.effect, a.candidate.effect, j + 1, cure(fit.effect, a.candidate.effect)));
+        advise(fmt::format("{} or {} at joint {}: {}", fit.effect, a.candidate.effect, j + 1,
+                           cure(fit.effect, a.candidate.effect)));
       }
     }
     return json{{"effect", fit.effect},
@@ -746,7 +771,8 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
   const auto found_of = [&](const EffectFit& fit, std::size_t j, bool body) -> std::pair<const Found*, std::size_t> {
     for (std::size_t i = 0; i < groups.size(); ++i) {
       const Group& group = at.groups()[groups[i]];
-      if (group.candidate.effect != fit.effect || group.on_body != body || (!body && group.candidate.joint != j)) continue;
+      if (group.candidate.effect != fit.effect || group.on_body != body || (!body && group.candidate.joint != j))
+        continue;
       if (group.candidate.shape != fit.shape && group.candidate.effect == Ripple::name) continue;
       for (const Found& f : outcome.found) {
         if (f.group == groups[i]) return {&f, i};
@@ -793,7 +819,8 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
       before *= held.before[k] / std::max(held.rows[k], 1.0) / (at.weights()[k] * without.square[k] / rows[k]);
       after *= held.after[k] / std::max(held.rows[k], 1.0) / (at.weights()[k] * all.square[k] / rows[k]);
     }
-    const double rms_before = std::sqrt(before / std::max(count, 1.0)), rms_after = std::sqrt(after / std::max(count, 1.0));
+    const double rms_before = std::sqrt(before / std::max(count, 1.0)),
+                 rms_after = std::sqrt(after / std::max(count, 1.0));
     const double floor = rms_after * std::sqrt(std::max(0.0, 1 - held.leftover[k] / std::max(held.after[k], 1e-300)));
     json effects = json::array(), resembles = json::array();
     for (const EffectFit& fit : found.current.joints[j].effects) {
@@ -839,10 +866,12 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
                 {"lack_of_fit", {{"state_p", outcome.lack[j].state_p}, {"time_p", outcome.lack[j].time_p}}}};
     if (unexplained) {
       const json& regions = one["where"];
-      advise(fmt::format("record more of joint {}{}", j + 1,
-                         regions.empty() ? std::string()
-                                         : fmt::format(" where the gap sits ({} from {:.3g} to {:.3g})", regions[0]["signal"].get<std::string>(),
-                                                       regions[0]["from"].get<double>(), regions[0]["to"].get<double>())));
+      advise(fmt::format(
+          "record more of joint {}{}", j + 1,
+          regions.empty()
+              ? std::string()
+              : fmt::format(" where the gap sits ({} from {:.3g} to {:.3g})", regions[0]["signal"].get<std::string>(),
+                            regions[0]["from"].get<double>(), regions[0]["to"].get<double>())));
     }
     joints.push_back(std::move(one));
   }
@@ -868,7 +897,10 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
       if (reached && joint["verdict"] == "nothing_missing") joint["verdict"] = "effects_found";
     }
   }
-  const std::string verdict = any_unexplained ? "unexplained" : any_effect ? "effects_found" : any_still ? "not_excited" : "nothing_missing";
+  const std::string verdict = any_unexplained ? "unexplained"
+                              : any_effect    ? "effects_found"
+                              : any_still     ? "not_excited"
+                                              : "nothing_missing";
   result.report = {{"schema", "fxdyn.diagnosis/1"},
                    {"verdict", verdict},
                    {"joints", joints},

@@ -65,7 +65,8 @@ std::vector<std::vector<double>> grids(const EffectInfo& info, std::size_t joint
     } else if (shape.name == "time_constant") {
       values = geometric(0.1 * s.seconds, 4 * s.seconds, 5);
     } else if (shape.name == "limit") {
-      for (const double share : {0.45, 0.55, 0.63, 0.7, 0.76, 0.82, 0.87, 0.91, 0.95}) values.push_back(share * s.torque);
+      for (const double share : {0.45, 0.55, 0.63, 0.7, 0.76, 0.82, 0.87, 0.91, 0.95})
+        values.push_back(share * s.torque);
     } else if (shape.name == "time") {
       values = geometric(5e-4, std::min(0.03, static_cast<double>(Delay::largest) * s.step_s), 5);
     } else if (shape.name == "relaxation") {
@@ -114,7 +115,8 @@ std::vector<Group> dictionary(const Linearised& at, const std::vector<EffectCand
       });
       if (skipped) continue;
       // A balancer's force over the angle of a joint that turns.
-      if (info.name == GravityCompensator::name && at.models().current.robot.joints[j].type != JointType::revolute) continue;
+      if (info.name == GravityCompensator::name && at.models().current.robot.joints[j].type != JointType::revolute)
+        continue;
       const Scales s = scales_of(at, j);
       std::vector<std::vector<double>> shapes{{}};
       double continuous = 0;
@@ -129,15 +131,16 @@ std::vector<Group> dictionary(const Linearised& at, const std::vector<EffectCand
         shapes = std::move(more);
       }
       const int searched = searched_shape({std::string(info.name), j, {}});
-      if (searched >= 0) continuous = static_cast<double>(grids(info, j, at, s)[static_cast<std::size_t>(searched)].size());
+      if (searched >= 0)
+        continuous = static_cast<double>(grids(info, j, at, s)[static_cast<std::size_t>(searched)].size());
       for (const auto& shape : shapes) {
         Group group;
         group.candidate = {std::string(info.name), j, shape};
         group.on_body = info.acts_on == ActsOn::body;
         // A share that is 1 by definition is not free.
         group.nonlinear = (searched >= 0) - (info.linear[0].name == "share");
-        group.log_grid = std::log(std::max(1.0, static_cast<double>(shapes.size()) / std::max(1.0, continuous) *
-                                                    std::max(1.0, 0.5 * continuous)));
+        group.log_grid = std::log(std::max(
+            1.0, static_cast<double>(shapes.size()) / std::max(1.0, continuous) * std::max(1.0, 0.5 * continuous)));
         for (const ParameterInfo& p : info.linear) group.lower.push_back(p.lower);
         out.push_back(std::move(group));
       }
@@ -172,8 +175,7 @@ std::vector<Group> ripples(const Linearised& at, std::size_t joint, const Vector
       q.push_back(at.motion(l).q(k, j));
       g.push_back(full[k] * static_cast<double>(stride));
     }
-    for (Index r = 0; r < b.count; ++r)
-      speed.push_back(std::fabs(at.motion(l).dq(log.first + r * log.decimation, j)));
+    for (Index r = 0; r < b.count; ++r) speed.push_back(std::fabs(at.motion(l).dq(log.first + r * log.decimation, j)));
   }
   std::sort(speed.begin(), speed.end());
   constexpr std::size_t bins = 64;
@@ -193,7 +195,8 @@ std::vector<Group> ripples(const Linearised& at, std::size_t joint, const Vector
     return 0.5 * sum / static_cast<double>(bins) * static_cast<double>(speed.size());
   };
   const double cell = 2 * std::numbers::pi / s.range, step = cell / 4;
-  const double lowest = std::max(find_effect(Ripple::name)->shape[0].lower, std::max(0.6 * cell, 1.3 * std::min(1.0, 6.0 / s.range)));
+  const double lowest =
+      std::max(find_effect(Ripple::name)->shape[0].lower, std::max(0.6 * cell, 1.3 * std::min(1.0, 6.0 / s.range)));
   const double floor = 2e-3 * power(lowest);
   constexpr std::size_t most_wavenumbers = 2400;
   std::vector<double> n, p;

@@ -80,7 +80,8 @@ double line_chance(const Linearised& at, const VectorXd& e) {
       power[k] = s1 * s1 + s2 * s2 - c * s1 * s2;
     }
     for (Index k = 0; k < bins; ++k) {
-      const Index from = std::clamp<Index>(k - 15, 0, std::max<Index>(0, bins - 31)), n = std::min<Index>(31, bins - from);
+      const Index from = std::clamp<Index>(k - 15, 0, std::max<Index>(0, bins - 31)),
+                  n = std::min<Index>(31, bins - from);
       VectorXd near = power.segment(from, n);
       std::nth_element(near.begin(), near.begin() + n / 2, near.end());
       const double level = near[n / 2] / std::numbers::ln2;
@@ -122,7 +123,9 @@ MatrixXd features(const Linearised& at, std::size_t joint, bool healthy) {
   Eigen::ArrayXd speed = Eigen::ArrayXd::Zero(static_cast<Index>(n)), acceleration = speed, load = speed;
   for (std::size_t l = 0; l < at.logs().size(); ++l) {
     const ProcessedLog& log = at.logs()[l].log;
-    const auto inside = [&](const MatrixXd& m) { return m.middleRows(log.first, log.last - log.first).array().abs().colwise().maxCoeff().transpose(); };
+    const auto inside = [&](const MatrixXd& m) {
+      return m.middleRows(log.first, log.last - log.first).array().abs().colwise().maxCoeff().transpose();
+    };
     speed = speed.max(inside(at.motion(l).dq).eval());
     acceleration = acceleration.max(inside(at.motion(l).ddq).eval());
     load = load.max(inside(at.robot_columns(l).structural()).eval());
@@ -218,8 +221,10 @@ LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& 
   const MatrixXd b = w * (f.transpose() * surrogate) - z.transpose() * theirs;
   VectorXd null(surrogate.cols());
   for (Index s = 0; s < null.size(); ++s) null[s] = statistic(b.col(s));
-  const double mean = null.mean(), variance = (null.array() - mean).square().sum() / static_cast<double>(null.size() - 1);
-  const double freedom = std::clamp(2 * mean * mean / std::max(variance, 1e-300), 3.0, static_cast<double>(kept.size()));
+  const double mean = null.mean(),
+               variance = (null.array() - mean).square().sum() / static_cast<double>(null.size() - 1);
+  const double freedom =
+      std::clamp(2 * mean * mean / std::max(variance, 1e-300), 3.0, static_cast<double>(kept.size()));
   out.state_p = chance(mine / std::max(mean, 1e-300), freedom);
   out.time_p = std::min(line_chance(at, residual), at.models().has_baseline ? slow_chance(at, residual) : 1.0);
   return out;

@@ -15,8 +15,8 @@ struct LackOfFit {
   bool structured() const { return state_p < 1e-6 || time_p < 1e-8; }
 };
 
-/// Is there structure in what a fit leaves of a joint, on the rows that fit? The statistic's distribution comes from the
-/// same residual at other times, so that noise of any colour counts as noise.
+/// Is there structure in what a fit leaves of a joint, on the rows that fit? The statistic's distribution comes from
+/// the same residual at other times, so that noise of any colour counts as noise.
 LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& fit, const Eigen::MatrixXd& features);
 
 /// Share of the squared residual of a fit on the blocks that is a function of the state, the expected part of noise

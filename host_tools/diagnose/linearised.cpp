@@ -123,8 +123,8 @@ Linearised::Linearised(const Models& models, const std::vector<SessionLog>& logs
     MotionRows m = log.motion();
     motions_[l] = std::make_unique<Motion>(
         Motion{log.name, log.step_s, log.t, std::move(m.q), std::move(m.dq), std::move(m.ddq)});
-    robot_[l] = std::make_unique<RobotColumns>(
-        with_load_of(log, logs[l].healthy ? models_.healthy : models_.current), *motions_[l]);
+    robot_[l] = std::make_unique<RobotColumns>(with_load_of(log, logs[l].healthy ? models_.healthy : models_.current),
+                                               *motions_[l]);
   });
   make_blocks();
   make_unknowns();
@@ -267,7 +267,8 @@ void Linearised::make_unknowns() {
   };
   for (std::size_t j = 0; j < now.joints.size(); ++j) {
     for (std::size_t e = 0; e < now.joints[j].effects.size(); ++e) {
-      if (now.joints[j].effects[e].named && !fixed(j, now.joints[j].effects[e])) named(now.joints[j].effects[e], j, e, false);
+      if (now.joints[j].effects[e].named && !fixed(j, now.joints[j].effects[e]))
+        named(now.joints[j].effects[e], j, e, false);
     }
   }
   for (std::size_t e = 0; e < now.body.size(); ++e) {
@@ -283,7 +284,8 @@ MatrixXd Linearised::follow(std::size_t log, std::size_t joint, MatrixXd columns
     const double share = effect->linear[0];
     if (effect->effect == Saturation::name) {
       const auto torque = robot_[log]->torque().col(static_cast<Index>(joint)).array().abs();
-      const Eigen::ArrayXd pass = (torque < effect->shape[0] * (1 - 1e-9)).select(Eigen::ArrayXd::Ones(torque.size()), 1 - share);
+      const Eigen::ArrayXd pass =
+          (torque < effect->shape[0] * (1 - 1e-9)).select(Eigen::ArrayXd::Ones(torque.size()), 1 - share);
       columns = pass.matrix().asDiagonal() * columns;
       continue;
     }
@@ -333,13 +335,18 @@ VectorXd Linearised::certainty(std::size_t log, std::size_t joint, double sigma)
   // Twice white noise's: an encoder at standstill repeats its error.
   const double cutoff = std::min(l.filter.position_cutoff_hz, 0.5 / l.step_s);
   const double sigma_dq = 2 * 2 * std::numbers::pi * noise * std::sqrt(2 * l.step_s * cutoff * cutoff * cutoff / 3);
-  const double amplitude = std::fabs(coulomb->linear[0]), width = fit.sign_width;
+  const double width = fit.sign_width;
+  // All friction that turns with the sign, some of it in proportion to the load.
+  double amplitude = std::fabs(coulomb->linear[0]), of_load = 0;
+  if (const EffectFit* stribeck = fit.find(Stribeck::name)) amplitude += std::fabs(stribeck->linear[0]);
+  if (const EffectFit* load = fit.find(LoadFriction::name)) of_load = std::fabs(load->linear[0]);
   VectorXd uncertain(l.samples());
   for (Index k = 0; k < l.samples(); ++k) {
     const double dq = (*motions_[log]).dq(k, static_cast<Index>(joint));
     // the mean slope over what the velocity may be
     const double slope = (std::tanh((dq + sigma_dq) / width) - std::tanh((dq - sigma_dq) / width)) / (2 * sigma_dq);
-    uncertain[k] = amplitude * slope * sigma_dq / sigma;
+    const double load = std::fabs(robot_[log]->structural()(k, static_cast<Index>(joint)));
+    uncertain[k] = (amplitude + of_load * load) * slope * sigma_dq / sigma;
   }
   VectorXd rows = l.decimate(l.filter_columns(uncertain.cwiseAbs2()));
   return (1 + rows.array().max(0)).sqrt().inverse();
@@ -380,7 +387,8 @@ void Linearised::make_rows() {
       if (felt) rows.column.push_back(c);
     }
     rows.local.assign(static_cast<std::size_t>(columns_), -1);
-    for (std::size_t i = 0; i < rows.column.size(); ++i) rows.local[static_cast<std::size_t>(rows.column[i])] = static_cast<Index>(i);
+    for (std::size_t i = 0; i < rows.column.size(); ++i)
+      rows.local[static_cast<std::size_t>(rows.column[i])] = static_cast<Index>(i);
     rows.x.setZero(total, static_cast<Index>(rows.column.size()));
     rows.y.setZero(total);
   }
@@ -391,8 +399,7 @@ void Linearised::make_rows() {
     const Motion& motion = *motions_[l];
     const Index at = log_rows_[l].first, count = log_rows_[l].count;
     std::vector<MatrixXd> full(n);
-    for (std::size_t j = 0; j < n; ++j)
-      full[j].setZero(log.samples(), static_cast<Index>(rows_[j].column.size()) + 1);
+    for (std::size_t j = 0; j < n; ++j) full[j].setZero(log.samples(), static_cast<Index>(rows_[j].column.size()) + 1);
     Regressor regressor(chain_);
     for (Index k = 0; k < log.samples(); ++k) {
       const MatrixXd& y = regressor(motion.q.row(k), motion.dq.row(k), motion.ddq.row(k));
@@ -445,7 +452,8 @@ void Linearised::make_rows() {
           const MatrixXd slope = (loaded(more) - loaded(less)) / (2 * step);
           for (std::size_t j = 0; j < n; ++j) columns[j] = slope.col(static_cast<Index>(j));
         } else if (u.kind == Unknown::Kind::linear) {
-          columns[u.joint] = full_rate(l, {fit.effect, u.joint, fit.shape}).joints[u.joint].col(static_cast<Index>(u.index));
+          columns[u.joint] =
+              full_rate(l, {fit.effect, u.joint, fit.shape}).joints[u.joint].col(static_cast<Index>(u.index));
         } else {
           EffectCandidate more{fit.effect, u.joint, fit.shape}, less = more;
           more.shape[u.index] *= 1 + difference;
@@ -487,7 +495,8 @@ void Linearised::make_rows() {
   for (Index c = 0; c < columns_; ++c) all.push_back(c);
   parallel_for(n, [&](std::size_t j) {
     JointRows& rows = rows_[j];
-    for (std::size_t i = 0; i < rows.column.size(); ++i) rows.y += rows.x.col(static_cast<Index>(i)) * x0[rows.column[i]];
+    for (std::size_t i = 0; i < rows.column.size(); ++i)
+      rows.y += rows.x.col(static_cast<Index>(i)) * x0[rows.column[i]];
     sum_up(rows, 0);
   });
   const auto reweight = [&] {
@@ -498,7 +507,8 @@ void Linearised::make_rows() {
         double square = 0;
         for (const std::size_t b : fit_blocks_) square += rows_[j].sums[b].square;
         // noise-free: no more than 1e-9 of the signal
-        weights_[static_cast<Index>(j)] = fit.rows[static_cast<Index>(j)] / std::max(fit.square[static_cast<Index>(j)], 1e-18 * square + 1e-300);
+        weights_[static_cast<Index>(j)] =
+            fit.rows[static_cast<Index>(j)] / std::max(fit.square[static_cast<Index>(j)], 1e-18 * square + 1e-300);
       }
     }
     return solve(all);
@@ -514,8 +524,10 @@ void Linearised::make_rows() {
     for (const std::size_t b : fit_blocks_) {
       for (Index i = 0; i < blocks_[b].count; ++i) magnitude.push_back(std::fabs(e[blocks_[b].first + i]));
     }
-    std::nth_element(magnitude.begin(), magnitude.begin() + static_cast<std::ptrdiff_t>(magnitude.size() / 2), magnitude.end());
-    const double sigma = std::max(1.4826 * magnitude[magnitude.size() / 2], 1e-12 / std::sqrt(weights_[static_cast<Index>(j)]));
+    std::nth_element(magnitude.begin(), magnitude.begin() + static_cast<std::ptrdiff_t>(magnitude.size() / 2),
+                     magnitude.end());
+    const double sigma =
+        std::max(1.4826 * magnitude[magnitude.size() / 2], 1e-12 / std::sqrt(weights_[static_cast<Index>(j)]));
     row_scale_[j].resize(total);
     std::vector<VectorXd> parts;
     for (std::size_t l = 0; l < logs_->size(); ++l) {
@@ -550,7 +562,8 @@ void Linearised::add_background(std::size_t joint) {
   const Index from = rows.x.cols();
   rows.x.conservativeResize(Eigen::NoChange, from + more.cols());
   // Of the size of the noise each at most: friction and base parameters must not hide in it.
-  const VectorXd rms = (more.colwise().norm() / std::sqrt(static_cast<double>(more.rows()))).transpose().array().max(1e-300);
+  const VectorXd rms =
+      (more.colwise().norm() / std::sqrt(static_cast<double>(more.rows()))).transpose().array().max(1e-300);
   rows.x.rightCols(more.cols()) = more * rms.cwiseInverse().asDiagonal();
   background_information_.resize(joints(), 0.0);
   background_information_[joint] = 4 * weights_[static_cast<Index>(joint)];
@@ -715,7 +728,8 @@ VectorXd Linearised::square(const LinearFit& fit, const std::vector<std::size_t>
   VectorXd out = VectorXd::Zero(static_cast<Index>(joints()));
   for (std::size_t j = 0; j < joints(); ++j) {
     const VectorXd e = residual(j, fit);
-    for (const std::size_t b : blocks) out[static_cast<Index>(j)] += e.segment(blocks_[b].first, blocks_[b].count).squaredNorm();
+    for (const std::size_t b : blocks)
+      out[static_cast<Index>(j)] += e.segment(blocks_[b].first, blocks_[b].count).squaredNorm();
   }
   return out;
 }
@@ -797,7 +811,8 @@ void update(Models& models, const Linearised& at, const LinearFit& fit, double s
       continue;
     }
     add_to(models.current, u, step);
-    const bool named = u.kind != Unknown::Kind::base && u.kind != Unknown::Kind::width && fit_of(models.current, u).named;
+    const bool named =
+        u.kind != Unknown::Kind::base && u.kind != Unknown::Kind::width && fit_of(models.current, u).named;
     if (models.has_baseline && !u.change && !named) add_to(models.healthy, u, step);
   }
 }

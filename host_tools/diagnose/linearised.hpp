@@ -17,7 +17,7 @@ namespace fxdyn::diagnosis {
 struct Models {
   IdentifiedModel healthy, current;
   bool has_baseline = false;
-  std::vector<EffectCandidate> fixed;  ///< what a link encoder gave: the torque does not change it
+  std::vector<EffectCandidate> fixed;   ///< what a link encoder gave: the torque does not change it
   std::vector<std::size_t> background;  ///< joints whose healthy session has structure that no effect explains
 };
 
@@ -49,13 +49,13 @@ struct Unknown {
 struct Group {
   EffectCandidate candidate;
   bool on_body = false;
-  bool in_model = false;         ///< columns are d torque / d (unknown) around the named effect
-  Eigen::Index first = 0;        ///< column
-  Eigen::Index count = 0;        ///< columns
-  int nonlinear = 0;             ///< shape parameters that were searched
-  double log_grid = 0;           ///< ln of the number of independent shapes tried
-  std::vector<double> lower{};   ///< bounds of the coefficients
-  bool noise_limited = false;    ///< what is seen of it is encoder noise
+  bool in_model = false;        ///< columns are d torque / d (unknown) around the named effect
+  Eigen::Index first = 0;       ///< column
+  Eigen::Index count = 0;       ///< columns
+  int nonlinear = 0;            ///< shape parameters that were searched
+  double log_grid = 0;          ///< ln of the number of independent shapes tried
+  std::vector<double> lower{};  ///< bounds of the coefficients
+  bool noise_limited = false;   ///< what is seen of it is encoder noise
 };
 
 /// Rows that are used or left out together.

@@ -40,8 +40,10 @@ double misfit(const Linearised& at) {
     const Eigen::MatrixXd x = at.rows(j).x(used, local);
     const VectorXd y = e(used);
     Eigen::MatrixXd gram = x.transpose() * x;
-    gram.diagonal().array() +=
-        local.empty() ? 0 : at.background_information(at.rows(j).column[static_cast<std::size_t>(local[0])]) / at.weights()[static_cast<Index>(j)];
+    gram.diagonal().array() += local.empty()
+                                   ? 0
+                                   : at.background_information(at.rows(j).column[static_cast<std::size_t>(local[0])]) /
+                                         at.weights()[static_cast<Index>(j)];
     square[static_cast<Index>(j)] = (y - x * SymmetricSolver(gram).solve(x.transpose() * y)).squaredNorm();
   }
   for (Index j = 0; j < square.size(); ++j) sum += rows[j] * std::log(std::max(square[j], 1e-300));
@@ -103,9 +105,11 @@ void name(Models& models, const Group& group, const VectorXd& theta) {
   if (info.linear[0].name == "share") fit.linear[0] = 1;
   if (fit.effect == Payload::name) {
     fit.linear[0] = std::max(fit.linear[0], 1e-6);
-    for (std::size_t i = 1; i < fit.linear.size(); ++i) fit.linear[i] = std::clamp(fit.linear[i] / fit.linear[0], -10.0, 10.0);
+    for (std::size_t i = 1; i < fit.linear.size(); ++i)
+      fit.linear[i] = std::clamp(fit.linear[i] / fit.linear[0], -10.0, 10.0);
   }
-  (group.on_body ? models.current.body : models.current.joints[group.candidate.joint].effects).push_back(std::move(fit));
+  (group.on_body ? models.current.body : models.current.joints[group.candidate.joint].effects)
+      .push_back(std::move(fit));
 }
 
 }  // namespace fxdyn::diagnosis

@@ -138,6 +138,13 @@ bool Search::allowed(const Choice& state, std::size_t g) const {
     const Group& o = at_.groups()[other];
     if (o.on_body) ++robot;
     if (!o.on_body && o.candidate.joint == group.candidate.joint) ++here;
+    // Both have dq_k: together they are two large torques that cancel.
+    const auto couples = [](const Group& one) {
+      return one.candidate.effect == JointCoupling::name || one.candidate.effect == MotorCoupling::name;
+    };
+    if (couples(group) && couples(o) && o.candidate.joint == group.candidate.joint &&
+        o.candidate.shape[0] == group.candidate.shape[0])
+      return false;
     if (o.on_body != group.on_body || o.candidate.effect != group.candidate.effect) continue;
     if (!group.on_body && o.candidate.joint != group.candidate.joint) continue;
     if (!several_allowed(group.candidate.effect)) return false;
@@ -256,7 +263,8 @@ std::vector<Search::Scored> Search::score_all(const Choice& state, bool with_thr
       VectorXd most = VectorXd::Constant(shifts, -30.0);
       for (std::size_t g = 0; g < at_.groups().size(); ++g) {
         const Group& group = at_.groups()[g];
-        if (usable[g] == 0 || group.on_body || group.candidate.joint != j || group.candidate.effect == Ripple::name) continue;
+        if (usable[g] == 0 || group.on_body || group.candidate.joint != j || group.candidate.effect == Ripple::name)
+          continue;
         const Index local = rows.local[static_cast<std::size_t>(group.first)];
         if (local < 0) continue;
         const MatrixXd b = products.middleRows(local, group.count) -
@@ -309,7 +317,8 @@ std::size_t Search::refine(const Choice& state, std::size_t g) {
         left.projection += w * c.transpose() * rows.y.segment(block.first, block.count);
         for (std::size_t i = 0; i < state.fit.columns.size(); ++i) {
           const Index at = rows.local[static_cast<std::size_t>(state.fit.columns[i])];
-          if (at >= 0) cross.row(static_cast<Index>(i)) += w * rows.x.col(at).segment(block.first, block.count).transpose() * c;
+          if (at >= 0)
+            cross.row(static_cast<Index>(i)) += w * rows.x.col(at).segment(block.first, block.count).transpose() * c;
         }
       }
     }

@@ -42,7 +42,7 @@ struct SearchSettings {
   std::size_t max_effects = 3;  ///< per joint
   std::size_t robot_effects = 2;
   std::size_t most = 8;  ///< of the whole robot: what needs more is not explained by the catalogue
-  double within = 10;  ///< alternatives are no further behind
+  double within = 10;    ///< alternatives are no further behind
 };
 
 /// Beam search forward, swaps, backward elimination.

@@ -134,7 +134,8 @@ nlohmann::json where(const IdentifiedModel& model, const std::vector<const Proce
   nlohmann::json out = nlohmann::json::array();
   for (const Region& region : regions) {
     if (out.size() >= most_regions || (region.contrast < telling && !out.empty())) break;
-    out.push_back({{"signal", region.signal}, {"from", region.from}, {"to", region.to}, {"share_of_gap", region.share}});
+    out.push_back(
+        {{"signal", region.signal}, {"from", region.from}, {"to", region.to}, {"share_of_gap", region.share}});
   }
   return out;
 }

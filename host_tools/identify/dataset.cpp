@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <complex>
+#include <numbers>
 
 #include "host_tools/error.hpp"
 #include "host_tools/log/spectrum.hpp"
@@ -316,8 +316,7 @@ double age_of(const IdentifiedModel& model, const ProcessedLog& log) {
     }
   }
   const double start = log.t[0];
-  const bool belongs =
-      start >= model.session->start_s && start <= model.session->end_s + constants_till_cold * longest;
+  const bool belongs = start >= model.session->start_s && start <= model.session->end_s + constants_till_cold * longest;
   return longest > 0 && belongs ? start - model.session->start_s : 0;
 }
 

@@ -93,7 +93,8 @@ ProcessedLog process(Log log, const FilterFit& filter, const ProcessSettings& se
 IdentifiedModel with_load_of(const ProcessedLog& log, IdentifiedModel model);
 
 /// How long the robot has run when the log begins: since the start of the model's session, where the log's time stamps
-/// say that it belongs to it (up to three of the drift's time constants after its end) and the model drifts; else 0 [s].
+/// say that it belongs to it (up to three of the drift's time constants after its end) and the model drifts; else 0
+/// [s].
 double age_of(const IdentifiedModel& model, const ProcessedLog& log);
 
 /// Whether each joint moves in the train logs by more than its encoder's noise.
