@@ -18,6 +18,8 @@ using Eigen::VectorXd;
 
 constexpr double least_score = 12;
 constexpr double least_closure = 0.5;
+/// Of the power of all parts.
+constexpr double least_part = 0.05;
 /// A parameter that differs by less than this share from the healthy session's has not changed.
 constexpr double same_share = 0.33;
 constexpr Index order = 6;
@@ -222,7 +224,26 @@ Deflections find_deflections(const IdentifiedModel& model, const std::vector<Pro
                healthy = with_link(before, true, Role::train);
     if (train.empty()) return;
     const Rows rows = rows_of(model, train, j);
-    const Set set = best_set(rows);
+    Set set = best_set(rows);
+    // Encoders are so fine that errors of the torque show too: what is a small part of the deflection is no finding.
+    for (bool again = true; again && set.parts.size() > 1;) {
+      again = false;
+      const VectorXd a = colour(rows, residual(design(rows, set.parts), rows.delta));
+      double whole = 0;
+      std::vector<double> sizes;
+      Index at = 0;
+      for (const Part& part : set.parts) {
+        const auto count = static_cast<Index>(find_effect(part.effect)->linear.size());
+        sizes.push_back(std::pow(size_of(rows, part, set.theta.segment(at, count)), 2));
+        whole += sizes.back();
+        at += count;
+      }
+      const auto least = std::min_element(sizes.begin(), sizes.end());
+      if (*least > least_part * whole) break;
+      set.parts.erase(set.parts.begin() + (least - sizes.begin()));
+      fit(rows, a, set);
+      again = true;
+    }
     if (set.parts.empty()) return;
     Set old;
     std::optional<Rows> old_rows;

@@ -478,7 +478,7 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
   SearchSettings settings;
   settings.max_effects = static_cast<std::size_t>(project.diagnose.max_effects);
   // Few things change at once; a robot of which nothing is known may lack more.
-  settings.most = models.has_baseline ? 2 + n / 2 : 2 + 2 * n;
+  settings.most = models.has_baseline ? 4 + n : 2 + 2 * n;
   SearchSettings modest = settings;  // a background need not be named, only taken out
   modest.max_effects = std::min<std::size_t>(2, settings.max_effects);
   modest.most = std::max<std::size_t>(2, n);
@@ -545,8 +545,14 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
     Outcome background;
     background.at = std::make_unique<Linearised>(alone, before);
     look_for_lack(background);
-    const bool structured =
+    bool structured =
         std::any_of(background.lack.begin(), background.lack.end(), [](const LackOfFit& l) { return l.structured(); });
+    if (!structured) {
+      // Ripple is finer than the functions that the test knows.
+      Linearised at(alone, before);
+      Search ripples_only(at, modest);
+      structured = !ripples_only.run({}, progress).groups.empty();
+    }
     if (structured) {
       background = explore(alone, before, modest, never, progress);
       alone = background.models;

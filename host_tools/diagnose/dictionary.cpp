@@ -14,6 +14,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+/// A session must last that long for drift to be looked for.
+constexpr double shortest_drift_s = 20;
+
 std::vector<double> geometric(double from, double to, int count) {
   std::vector<double> values;
   for (int i = 0; i < count; ++i) values.push_back(from * std::pow(to / from, static_cast<double>(i) / (count - 1)));
@@ -118,6 +121,8 @@ std::vector<Group> dictionary(const Linearised& at, const std::vector<EffectCand
       if (info.name == GravityCompensator::name && at.models().current.robot.joints[j].type != JointType::revolute)
         continue;
       const Scales s = scales_of(at, j);
+      // Nothing warms up in a few seconds.
+      if (info.name == FrictionDrift::name && s.seconds < shortest_drift_s) continue;
       std::vector<std::vector<double>> shapes{{}};
       double continuous = 0;
       for (const auto& values : grids(info, j, at, s)) {
