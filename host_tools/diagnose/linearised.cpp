@@ -636,6 +636,7 @@ std::size_t Linearised::add(const Group& group, const std::vector<MatrixXd>& col
 }
 
 void Linearised::add_all(std::vector<Group> groups) {
+  if (groups.empty()) return;
   std::vector<std::vector<MatrixXd>> made(groups.size());
   parallel_for(groups.size(), [&](std::size_t g) { made[g] = make(groups[g].candidate); });
   std::vector<Index> from(joints());

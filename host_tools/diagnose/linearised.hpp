@@ -122,7 +122,7 @@ class Linearised {
   void set_weights(const Eigen::VectorXd& weights) { weights_ = weights; }
 
   /// Columns of candidates (current session), whitened: per joint rows x columns; 0 x 0 where nothing is felt.
-  /// `shortened` for each candidate alone, safe from several threads.
+  /// Safe from several threads.
   std::vector<Eigen::MatrixXd> make(const EffectCandidate& candidate) const;
   /// Appends them as a group; returns its index.
   std::size_t add(const Group& group, const std::vector<Eigen::MatrixXd>& columns);

@@ -189,6 +189,7 @@ Choice Search::evaluate(const std::vector<std::size_t>& groups) const {
 }
 
 std::vector<Search::Scored> Search::score_all(const Choice& state, bool with_thresholds) {
+  if (at_.columns() == static_cast<Index>(at_.unknowns().size())) return {};  // no candidates
   const std::vector<Index>& s = state.fit.columns;
   const auto from = static_cast<Index>(at_.unknowns().size());
   VectorXd weights(static_cast<Index>(at_.joints()));
