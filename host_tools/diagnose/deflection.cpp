@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
+#include "host_tools/diagnose/autoregression.hpp"
+#include "host_tools/identify/regressor.hpp"
 #include "host_tools/identify/solver.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/parallel.hpp"
@@ -20,9 +23,10 @@ constexpr double least_score = 12;
 constexpr double least_closure = 0.5;
 /// Of the power of all parts.
 constexpr double least_part = 0.05;
+/// Times the noise: a deflection without a name that is told of.
+constexpr double worth_a_word = 2;
 /// A parameter that differs by less than this share from the healthy session's has not changed.
 constexpr double same_share = 0.33;
-constexpr Index order = 6;
 
 /// Rows of one joint's logs.
 struct Rows {
@@ -32,6 +36,14 @@ struct Rows {
   VectorXd delta;
   std::size_t joint = 0;
   double width = 0.01;
+  std::vector<MatrixXd> slopes;  ///< d load / d z by log, at full rate; empty: the load is taken as it is
+  VectorXd z;                    ///< of the base parameters, in units of their standard deviations: 0, 1 a priori
+
+  /// The load with the base parameters elsewhere.
+  void move(const VectorXd& to) {
+    for (std::size_t l = 0; l < logs.size(); ++l) series[l].structural += slopes[l] * (to - z);
+    z = to;
+  }
 
   MatrixXd columns(std::string_view effect, const std::vector<double>& shape) const {
     MatrixXd out;
@@ -50,30 +62,39 @@ struct Rows {
     return out;
   }
   MatrixXd whiten(const MatrixXd& x, const VectorXd& a) const {
-    MatrixXd out = x;
-    for (std::size_t l = 0; l < logs.size(); ++l) {
-      auto mine = out.middleRows(first[l], count[l]);
-      const auto from = x.middleRows(first[l], count[l]);
-      for (Index lag = 1; lag <= a.size() && lag < count[l]; ++lag)
-        mine.bottomRows(count[l] - lag) -= a[lag - 1] * from.topRows(count[l] - lag);
-      mine.topRows(std::min<Index>(a.size(), count[l])).setZero();
-    }
+    MatrixXd out(x.rows(), x.cols());
+    for (std::size_t l = 0; l < logs.size(); ++l)
+      out.middleRows(first[l], count[l]) = prewhitened(x.middleRows(first[l], count[l]), a);
     return out;
   }
 };
 
-Rows rows_of(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs, std::size_t joint) {
+/// The torque of the rigid body, all joints.
+std::vector<MatrixXd> loads(const IdentifiedModel& model, const std::vector<ProcessedLog>& logs) {
+  IdentifiedModel rigid = model;
+  for (JointFit& fit : rigid.joints) fit.effects.clear();
+  rigid.filter.torque_lead_s = 0;
+  std::vector<MatrixXd> out(logs.size());
+  parallel_for(logs.size(), [&](std::size_t l) {
+    if (logs[l].qlink.size() > 0) out[l] = predict(rigid, logs[l]);
+  });
+  return out;
+}
+
+struct LinkedLog {
+  const ProcessedLog* log;
+  const MatrixXd* load;
+};
+
+Rows rows_of(const IdentifiedModel& model, const std::vector<LinkedLog>& logs, std::size_t joint) {
   Rows rows;
   rows.joint = joint;
   rows.width = model.joints[joint].sign_width;
   const auto j = static_cast<Index>(joint);
-  IdentifiedModel rigid = model;
-  for (JointFit& fit : rigid.joints) fit.effects.clear();
-  rigid.filter.torque_lead_s = 0;
   Index total = 0;
-  for (const ProcessedLog* log : logs) {
+  for (const auto& [log, load] : logs) {
     MotionRows m = log->joint_motion(j);
-    JointSeries series{m.q, m.dq, m.ddq, predict(rigid, *log).col(j), log->step_s};
+    JointSeries series{m.q, m.dq, m.ddq, load->col(j), log->step_s};
     rows.series.push_back(std::move(series));
     rows.logs.push_back(log);
     rows.first.push_back(total);
@@ -82,10 +103,68 @@ Rows rows_of(const IdentifiedModel& model, const std::vector<const ProcessedLog*
   }
   rows.delta.resize(total);
   for (std::size_t l = 0; l < logs.size(); ++l) {
-    const MatrixXd delta = logs[l]->filter_columns((logs[l]->q - logs[l]->qlink).col(j));
-    rows.delta.segment(rows.first[l], rows.count[l]) = logs[l]->decimate(delta);
+    const ProcessedLog& log = *rows.logs[l];
+    const MatrixXd delta = log.filter_columns((log.q - log.qlink).col(j));
+    rows.delta.segment(rows.first[l], rows.count[l]) = log.decimate(delta);
   }
   return rows;
+}
+
+/// How the load follows from base parameters that are uncertain, Y_j L with covariance = L L^T: along the directions in
+/// which the load itself is uncertain by more than a share of it.
+struct Uncertain {
+  MatrixXd spread;  ///< of base parameters [columns x directions]
+  std::vector<Index> columns;
+};
+
+MatrixXd slopes_of(const ProcessedLog& log, std::size_t joint, const IdentifiedModel& model, const Uncertain& u) {
+  Regressor regressor(to_dh(model.robot));
+  const MotionRows m = log.motion();
+  MatrixXd own(log.samples(), static_cast<Index>(u.columns.size()));
+  for (Index k = 0; k < own.rows(); ++k) {
+    const MatrixXd& y = regressor(m.q.row(k), m.dq.row(k), m.ddq.row(k));
+    for (Index c = 0; c < own.cols(); ++c)
+      own(k, c) = y(static_cast<Index>(joint), u.columns[static_cast<std::size_t>(c)]);
+  }
+  return own * u.spread;
+}
+
+/// Gives the rows their slopes. @param u as before, or to be found
+void add_slopes(Rows& rows, const IdentifiedModel& model, const Uncertain& u) {
+  for (const ProcessedLog* log : rows.logs) rows.slopes.push_back(slopes_of(*log, rows.joint, model, u));
+  rows.z = VectorXd::Zero(u.spread.cols());
+}
+
+Uncertain uncertainty(Rows& rows, const IdentifiedModel& model, const MatrixXd& covariance) {
+  constexpr double little = 1e-3;  // of the load
+  Uncertain u;
+  const auto j = static_cast<Index>(rows.joint);
+  std::vector<Index> mine;  // those of links from the joint on
+  for (std::size_t k = 0; k < model.base.size(); ++k) {
+    const auto column = static_cast<Index>(model.base[k].column);
+    if (column < j * static_cast<Index>(parameters_per_link)) continue;
+    mine.push_back(static_cast<Index>(k));
+    u.columns.push_back(column);
+  }
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(covariance(mine, mine));
+  u.spread = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+  add_slopes(rows, model, u);
+  MatrixXd gram = MatrixXd::Zero(rows.z.size(), rows.z.size());
+  double load = 0;
+  for (std::size_t l = 0; l < rows.logs.size(); ++l) {
+    gram += rows.slopes[l].transpose() * rows.slopes[l];
+    load += rows.series[l].structural.squaredNorm();
+  }
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> principal(gram);
+  std::vector<Index> kept;
+  for (Index i = 0; i < gram.rows(); ++i) {
+    if (principal.eigenvalues()[i] > little * little * load) kept.push_back(i);
+  }
+  const MatrixXd turn = principal.eigenvectors()(Eigen::all, kept);
+  u.spread = u.spread * turn;
+  for (MatrixXd& slopes : rows.slopes) slopes = slopes * turn;
+  rows.z = VectorXd::Zero(turn.cols());
+  return u;
 }
 
 struct Part {
@@ -111,19 +190,9 @@ MatrixXd design(const Rows& rows, const std::vector<Part>& parts) {
 }
 
 VectorXd colour(const Rows& rows, const VectorXd& e) {
-  VectorXd r = VectorXd::Zero(order + 1);
-  for (std::size_t l = 0; l < rows.logs.size(); ++l) {
-    const VectorXd x = e.segment(rows.first[l], rows.count[l]);
-    for (Index lag = 0; lag <= order && lag < x.size(); ++lag)
-      r[lag] += x.head(x.size() - lag).dot(x.tail(x.size() - lag));
-  }
-  if (!(r[0] > 0)) return VectorXd::Zero(order);
-  MatrixXd toeplitz(order, order);
-  for (Index i = 0; i < order; ++i) {
-    for (Index k = 0; k < order; ++k) toeplitz(i, k) = r[std::abs(i - k)];
-  }
-  toeplitz.diagonal() *= 1 + 1e-4;
-  return toeplitz.ldlt().solve(r.tail(order));
+  std::vector<VectorXd> parts;
+  for (std::size_t l = 0; l < rows.logs.size(); ++l) parts.emplace_back(e.segment(rows.first[l], rows.count[l]));
+  return autoregression(parts);
 }
 
 VectorXd residual(const MatrixXd& x, const VectorXd& y) {
@@ -154,48 +223,173 @@ void fit(const Rows& rows, const VectorXd& a, Set& set) {
   set.score = possible ? -n * std::log(std::max(set.square, 1e-300) / n) - penalty : -1e300;
 }
 
-Set best_set(const Rows& rows) {
-  const double largest = [&] {
-    double most = 0;
-    for (const JointSeries& s : rows.series) most = std::max(most, s.structural.cwiseAbs().maxCoeff());
-    return std::max(most, 1e-6);
-  }();
-  const std::vector<double> relaxations{0, 1e-3, 3e-3, 8e-3, 2e-2},
-      scales{0.01 * largest, 0.025 * largest, 0.06 * largest, 0.15 * largest};
-  const std::vector<Part> full{{std::string(Elasticity::name), {1e-3}},
-                               {std::string(Backlash::name), {0.03 * largest}},
-                               {std::string(Eccentricity::name), {}}};
-  // Colour of what no set explains.
-  const VectorXd a = colour(rows, residual(design(rows, full), rows.delta));
-  Set best;
-  fit(rows, a, best);
-  for (unsigned mask = 1; mask < 8; ++mask) {
-    Set set;
-    for (unsigned i = 0; i < 3; ++i) {
-      if ((mask >> i & 1U) != 0) set.parts.push_back(full[i]);
-    }
-    fit(rows, a, set);
-    for (int round = 0; round < 2; ++round) {
-      for (std::size_t p = 0; p < set.parts.size(); ++p) {
-        if (set.parts[p].shape.empty()) continue;
-        const bool gap = set.parts[p].effect == Backlash::name;
-        std::vector<double> values = gap ? scales : relaxations;
-        if (round > 0) {
-          const double now = set.parts[p].shape[0];
-          values = {0.7 * now, 0.85 * now, 1.18 * now, 1.4 * now};
-        }
-        for (const double value : values) {
-          Set other = set;
-          const ParameterInfo& info = find_effect(set.parts[p].effect)->shape[0];
-          other.parts[p].shape[0] = std::clamp(value, info.lower, info.upper);
-          fit(rows, a, other);
-          if (other.score > set.score) set = other;
-        }
+/// All three, with middling shapes.
+std::vector<Part> all_parts(double largest) {
+  return {{std::string(Elasticity::name), {1e-3}},
+          {std::string(Backlash::name), {0.03 * largest}},
+          {std::string(Eccentricity::name), {}}};
+}
+
+double largest_load(const Rows& rows) {
+  double most = 1e-6;
+  for (const JointSeries& s : rows.series) most = std::max(most, s.structural.cwiseAbs().maxCoeff());
+  return most;
+}
+
+/// Shapes one after the other: over a grid, then around.
+void tune(const Rows& rows, const VectorXd& a, Set& set, bool from_grid) {
+  const double largest = largest_load(rows);
+  for (int round = from_grid ? 0 : 1; round < 2; ++round) {
+    for (std::size_t p = 0; p < set.parts.size(); ++p) {
+      if (set.parts[p].shape.empty()) continue;
+      const double now = set.parts[p].shape[0];
+      std::vector<double> values{0.7 * now, 0.85 * now, 1.18 * now, 1.4 * now};
+      if (round == 0 && set.parts[p].effect == Backlash::name)
+        values = {0.01 * largest, 0.025 * largest, 0.06 * largest, 0.15 * largest};
+      if (round == 0 && set.parts[p].effect == Elasticity::name) values = {0, 1e-3, 3e-3, 8e-3, 2e-2};
+      for (const double value : values) {
+        Set other = set;
+        const ParameterInfo& info = find_effect(set.parts[p].effect)->shape[0];
+        other.parts[p].shape[0] = std::clamp(value, info.lower, info.upper);
+        fit(rows, a, other);
+        if (other.score > set.score) set = std::move(other);
       }
     }
-    if (set.score > best.score + least_score) best = set;
+  }
+}
+
+bool bends(const Set& set) {
+  return std::any_of(set.parts.begin(), set.parts.end(),
+                     [](const Part& part) { return part.effect != Eccentricity::name; });
+}
+
+/// A set with the load where torque and deflection together have it most likely: Gauss-Newton over coefficients and z.
+struct Moved {
+  Set set;
+  VectorXd z;
+  double score = -1e300;  ///< of the set, less what the load's move costs and what it was free to do (Laplace)
+};
+
+Moved move_load(const Rows& start, const VectorXd& a, const Set& from) {
+  constexpr int most_rounds = 8;
+  constexpr double h = 0.02;  // of a standard deviation
+  Rows rows = start;
+  Moved best{from, rows.z, from.score};
+  if (rows.z.size() == 0 || !bends(from)) return best;
+  double cost = -from.score + rows.z.squaredNorm();
+  for (int round = 0; round < most_rounds; ++round) {
+    const MatrixXd own = design(rows, best.set.parts);
+    const Index first = own.cols();
+    MatrixXd x(own.rows(), first + rows.z.size());
+    x.leftCols(first) = own;
+    VectorXd theta = VectorXd::Zero(first);
+    theta.tail(best.set.theta.size()) = best.set.theta;
+    for (Index i = 0; i < rows.z.size(); ++i) {
+      Rows moved = rows;
+      const VectorXd step = VectorXd::Unit(rows.z.size(), i) * h;
+      moved.move(rows.z + step);
+      const MatrixXd there = design(moved, best.set.parts);
+      moved.move(rows.z - step);
+      x.col(first + i) = (there - design(moved, best.set.parts)) * theta / (2 * h);
+    }
+    x = rows.whiten(x, a);
+    MatrixXd gram = x.transpose() * x;
+    // What the load at z makes stays on the other side; a priori z is 0 with variance 1.
+    const VectorXd right =
+        x.transpose() * (rows.whiten(rows.delta, a) + x.rightCols(rows.z.size()) * rows.z);
+    const VectorXd free = (1 + gram.diagonal().tail(rows.z.size()).array() / best.set.noise).log();
+    best.score = -cost - free.sum();
+    best.z = rows.z;
+    if (round == most_rounds - 1) break;
+    gram.diagonal().tail(rows.z.size()).array() += best.set.noise;
+    const VectorXd step = SymmetricSolver(gram).solve(right).tail(rows.z.size()) - rows.z, at = rows.z;
+    bool better = false;
+    for (double share = 1; share > 0.05 && !better; share *= 0.4) {
+      rows.move(at + share * step);
+      Set set = best.set;
+      fit(rows, a, set);
+      tune(rows, a, set, round == 0);
+      const double now = -set.score + rows.z.squaredNorm();
+      better = now < cost - 0.5;
+      if (!better) continue;
+      best.set = std::move(set);
+      cost = now;
+    }
+    if (better) continue;
+    rows.move(at);
+    break;
   }
   return best;
+}
+
+/// z at which the load is in proportion to the deflection, as near to the torque's load as that allows: with z_v the
+/// deflection's fit by the slopes and z_s that of the load at z = 0,
+///   z = alpha z_v - z_s, alpha = (z_v . z_s) / |z_v|^2, at least 1 / |z_v|.
+VectorXd likely_load(const Rows& rows, const VectorXd& a) {
+  MatrixXd all(rows.delta.size(), rows.z.size());
+  VectorXd load(rows.delta.size());
+  for (std::size_t l = 0; l < rows.logs.size(); ++l) {
+    const ProcessedLog& log = *rows.logs[l];
+    all.middleRows(rows.first[l], rows.count[l]) = log.decimate(log.filter_columns(rows.slopes[l]));
+    load.segment(rows.first[l], rows.count[l]) = log.decimate(log.filter_columns(rows.series[l].structural));
+  }
+  const MatrixXd white = rows.whiten(all, a), offsets = rows.whiten(rows.offsets(), a);
+  MatrixXd x(white.rows(), white.cols() + offsets.cols());
+  x << white, offsets;
+  const SymmetricSolver solver(x.transpose() * x);
+  const VectorXd v = solver.solve(x.transpose() * rows.whiten(rows.delta, a)).head(white.cols());
+  const VectorXd s = SymmetricSolver(all.transpose() * all).solve(all.transpose() * load);
+  return std::max(v.dot(s) / v.squaredNorm(), 1 / v.norm()) * v - s;
+}
+
+/// Forward: the effect that brings most, as long as one brings something; the load moves with it.
+Set best_set(Rows& rows, const IdentifiedModel& model, const MatrixXd& covariance, Uncertain& uncertain) {
+  const std::vector<Part> full = all_parts(largest_load(rows));
+  // Colour of what no set explains.
+  const VectorXd a = colour(rows, residual(design(rows, full), rows.delta));
+  Moved best;
+  fit(rows, a, best.set);
+  best.score = best.set.score;
+  for (std::size_t level = 0; level < full.size(); ++level) {
+    std::vector<Moved> next;
+    for (const Part& part : full) {
+      Moved more = best;
+      if (std::any_of(more.set.parts.begin(), more.set.parts.end(),
+                      [&](const Part& other) { return other.effect == part.effect; }))
+        continue;
+      more.set.parts.push_back(part);
+      fit(rows, a, more.set);
+      tune(rows, a, more.set, true);
+      next.push_back(std::move(more));
+    }
+    double most = -1e300;
+    for (const Moved& one : next) most = std::max(most, one.set.score);
+    if (most < best.set.score + least_score) break;
+    if (level == 0 && covariance.size() > 0) uncertain = uncertainty(rows, model, covariance);
+    std::size_t chosen = 0;
+    for (Moved& one : next) one = move_load(rows, a, one.set);
+    if (level == 0 && rows.z.size() > 0) {
+      // Where the torque tells little of the load, even its signs, the way there begins at what the deflection tells.
+      Rows there = rows;
+      there.move(likely_load(rows, a));
+      for (std::size_t i = 0; i < 2; ++i) {
+        Set set;
+        set.parts = {full[i]};
+        fit(there, a, set);
+        tune(there, a, set, true);
+        if (set.score == -1e300) continue;
+        Moved moved = move_load(there, a, set);
+        if (moved.score > next[i].score) next[i] = std::move(moved);
+      }
+    }
+    for (std::size_t i = 0; i < next.size(); ++i) {
+      if (next[i].score > next[chosen].score) chosen = i;
+    }
+    if (next[chosen].score < best.score + least_score) break;
+    best = next[chosen];
+    if (best.z.size() > 0) rows.move(best.z);
+  }
+  return best.set;
 }
 
 /// RMS of a part's deflection over the rows.
@@ -207,24 +401,37 @@ double size_of(const Rows& rows, const Part& part, const VectorXd& theta) {
 
 }  // namespace
 
-Deflections find_deflections(const IdentifiedModel& model, const std::vector<ProcessedLog>& now,
-                             const std::vector<ProcessedLog>& before, std::vector<DeflectionEffect>& background) {
+Deflections find_deflections(const IdentifiedModel& model, const MatrixXd& base_covariance,
+                             const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before,
+                             std::vector<DeflectionEffect>& background) {
   const std::size_t n = model.joints.size();
+  const std::vector<MatrixXd> load_now = loads(model, now), load_before = loads(model, before);
   std::vector<Deflections> found(n);
   std::vector<std::vector<DeflectionEffect>> learned(n);
   parallel_for(n, [&](std::size_t j) {
-    const auto with_link = [&](const std::vector<ProcessedLog>& logs, bool all, Role role) {
-      std::vector<const ProcessedLog*> out;
-      for (const ProcessedLog& log : logs) {
-        if (log.qlink.size() > 0 && log.has_link[j] && (all || log.role == role)) out.push_back(&log);
+    const auto with_link = [&](const std::vector<ProcessedLog>& logs, const std::vector<MatrixXd>& load,
+                               std::optional<Role> role) {
+      std::vector<LinkedLog> out;
+      for (std::size_t l = 0; l < logs.size(); ++l) {
+        if (logs[l].qlink.size() > 0 && logs[l].has_link[j] && (!role || logs[l].role == *role))
+          out.push_back({&logs[l], &load[l]});
       }
       return out;
     };
-    const auto train = with_link(now, false, Role::train), judge = with_link(now, false, Role::validate),
-               healthy = with_link(before, true, Role::train);
+    const auto train = with_link(now, load_now, Role::train), judge = with_link(now, load_now, Role::validate),
+               healthy = with_link(before, load_before, {});
     if (train.empty()) return;
-    const Rows rows = rows_of(model, train, j);
-    Set set = best_set(rows);
+    Rows rows = rows_of(model, train, j);
+    Uncertain uncertain;
+    Set set = best_set(rows, model, base_covariance, uncertain);
+    // Other logs of the joint with the load that was found.
+    const auto others = [&](const std::vector<LinkedLog>& logs) {
+      Rows out = rows_of(model, logs, j);
+      if (rows.z.size() == 0) return out;
+      add_slopes(out, model, uncertain);
+      out.move(rows.z);
+      return out;
+    };
     // Encoders are so fine that errors of the torque show too: what is a small part of the deflection is no finding.
     for (bool again = true; again && set.parts.size() > 1;) {
       again = false;
@@ -248,32 +455,63 @@ Deflections find_deflections(const IdentifiedModel& model, const std::vector<Pro
     Set old;
     std::optional<Rows> old_rows;
     if (!healthy.empty()) {
-      old_rows = rows_of(model, healthy, j);
-      old = best_set(*old_rows);
+      old_rows = others(healthy);
+      Uncertain same;
+      old = best_set(*old_rows, model, {}, same);
     }
-    const Rows judged = judge.empty() ? rows : rows_of(model, judge, j);
-    const VectorXd judged_before = residual(judged.offsets(), judged.delta);
-    Index at = 0;
-    VectorXd all = VectorXd::Zero(judged.delta.size());
-    std::vector<VectorXd> part_of;
-    for (const Part& part : set.parts) {
-      const auto count = static_cast<Index>(find_effect(part.effect)->linear.size());
-      part_of.push_back(judged.columns(part.effect, part.shape) * set.theta.segment(at, count));
-      all += part_of.back();
-      at += count;
+    // What judges, with coefficients fitted to something else: the validate logs, or each train log by the others.
+    struct Fold {
+      Rows rows;
+      VectorXd theta;
+    };
+    std::vector<Fold> folds;
+    const bool held_out = !judge.empty() || train.size() > 1;
+    if (!judge.empty()) {
+      folds.push_back({others(judge), set.theta});
+    } else if (!held_out) {
+      folds.push_back({rows, set.theta});
+    } else {
+      const VectorXd a = colour(rows, residual(design(rows, set.parts), rows.delta));
+      for (std::size_t l = 0; l < train.size(); ++l) {
+        std::vector<LinkedLog> rest = train;
+        rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(l));
+        Set other = set;
+        fit(others(rest), a, other);
+        folds.push_back({others({train[l]}), other.theta});
+      }
     }
-    const VectorXd judged_after = residual(judged.offsets(), judged.delta - all);
-    // The noise of the two encoders is no gap.
-    const double white =
-        std::max(0.0, std::min(judged_after.squaredNorm(), set.noise * static_cast<double>(judged_after.size())));
-    const double gap = std::max(judged_before.squaredNorm() - white, 1e-300);
-    const double closure = (judged_before.squaredNorm() - judged_after.squaredNorm()) / gap;
+    double square = 0, after = 0, white = 0;
+    std::vector<double> without(set.parts.size(), 0.0);
+    for (const Fold& fold : folds) {
+      const Rows& judged = fold.rows;
+      std::vector<VectorXd> part_of;
+      VectorXd all = VectorXd::Zero(judged.delta.size());
+      Index at = 0;
+      for (const Part& part : set.parts) {
+        const auto count = static_cast<Index>(find_effect(part.effect)->linear.size());
+        part_of.push_back(judged.columns(part.effect, part.shape) * fold.theta.segment(at, count));
+        all += part_of.back();
+        at += count;
+      }
+      const auto left = [&](const VectorXd& taken) {
+        return residual(judged.offsets(), judged.delta - taken).squaredNorm();
+      };
+      square += left(VectorXd::Zero(all.size()));
+      after += left(all);
+      // The noise of the two encoders is no gap.
+      white += set.noise * static_cast<double>(all.size());
+      for (std::size_t p = 0; p < part_of.size(); ++p) without[p] += left(all - part_of[p]);
+    }
+    const double gap = std::max(square - std::min(after, white), 1e-300), closure = (square - after) / gap;
     if (closure < least_closure) {
+      // .. and so little that encoders may make it themselves is not worth a word.
+      if (square < worth_a_word * white) return;
       found[j].notes.push_back(fmt::format("{}: the deflection that the link encoder shows is none that has a name",
                                            model.robot.joints[j].name));
       return;
     }
-    at = 0;
+    const VectorXd a = colour(rows, residual(design(rows, set.parts), rows.delta));
+    Index at = 0;
     for (std::size_t p = 0; p < set.parts.size(); ++p) {
       const Part& part = set.parts[p];
       const EffectInfo& info = *find_effect(part.effect);
@@ -290,13 +528,12 @@ Deflections find_deflections(const IdentifiedModel& model, const std::vector<Pro
         effect.fit.linear_std.push_back(std[i]);
       }
       effect.fit.shape_std.assign(part.shape.size(), 0.0);
-      const VectorXd without = residual(judged.offsets(), judged.delta - all + part_of[p]);
-      effect.closure = (without.squaredNorm() - judged_after.squaredNorm()) / gap;
-      Set less = set;
+      effect.closure = (without[p] - after) / gap;
+      effect.held_out = held_out;
+      Set less = set, again = set;
       less.parts.erase(less.parts.begin() + static_cast<std::ptrdiff_t>(p));
-      fit(rows, colour(rows, residual(design(rows, set.parts), rows.delta)), less);
-      Set again = set;
-      fit(rows, colour(rows, residual(design(rows, set.parts), rows.delta)), again);
+      fit(rows, a, less);
+      fit(rows, a, again);
       effect.score = again.score - less.score;
       bool alike = false;
       Index old_at = 0;

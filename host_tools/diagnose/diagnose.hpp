@@ -12,6 +12,7 @@ struct Diagnosis {
   IdentifiedModel nominal;  ///< base parameters and nominal effects (what a healthy session has beside them too)
   IdentifiedModel model;    ///< with the effects that were named
   nlohmann::json report;    ///< diagnosis.json
+  std::vector<bool> still;  ///< joints that stand still: neither model has anything of their own
 };
 
 /// Finds what the nominal model lacks, names it, adds it, and tells what that is worth on logs that decided nothing.

@@ -25,7 +25,7 @@ std::vector<double> geometric(double from, double to, int count) {
 
 /// How a joint moves over the logs that fit.
 struct Scales {
-  double speed = 0, range = 0, torque = 0, structural = 0, seconds = 0, step_s = 1;
+  double speed = 0, range = 0, torque = 0, structural = 0, seconds = 0;
 };
 
 Scales scales_of(const Linearised& at, std::size_t joint) {
@@ -43,7 +43,6 @@ Scales scales_of(const Linearised& at, std::size_t joint) {
     s.torque = std::max(s.torque, inside(at.robot_columns(l).torque()).cwiseAbs().maxCoeff());
     s.structural = std::max(s.structural, inside(at.robot_columns(l).structural()).cwiseAbs().maxCoeff());
     last = std::max(last, entry.age_s + entry.log.step_s * static_cast<double>(entry.log.samples()));
-    s.step_s = std::min(s.step_s, entry.log.step_s);
   }
   s.range = upper - lower;
   s.seconds = last;
@@ -71,7 +70,7 @@ std::vector<std::vector<double>> grids(const EffectInfo& info, std::size_t joint
       for (const double share : {0.45, 0.55, 0.63, 0.7, 0.76, 0.82, 0.87, 0.91, 0.95})
         values.push_back(share * s.torque);
     } else if (shape.name == "time") {
-      values = geometric(5e-4, std::min(0.03, static_cast<double>(Delay::largest) * s.step_s), 5);
+      values = geometric(5e-4, std::min(0.03, static_cast<double>(Delay::largest) * at.models().smallest_step_s), 5);
     } else if (shape.name == "relaxation") {
       values = {1e-3, 8e-3};
     } else if (shape.name == "torque_scale") {
@@ -82,8 +81,10 @@ std::vector<std::vector<double>> grids(const EffectInfo& info, std::size_t joint
       values = geometric(std::max(0.3 * width, 1e-3 * s.speed), std::max(3 * width, 0.03 * s.speed), 3);
     } else if (shape.name == "joint") {
       for (std::size_t k = 0; k < n; ++k) {
-        const bool neighbour = k + 1 == joint || k == joint + 1;
-        if (k != joint && (info.name != MotorCoupling::name || neighbour)) values.push_back(static_cast<double>(k + 1));
+        // Motors that share a gear turn joints of one kind that follow one another.
+        const auto& joints = at.models().current.robot.joints;
+        const bool mates = (k + 1 == joint || k == joint + 1) && joints[k].type == joints[joint].type;
+        if (k != joint && (info.name != MotorCoupling::name || mates)) values.push_back(static_cast<double>(k + 1));
       }
     }
     for (double& value : values) value = std::clamp(value, shape.lower, shape.upper);
@@ -109,6 +110,7 @@ int searched_shape(const EffectCandidate& candidate) {
 std::vector<Group> dictionary(const Linearised& at, const std::vector<EffectCandidate>& skip) {
   std::vector<Group> out;
   const std::size_t n = at.joints();
+  const Robot& robot = at.models().current.robot;
   for (const EffectInfo& info : effect_infos()) {
     if (is_nominal(info.name) || info.name == Ripple::name) continue;
     if (info.needs_peers && n < 2) continue;
@@ -117,9 +119,9 @@ std::vector<Group> dictionary(const Linearised& at, const std::vector<EffectCand
         return c.effect == info.name && (info.acts_on == ActsOn::body || c.joint == j);
       });
       if (skipped) continue;
-      // A balancer's force over the angle of a joint that turns.
-      if (info.name == GravityCompensator::name && at.models().current.robot.joints[j].type != JointType::revolute)
-        continue;
+      // A balancer's force, an encoder's once a turn: over the angle of a joint that turns.
+      const bool of_angle = info.name == GravityCompensator::name || info.name == Eccentricity::name;
+      if (of_angle && robot.joints[j].type != JointType::revolute) continue;
       const Scales s = scales_of(at, j);
       // Nothing warms up in a few seconds.
       if (info.name == FrictionDrift::name && s.seconds < shortest_drift_s) continue;
@@ -138,7 +140,7 @@ std::vector<Group> dictionary(const Linearised& at, const std::vector<EffectCand
       const int searched = searched_shape({std::string(info.name), j, {}});
       if (searched >= 0)
         continuous = static_cast<double>(grids(info, j, at, s)[static_cast<std::size_t>(searched)].size());
-      for (const auto& shape : shapes) {
+      for (const auto& shape : shapes) {  // none where the joint has no mate
         Group group;
         group.candidate = {std::string(info.name), j, shape};
         group.on_body = info.acts_on == ActsOn::body;

@@ -16,19 +16,23 @@ using Eigen::Index;
 using Eigen::VectorXd;
 using nlohmann::json;
 
-/// Sums of squares over the logs, one a joint.
+/// Sums of squares over the logs' samples, one a joint.
 struct Pooled {
   VectorXd squares;
   Index logs = 0;
-  void add(const std::vector<JointMetrics>& metrics, double JointMetrics::*of) {
+  double samples = 0;
+  void add(const std::vector<JointMetrics>& metrics, double JointMetrics::*of, const ProcessedLog& log) {
     if (squares.size() == 0) squares.setZero(static_cast<Index>(metrics.size()));
-    for (std::size_t j = 0; j < metrics.size(); ++j) squares[static_cast<Index>(j)] += metrics[j].*of * metrics[j].*of;
+    const auto count = static_cast<double>(log.last - log.first);
+    for (std::size_t j = 0; j < metrics.size(); ++j)
+      squares[static_cast<Index>(j)] += count * metrics[j].*of * metrics[j].*of;
     ++logs;
+    samples += count;
   }
   /// null where a log is missing or a figure is not finite.
   json rms(std::size_t joint, std::size_t of_logs) const {
     if (logs == 0 || static_cast<std::size_t>(logs) != of_logs) return nullptr;
-    const double value = std::sqrt(squares[static_cast<Index>(joint)] / static_cast<double>(logs));
+    const double value = std::sqrt(squares[static_cast<Index>(joint)] / samples);
     return std::isfinite(value) ? json(value) : json(nullptr);
   }
 };
@@ -60,7 +64,7 @@ json log_json(const ProcessedLog& log) {
 }  // namespace
 
 json evidence_json(const IdentifiedModel& nominal, const IdentifiedModel& diagnosed,
-                   const std::vector<ProcessedLog>& held_out) {
+                   const std::vector<ProcessedLog>& held_out, const std::vector<bool>& still) {
   json logs = json::array(), joints = json::array();
   Pooled before, after, fixed, noise;
   Firmware firmware(diagnosed);
@@ -70,14 +74,14 @@ json evidence_json(const IdentifiedModel& nominal, const IdentifiedModel& diagno
     if (log.tau.size() == 0) continue;
     judged.push_back(&log);
     logs.push_back(log_json(log));
-    before.add(judge(log, predict(nominal, log)), &JointMetrics::rmse);
+    before.add(judge(log, predict(nominal, log)), &JointMetrics::rmse, log);
     const auto with_effects = judge(log, predict(diagnosed, log));
-    after.add(with_effects, &JointMetrics::rmse);
-    noise.add(with_effects, &JointMetrics::noise_floor);
+    after.add(with_effects, &JointMetrics::rmse, log);
+    noise.add(with_effects, &JointMetrics::noise_floor, log);
     if (why_not_fixed) continue;
     // A model that fixed point can't hold is still a diagnosis.
     try {
-      fixed.add(judge(log, firmware(log)), &JointMetrics::rmse);
+      fixed.add(judge(log, firmware(log)), &JointMetrics::rmse, log);
     } catch (const DataError& error) {
       why_not_fixed = error.what();
     } catch (const InputError& error) {
@@ -85,13 +89,15 @@ json evidence_json(const IdentifiedModel& nominal, const IdentifiedModel& diagno
     }
   }
   for (std::size_t j = 0; j < diagnosed.robot.size() && !judged.empty(); ++j) {
+    // Of what stands still these logs tell nothing.
+    const auto figure = [&](const Pooled& of) { return j < still.size() && still[j] ? json(nullptr) : of.rms(j, judged.size()); };
     joints.push_back({{"joint", diagnosed.robot.joints[j].name},
                       {"index", j + 1},
                       {"unit", diagnosed.robot.joints[j].torque_unit()},
-                      {"rms_before", before.rms(j, judged.size())},
-                      {"rms_after", after.rms(j, judged.size())},
-                      {"rms_after_fixed", fixed.rms(j, judged.size())},
-                      {"noise_floor", noise.rms(j, judged.size())}});
+                      {"rms_before", figure(before)},
+                      {"rms_after", figure(after)},
+                      {"rms_after_fixed", figure(fixed)},
+                      {"noise_floor", figure(noise)}});
   }
   json out = {{"held_out", logs}, {"joints", joints}, {"fixed_point", {{"computed", !why_not_fixed}}}};
   if (why_not_fixed) out["fixed_point"]["why_not"] = *why_not_fixed;
@@ -101,6 +107,8 @@ json evidence_json(const IdentifiedModel& nominal, const IdentifiedModel& diagno
     out["forward"] = nullptr;
   } else {
     out["forward"] = forward_json(nominal, diagnosed, judged);
+    if (held_out.front().role == Role::validate)
+      out["note"] = "no test log: the validate logs fitted nothing, but decided which names stay";
   }
   return out;
 }

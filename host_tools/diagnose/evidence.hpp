@@ -7,7 +7,8 @@
 
 namespace fxdyn {
 
-/// What a diagnosis is worth on logs that its search never saw: the key "evidence" of diagnosis.json.
+/// What a diagnosis is worth on logs that fitted nothing of it: the key "evidence" of diagnosis.json. Test logs decided
+/// nothing either; validate logs, in their stead, decided which names stay, and "note" says so.
 ///
 /// joints: RMS of measured minus model torque with the model before and after, both torques filtered alike at the
 /// torque cut-off, edges dropped (judge()), logs pooled like pooled_error(): the root of the mean of their squares. The
@@ -17,7 +18,8 @@ namespace fxdyn {
 /// forward: see forward_json().
 ///
 /// Torque-less logs are left out. Without any log the lists are empty and "note" says so.
+/// @param still joints that stand still: their figures are null
 nlohmann::json evidence_json(const IdentifiedModel& nominal, const IdentifiedModel& diagnosed,
-                             const std::vector<ProcessedLog>& held_out);
+                             const std::vector<ProcessedLog>& held_out, const std::vector<bool>& still = {});
 
 }  // namespace fxdyn

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <numbers>
+#include <unsupported/Eigen/FFT>
 
 #include "host_tools/identify/solver.hpp"
 #include "host_tools/model/effects.hpp"
@@ -59,58 +61,84 @@ double chance(double ratio, double freedom) {
   return 0.5 * std::erfc(z / std::numbers::sqrt2);
 }
 
-/// Chance of the highest line in the periodograms of the logs against their neighbourhood.
-double line_chance(const Linearised& at, const VectorXd& e) {
-  double most = 0, count = 0;
-  for (const Block& b : at.blocks()) {
-    if (b.healthy) continue;
-    const VectorXd x = e.segment(b.first, b.count);
+/// Something in the residual that is a matter of time.
+struct InTime {
+  double p = 1;      ///< chance that noise looks as much like it
+  double share = 0;  ///< of the squared residual
+};
+
+/// Lines in the periodograms of the blocks against their neighbourhood.
+InTime lines(const Linearised& at, const VectorXd& e, const std::vector<std::size_t>& blocks) {
+  constexpr Index neighbours = 31;
+  constexpr double sure = 5;  // exp(-5): a line that noise has as seldom counts
+  struct Line {
+    double power, level;
+  };
+  std::vector<Line> all;
+  double whole = 0;
+  Eigen::FFT<double> fft;
+  for (const std::size_t i : blocks) {
+    const Block& b = at.blocks()[i];
+    if (b.healthy || b.count < 2 * neighbours) continue;
+    const std::vector<double> x(e.data() + b.first, e.data() + b.first + b.count);
+    std::vector<std::complex<double>> spectrum;
+    fft.fwd(spectrum, x);
     const Index bins = b.count / 2;
     VectorXd power(bins);
+    for (Index k = 0; k < bins; ++k) power[k] = std::norm(spectrum[static_cast<std::size_t>(k + 1)]);
+    whole += power.sum();
     for (Index k = 0; k < bins; ++k) {
-      const double w = 2 * std::numbers::pi * static_cast<double>(k + 1) / static_cast<double>(b.count);
-      // Goertzel
-      double s1 = 0, s2 = 0;
-      const double c = 2 * std::cos(w);
-      for (Index i = 0; i < b.count; ++i) {
-        const double s = x[i] + c * s1 - s2;
-        s2 = s1;
-        s1 = s;
-      }
-      power[k] = s1 * s1 + s2 * s2 - c * s1 * s2;
-    }
-    for (Index k = 0; k < bins; ++k) {
-      const Index from = std::clamp<Index>(k - 15, 0, std::max<Index>(0, bins - 31)),
-                  n = std::min<Index>(31, bins - from);
+      const Index n = std::min(neighbours, bins), from = std::clamp<Index>(k - n / 2, 0, bins - n);
       VectorXd near = power.segment(from, n);
       std::nth_element(near.begin(), near.begin() + n / 2, near.end());
       const double level = near[n / 2] / std::numbers::ln2;
-      if (level > 0) most = std::max(most, power[k] / level);
-      count += 1;
+      if (level > 0) all.push_back({power[k], level});
     }
   }
-  return std::min(1.0, count * std::exp(-most));
+  InTime out;
+  const auto count = static_cast<double>(all.size());
+  double most = 0, beyond = 0;
+  for (const Line& line : all) {
+    const double ratio = line.power / line.level;
+    most = std::max(most, ratio);
+    if (ratio > std::log(count) + sure) beyond += line.power - line.level;
+  }
+  out.p = std::min(1.0, count * std::exp(-most));
+  if (whole > 0) out.share = beyond / whole;
+  return out;
 }
 
 /// Means over stretches of two seconds against those of the healthy session.
-double slow_chance(const Linearised& at, const VectorXd& e) {
-  double sum[2] = {0, 0}, count[2] = {0, 0};
-  for (const Block& b : at.log_rows(0).count > 0 ? at.blocks() : std::vector<Block>{}) {
+InTime slow(const Linearised& at, const VectorXd& e, const std::vector<std::size_t>& blocks) {
+  double sum[2] = {0, 0}, count[2] = {0, 0}, rows = 0, whole = 0;
+  const auto add = [&](const Block& b) {
     const ProcessedLog& log = at.logs()[b.log].log;
     const auto length = static_cast<Index>(2 / (log.step_s * static_cast<double>(log.decimation)));
-    if (length < 2) continue;
+    if (length < 2) return;
     for (Index k = 0; k + length <= b.count; k += length) {
       const double mean = e.segment(b.first + k, length).mean();
       sum[b.healthy] += mean * mean;
       count[b.healthy] += 1;
     }
+    if (b.healthy) return;
+    rows += static_cast<double>(b.count);
+    whole += e.segment(b.first, b.count).squaredNorm();
+  };
+  for (const std::size_t b : blocks) {
+    if (!at.blocks()[b].healthy) add(at.blocks()[b]);
   }
-  if (count[0] < 5 || count[1] < 5 || !(sum[1] > 0)) return 1;
+  for (const Block& b : at.blocks()) {
+    if (b.healthy) add(b);
+  }
+  InTime out;
+  if (count[0] < 5 || count[1] < 5 || !(sum[1] > 0)) return out;
   const double ratio = sum[0] / count[0] / (sum[1] / count[1]);
   // Paulson's normal approximation of F
   const double a = 2 / (9 * count[0]), b = 2 / (9 * count[1]), root = std::cbrt(ratio);
   const double z = ((1 - b) * root - (1 - a)) / std::sqrt(b * root * root + a);
-  return 0.5 * std::erfc(z / std::numbers::sqrt2);
+  out.p = 0.5 * std::erfc(z / std::numbers::sqrt2);
+  if (out.p < 1e-3) out.share = std::max(0.0, sum[0] / count[0] - sum[1] / count[1]) * rows / whole;
+  return out;
 }
 
 }  // namespace
@@ -134,8 +162,22 @@ MatrixXd features(const Linearised& at, std::size_t joint, bool healthy) {
   acceleration = acceleration.max(1e-9);
   load = load.max(1e-9);
   const bool turns = at.models().current.robot.joints[joint].type == JointType::revolute;
+  VectorXd scales_of(3 * static_cast<Index>(n));
+  scales_of << speed, acceleration, load;
   for (std::size_t l = 0; l < at.logs().size(); ++l) {
     if (at.logs()[l].healthy && !healthy) continue;
+    const auto put = [&](const MatrixXd& rows) {
+      if (out.size() == 0) out.setZero(total, rows.cols());
+      out.middleRows(at.log_rows(l).first, at.log_rows(l).count) = at.finish(l, joint, rows);
+    };
+    RowCache::Features& kept = at.logs()[l].cache->features[joint];
+    // The load moves a little with each fit; these functions need not.
+    const auto motion = 2 * static_cast<Index>(n);
+    if (kept.rows.size() > 0 && kept.scales.head(motion) == scales_of.head(motion) &&
+        (kept.scales - scales_of).norm() < 0.05 * scales_of.norm()) {
+      put(kept.rows);
+      continue;
+    }
     const Motion& m = at.motion(l);
     const Index samples = m.q.rows();
     std::vector<Eigen::ArrayXd> columns;
@@ -178,8 +220,9 @@ MatrixXd features(const Linearised& at, std::size_t joint, bool healthy) {
     }
     MatrixXd full(samples, static_cast<Index>(columns.size()));
     for (std::size_t c = 0; c < columns.size(); ++c) full.col(static_cast<Index>(c)) = columns[c];
-    if (out.size() == 0) out.setZero(total, full.cols());
-    out.middleRows(at.log_rows(l).first, at.log_rows(l).count) = at.prepare(l, joint, full);
+    const ProcessedLog& log = at.logs()[l].log;
+    kept = {scales_of, log.decimate(log.filter_columns(full))};
+    put(kept.rows);
   }
   return out;
 }
@@ -226,7 +269,8 @@ LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& 
   const double freedom =
       std::clamp(2 * mean * mean / std::max(variance, 1e-300), 3.0, static_cast<double>(kept.size()));
   out.state_p = chance(mine / std::max(mean, 1e-300), freedom);
-  out.time_p = std::min(line_chance(at, residual), at.models().has_baseline ? slow_chance(at, residual) : 1.0);
+  out.time_p = std::min(lines(at, residual, at.fit_blocks()).p,
+                        at.models().has_baseline ? slow(at, residual, at.fit_blocks()).p : 1.0);
   return out;
 }
 
@@ -238,20 +282,31 @@ double structured_share(const Linearised& at, std::size_t joint, const LinearFit
   const VectorXd size = f.colwise().norm().transpose().array().max(1e-300).inverse();
   const MatrixXd gram = size.asDiagonal() * (f.transpose() * f) * size.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(gram);
-  const auto energy = [&](const VectorXd& x) {
-    const VectorXd along = eigen.eigenvectors().transpose() * size.cwiseProduct(f.transpose() * x);
-    double sum = 0;
-    for (Index i = 0; i < along.size(); ++i) {
-      if (eigen.eigenvalues()[i] > 1e-4) sum += along[i] * along[i] / eigen.eigenvalues()[i];
-    }
-    return sum;
+  // Coefficients of an orthonormal basis.
+  const auto coordinates = [&](const VectorXd& x) {
+    VectorXd along = eigen.eigenvectors().transpose() * size.cwiseProduct(f.transpose() * x);
+    for (Index i = 0; i < along.size(); ++i)
+      along[i] = eigen.eigenvalues()[i] > 1e-4 ? along[i] / std::sqrt(eigen.eigenvalues()[i]) : 0;
+    return along;
   };
+  const auto energy = [&](const VectorXd& x) { return coordinates(x).squaredNorm(); };
   const MatrixXd surrogate = shifted(at, joint, e, blocks);
   double null = 0;
   for (Index s = 0; s < surrogate.cols(); ++s) null += energy(surrogate.col(s)) / static_cast<double>(surrogate.cols());
   const double whole = e.squaredNorm(), found = energy(e), expected = std::min(null / whole, 0.95);
   // found = structure + expected * (whole - structure)
-  return std::clamp((found / whole - expected) / (1 - expected), 0.0, 1.0);
+  const double of_state = std::clamp((found / whole - expected) / (1 - expected), 0.0, 1.0);
+  // What the state does not explain may still repeat or wander.
+  VectorXd along = coordinates(e);
+  for (Index i = 0; i < along.size(); ++i) {
+    if (eigen.eigenvalues()[i] > 1e-4) along[i] /= std::sqrt(eigen.eigenvalues()[i]);
+  }
+  const VectorXd rest = e - f * size.cwiseProduct(eigen.eigenvectors() * along);
+  const double of_time = std::max(lines(at, rest, blocks).share,
+                                  at.models().has_baseline
+                                      ? slow(at, rest + (at.residual(joint, fit) - e), blocks).share
+                                      : 0.0);
+  return of_state + (1 - of_state) * std::clamp(of_time, 0.0, 1.0);
 }
 
 }  // namespace fxdyn::diagnosis

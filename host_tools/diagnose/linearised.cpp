@@ -2,7 +2,9 @@
 
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
+#include "host_tools/diagnose/autoregression.hpp"
 #include "host_tools/diagnose/lack_of_fit.hpp"
 #include "host_tools/error.hpp"
 #include "host_tools/identify/solver.hpp"
@@ -17,8 +19,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Order of the autoregressive model of the noise.
-constexpr Index order = 6;
 /// Friction differs from session to session by this share of itself (standard deviation) without anything being wrong.
 constexpr double friction_change = 0.3;
 /// Likewise the offset, as a share of Coulomb friction.
@@ -38,6 +38,12 @@ bool is_shape_free(const EffectInfo& info, std::size_t i) {
 /// Columns that come from differences of predict() rather than from phi.
 bool by_difference(const EffectInfo& info) {
   return info.acts_on != ActsOn::torque || info.needs_total || info.needs_structural;
+}
+
+/// The unknown as it lies in the healthy model.
+Unknown in_healthy(Unknown u) {
+  u.effect = u.healthy_effect;
+  return u;
 }
 
 const EffectFit& fit_of(const IdentifiedModel& model, const Unknown& u) {
@@ -89,22 +95,6 @@ void add_to(IdentifiedModel& model, const Unknown& u, double step) {
       return;
     }
   }
-}
-
-VectorXd yule_walker(const std::vector<VectorXd>& residuals) {
-  VectorXd r = VectorXd::Zero(order + 1);
-  for (const VectorXd& e : residuals) {
-    for (Index lag = 0; lag <= order && lag < e.size(); ++lag)
-      r[lag] += e.head(e.size() - lag).dot(e.tail(e.size() - lag));
-  }
-  if (!(r[0] > 0)) return VectorXd::Zero(order);
-  MatrixXd toeplitz(order, order);
-  for (Index i = 0; i < order; ++i) {
-    for (Index k = 0; k < order; ++k) toeplitz(i, k) = r[std::abs(i - k)];
-  }
-  // A touch of white noise keeps the roots inside.
-  toeplitz.diagonal() *= 1 + 1e-4;
-  return toeplitz.ldlt().solve(r.tail(order));
 }
 
 }  // namespace
@@ -198,18 +188,22 @@ void Linearised::make_unknowns() {
       unknowns_.push_back(u);
     }
     const EffectFit* coulomb = common.joints[j].find(Coulomb::name);
+    std::size_t unnamed = 0;
     for (std::size_t e = 0; e < joint.effects.size(); ++e) {
       const EffectFit& fit = joint.effects[e];
-      if (fit.named || fixed(j, fit)) continue;
+      if (fit.named) continue;
+      const std::size_t before = two ? unnamed++ : e;  // both models have the unnamed ones in one order
+      if (fixed(j, fit)) continue;
       const EffectInfo& info = *find_effect(fit.effect);
       Unknown u;
       u.joint = j;
       u.effect = e;
+      u.healthy_effect = before;
       for (u.index = 0; u.index < info.linear.size(); ++u.index) {
         u.kind = Unknown::Kind::linear;
         u.change = false;
         u.prior_std = 0;
-        u.value = common.joints[j].effects[e].linear[u.index];
+        u.value = common.joints[j].effects[before].linear[u.index];
         unknowns_.push_back(u);
         if (!two || fit.effect == RotorInertia::name) continue;
         u.change = true;
@@ -237,6 +231,7 @@ void Linearised::make_unknowns() {
     group.candidate = {fit.effect, j, fit.shape};
     group.on_body = body;
     group.in_model = true;
+    group.id = {body, j, e};
     group.first = static_cast<Index>(unknowns_.size());
     Unknown u;
     u.joint = j;
@@ -318,8 +313,25 @@ EffectColumns Linearised::full_rate(std::size_t log, const EffectCandidate& cand
 
 MatrixXd Linearised::prepare(std::size_t log, std::size_t joint, const Eigen::Ref<const MatrixXd>& full) const {
   const ProcessedLog& l = (*logs_)[log].log;
+  return finish(log, joint, l.decimate(l.filter_columns(full)));
+}
+
+MatrixXd Linearised::finish(std::size_t log, std::size_t joint, const MatrixXd& rows) const {
   const Block& b = log_rows_[log];
-  return row_scale_[joint].segment(b.first, b.count).asDiagonal() * whiten(joint, l.decimate(l.filter_columns(full)));
+  return row_scale_[joint].segment(b.first, b.count).asDiagonal() * whiten(joint, rows);
+}
+
+double Linearised::log_scale(std::size_t joint) const {
+  double sum = 0;
+  for (const std::size_t b : fit_blocks_)
+    sum += row_scale_[joint].segment(blocks_[b].first, blocks_[b].count).array().log().sum();
+  return sum;
+}
+
+const Group* Linearised::find(const EffectId& id) const {
+  const auto it =
+      std::find_if(groups_.begin(), groups_.end(), [&](const Group& g) { return g.in_model && g.id == id; });
+  return it == groups_.end() ? nullptr : &*it;
 }
 
 /// What a row counts for, as a factor: near standstill the friction that an uncertain velocity makes is noise too,
@@ -352,26 +364,77 @@ VectorXd Linearised::certainty(std::size_t log, std::size_t joint, double sigma)
   return (1 + rows.array().max(0)).sqrt().inverse();
 }
 
-/// Rows of one log; its first ones have no past and are left out (zero).
+/// Rows of one log.
 MatrixXd Linearised::whiten(std::size_t joint, MatrixXd columns) const {
-  if (whitening_.empty()) return columns;
-  const VectorXd& a = whitening_[joint];
-  MatrixXd out = columns;
-  const Index rows = columns.rows();
-  for (Index lag = 1; lag <= a.size() && lag < rows; ++lag)
-    out.bottomRows(rows - lag) -= a[lag - 1] * columns.topRows(rows - lag);
-  out.topRows(std::min(rows, a.size())).setZero();
+  return whitening_.empty() ? columns : prewhitened(columns, whitening_[joint]);
+}
+
+Index Linearised::first_base(std::size_t joint) const {
+  const auto at = std::lower_bound(base_.columns.begin(), base_.columns.end(),
+                                   static_cast<Index>(joint) * static_cast<Index>(parameters_per_link));
+  return at - base_.columns.begin();
+}
+
+/// Base columns of a joint at full rate.
+std::vector<MatrixXd> Linearised::base_columns(std::size_t log, const std::vector<std::size_t>& of) const {
+  const Motion& motion = *motions_[log];
+  const auto nb = static_cast<Index>(base_.columns.size());
+  std::vector<MatrixXd> out(joints());
+  for (const std::size_t j : of) out[j].resize(motion.q.rows(), nb - first_base(j));
+  Regressor regressor(chain_);
+  for (Index k = 0; k < motion.q.rows(); ++k) {
+    const MatrixXd& y = regressor(motion.q.row(k), motion.dq.row(k), motion.ddq.row(k));
+    for (const std::size_t j : of) {
+      for (Index c = first_base(j), i = 0; c < nb; ++c, ++i)
+        out[j](k, i) = y(static_cast<Index>(j), base_.columns[static_cast<std::size_t>(c)]);
+    }
+  }
   return out;
+}
+
+/// Base columns of a joint as its torque shows them: with friction in proportion to them,
+///   d tau / d pi = (1 + sum coefficient d phi / d structural) Y,
+/// and through what follows in the torque's path; filtered and decimated.
+MatrixXd Linearised::base_rows(std::size_t log, std::size_t joint) const {
+  const SessionLog& entry = (*logs_)[log];
+  RowCache& cache = *entry.cache;
+  std::call_once(cache.made, [&] {
+    std::vector<std::size_t> all(joints());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    for (const MatrixXd& full : base_columns(log, all))
+      cache.base.push_back(entry.log.decimate(entry.log.filter_columns(full)));
+    cache.features.resize(joints());
+  });
+  const JointFit& fit = (entry.healthy ? models_.healthy : models_.current).joints[joint];
+  std::vector<const EffectFit*> of_load;
+  for (const EffectFit& effect : fit.effects) {
+    const EffectInfo& info = *find_effect(effect.effect);
+    if (info.acts_on == ActsOn::torque && info.needs_structural && !info.needs_total) of_load.push_back(&effect);
+  }
+  if (of_load.empty() && in_order(fit, true).empty()) return cache.base[joint];
+  MatrixXd columns = std::move(base_columns(log, {joint})[joint]);
+  const Motion& motion = *motions_[log];
+  const auto k = static_cast<Index>(joint);
+  const VectorXd structural = robot_[log]->structural().col(k);
+  const double step = difference * std::max(structural.cwiseAbs().maxCoeff(), 1e-9);
+  VectorXd factor = VectorXd::Ones(structural.size());
+  for (const EffectFit* effect : of_load) {
+    const auto at = [&](double by) {
+      const JointSeries series{motion.q.col(k), motion.dq.col(k), motion.ddq.col(k),
+                               (structural.array() + by).matrix(), motion.step_s};
+      return effect_columns(effect->effect, effect->shape, fit.sign_width, series);
+    };
+    const VectorXd theta = Eigen::Map<const VectorXd>(effect->linear.data(), static_cast<Index>(effect->linear.size()));
+    factor += (at(step) - at(-step)) * theta / (2 * step);
+  }
+  columns = factor.asDiagonal() * columns;
+  return entry.log.decimate(entry.log.filter_columns(follow(log, joint, std::move(columns))));
 }
 
 void Linearised::make_rows() {
   const std::size_t n = joints();
   const Index total = log_rows_.back().first + log_rows_.back().count;
-  const auto first_unknown = [&](std::size_t j) {
-    const auto at = std::lower_bound(base_.columns.begin(), base_.columns.end(),
-                                     static_cast<Index>(j) * static_cast<Index>(parameters_per_link));
-    return at - base_.columns.begin();
-  };
+  const auto first_unknown = [&](std::size_t j) { return first_base(j); };
   const auto nb = static_cast<Index>(base_.columns.size());
   // Which unknowns each joint feels: its base columns, its own, and everything that is not an effect on its torque.
   for (std::size_t j = 0; j < n; ++j) {
@@ -398,19 +461,10 @@ void Linearised::make_rows() {
     const IdentifiedModel& model = entry.healthy ? models_.healthy : models_.current;
     const Motion& motion = *motions_[l];
     const Index at = log_rows_[l].first, count = log_rows_[l].count;
-    std::vector<MatrixXd> full(n);
-    for (std::size_t j = 0; j < n; ++j) full[j].setZero(log.samples(), static_cast<Index>(rows_[j].column.size()) + 1);
-    Regressor regressor(chain_);
-    for (Index k = 0; k < log.samples(); ++k) {
-      const MatrixXd& y = regressor(motion.q.row(k), motion.dq.row(k), motion.ddq.row(k));
-      for (std::size_t j = 0; j < n; ++j) {
-        for (Index c = first_unknown(j), i = 0; c < nb; ++c, ++i)
-          full[j](k, i) = y(static_cast<Index>(j), base_.columns[static_cast<std::size_t>(c)]);
-      }
-    }
+    std::vector<MatrixXd> full(n);  // everything but the base columns, and the prediction
     for (std::size_t j = 0; j < n; ++j) {
-      const Index base = nb - first_unknown(j);
-      full[j].leftCols(base) = follow(l, j, full[j].leftCols(base));
+      full[j].setZero(log.samples(), static_cast<Index>(rows_[j].column.size()) - (nb - first_unknown(j)) + 1);
+      rows_[j].x.block(at, 0, count, nb - first_unknown(j)) = base_rows(l, j);
     }
     const MatrixXd& torque = robot_[l]->torque();
     const auto loaded = [&](IdentifiedModel m) {
@@ -418,9 +472,10 @@ void Linearised::make_rows() {
     };
     MatrixXd predicted = torque;
     for (Index c = nb; c < columns_; ++c) {
-      const Unknown& u = unknowns_[static_cast<std::size_t>(c)];
-      const bool named = u.kind != Unknown::Kind::width && fit_of(models_.current, u).named;
-      if (entry.healthy && (u.change || named)) continue;
+      const Unknown& common = unknowns_[static_cast<std::size_t>(c)];
+      const bool named = common.kind != Unknown::Kind::width && fit_of(models_.current, common).named;
+      if (entry.healthy && (common.change || named)) continue;
+      const Unknown u = entry.healthy ? in_healthy(common) : common;
       std::vector<MatrixXd> columns(n);
       if (u.kind == Unknown::Kind::width) {
         // d / d log w of everything that uses the sign
@@ -470,7 +525,7 @@ void Linearised::make_rows() {
       }
       for (std::size_t j = 0; j < n; ++j) {
         const Index local = rows_[j].local[static_cast<std::size_t>(c)];
-        if (local >= 0 && columns[j].size() > 0) full[j].col(local) = columns[j];
+        if (local >= 0 && columns[j].size() > 0) full[j].col(local - (nb - first_unknown(j))) = columns[j];
       }
     }
     const double lead = model.filter.torque_lead_s / log.step_s;
@@ -478,7 +533,7 @@ void Linearised::make_rows() {
       const auto k = static_cast<Index>(j);
       full[j].rightCols(1) = predicted.col(k);
       const MatrixXd kept = log.decimate(log.filter_columns(full[j]));
-      rows_[j].x.middleRows(at, count) = kept.leftCols(kept.cols() - 1);
+      rows_[j].x.block(at, nb - first_unknown(j), count, kept.cols() - 1) = kept.leftCols(kept.cols() - 1);
       MatrixXd tau = log.filter_columns(log.tau.col(k));
       if (lead != 0) tau = at_other_times(tau, -lead);
       rows_[j].y.segment(at, count) = log.decimate(tau) - kept.rightCols(1);
@@ -536,7 +591,7 @@ void Linearised::make_rows() {
       const bool use = models_.has_baseline ? b.healthy : b.fits;
       if (use) parts.emplace_back(e.segment(b.first, b.count).cwiseProduct(row_scale_[j].segment(b.first, b.count)));
     }
-    coefficients[j] = yule_walker(parts);
+    coefficients[j] = autoregression(parts);
   });
   if (whitening_.empty()) whitening_ = std::move(coefficients);
   parallel_for(n, [&](std::size_t j) {
@@ -794,6 +849,11 @@ MatrixXd Linearised::gram(Index first, Index count) const {
   return out;
 }
 
+MatrixXd base_covariance(const Linearised& at) {
+  const auto n = static_cast<Index>(at.models().current.base.size());
+  return SymmetricSolver(at.solve(at.nuisance()).information).inverse().topLeftCorner(n, n);
+}
+
 void update(Models& models, const Linearised& at, const LinearFit& fit, double share) {
   for (std::size_t i = 0; i < fit.columns.size(); ++i) {
     const auto c = static_cast<std::size_t>(fit.columns[i]);
@@ -814,7 +874,7 @@ void update(Models& models, const Linearised& at, const LinearFit& fit, double s
     add_to(models.current, u, step);
     const bool named =
         u.kind != Unknown::Kind::base && u.kind != Unknown::Kind::width && fit_of(models.current, u).named;
-    if (models.has_baseline && !u.change && !named) add_to(models.healthy, u, step);
+    if (models.has_baseline && !u.change && !named) add_to(models.healthy, in_healthy(u), step);
   }
 }
 

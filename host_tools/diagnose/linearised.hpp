@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,27 @@ struct Models {
   bool has_baseline = false;
   std::vector<EffectCandidate> fixed;   ///< what a link encoder gave: the torque does not change it
   std::vector<std::size_t> background;  ///< joints whose healthy session has structure that no effect explains
+  std::vector<std::size_t> rotors;      ///< joints whose rotor is told from the link by load friction alone, see name()
+  double smallest_step_s = 1;           ///< of all logs and of the drive's tick: what bounds a delay
+};
+
+/// An effect of Models::current: of joints[joint].effects, or of body.
+struct EffectId {
+  bool body = false;
+  std::size_t joint = 0, effect = 0;
+  bool operator==(const EffectId&) const = default;
+};
+
+/// What a log's motion alone makes of rows, kept from one linearisation to the next: filtered and decimated, as it is
+/// before whitening.
+struct RowCache {
+  struct Features {
+    Eigen::VectorXd scales;
+    Eigen::MatrixXd rows;
+  };
+  std::once_flag made;
+  std::vector<Eigen::MatrixXd> base;  ///< per joint: its base columns, nothing following in the torque's path
+  std::vector<Features> features;     ///< per joint, see features()
 };
 
 /// A log of one of the two sessions. Rows are decimated to `log.decimation`.
@@ -27,6 +49,7 @@ struct SessionLog {
   bool healthy = false;  ///< of the baseline
   bool fits = true;      ///< else it judges only (validate)
   double age_s = 0;      ///< of the session when the log begins: what drifts has drifted so far
+  std::shared_ptr<RowCache> cache = std::make_shared<RowCache>();
 };
 
 /// One scalar that is fitted.
@@ -38,7 +61,8 @@ struct Unknown {
     shape,   ///< logarithm of an effect's shape parameter
   };
   Kind kind = Kind::base;
-  std::size_t joint = 0, effect = 0, index = 0;  ///< base: index; shape and linear: of the model's effect
+  std::size_t joint = 0, effect = 0, index = 0;  ///< base: index; shape and linear: of the current model's effect
+  std::size_t healthy_effect = 0;                ///< the same in the healthy model
   bool body = false;                             ///< effect of IdentifiedModel::body
   bool change = false;                           ///< what the current session has more than the healthy one
   double value = 0;                              ///< in the model; 0 for logarithms, whose steps are fitted
@@ -49,13 +73,13 @@ struct Unknown {
 struct Group {
   EffectCandidate candidate;
   bool on_body = false;
-  bool in_model = false;        ///< columns are d torque / d (unknown) around the named effect
+  bool in_model = false;        ///< columns are d torque / d (unknown) around the named effect `id`
+  EffectId id{};
   Eigen::Index first = 0;       ///< column
   Eigen::Index count = 0;       ///< columns
   int nonlinear = 0;            ///< shape parameters that were searched
   double log_grid = 0;          ///< ln of the number of independent shapes tried
   std::vector<double> lower{};  ///< bounds of the coefficients
-  bool noise_limited = false;   ///< what is seen of it is encoder noise
 };
 
 /// Rows that are used or left out together.
@@ -107,7 +131,8 @@ class Linearised {
   const std::vector<Unknown>& unknowns() const { return unknowns_; }  ///< of the nuisance and of named effects
   const std::vector<Eigen::Index>& nuisance() const { return nuisance_; }
   const std::vector<Group>& groups() const { return groups_; }
-  Group& group(std::size_t i) { return groups_[i]; }
+  /// The group of a named effect; null: it has none (of a link encoder, or not in the model).
+  const Group* find(const EffectId& id) const;
   const JointRows& rows(std::size_t joint) const { return rows_[joint]; }
   const std::vector<Block>& blocks() const { return blocks_; }
   const std::vector<Fold>& folds() const { return folds_; }
@@ -136,6 +161,8 @@ class Linearised {
   Eigen::VectorXd row_count(const std::vector<std::size_t>& blocks) const;
   /// Whitened residual of a joint, all rows.
   Eigen::VectorXd residual(std::size_t joint, const LinearFit& fit) const;
+  /// Sum of ln(row scale) of the rows that fit, see certainty(): part of their likelihood.
+  double log_scale(std::size_t joint) const;
   /// Prior information on a column of the background; 0 for others.
   double background_information(Eigen::Index column) const;
   /// X^T W X and X^T W y.
@@ -147,6 +174,8 @@ class Linearised {
   Eigen::VectorXd projection(Eigen::Index from) const;
   Eigen::MatrixXd gram(Eigen::Index first, Eigen::Index count) const;
 
+  /// Whitened and scaled: rows of a log for a joint that are filtered and decimated already.
+  Eigen::MatrixXd finish(std::size_t log, std::size_t joint, const Eigen::MatrixXd& rows) const;
   /// Filtered, decimated, whitened: full-rate columns of a log for a joint.
   Eigen::MatrixXd prepare(std::size_t log, std::size_t joint, const Eigen::Ref<const Eigen::MatrixXd>& full) const;
   /// Rows of a log.
@@ -161,7 +190,9 @@ class Linearised {
   Eigen::VectorXd certainty(std::size_t log, std::size_t joint, double sigma) const;
   Eigen::MatrixXd whiten(std::size_t joint, Eigen::MatrixXd columns) const;
   Eigen::MatrixXd follow(std::size_t log, std::size_t joint, Eigen::MatrixXd columns) const;
-  Eigen::MatrixXd aged(const Group& group, std::size_t log, Eigen::MatrixXd columns) const;
+  Eigen::Index first_base(std::size_t joint) const;
+  std::vector<Eigen::MatrixXd> base_columns(std::size_t log, const std::vector<std::size_t>& of) const;
+  Eigen::MatrixXd base_rows(std::size_t log, std::size_t joint) const;
   EffectColumns full_rate(std::size_t log, const EffectCandidate& candidate) const;
 
   Models models_;
@@ -184,6 +215,9 @@ class Linearised {
   std::vector<std::size_t> background_joint_;  ///< of each column after the unknowns
   std::vector<double> background_information_;
 };
+
+/// Of the base parameters, whatever else is fitted.
+Eigen::MatrixXd base_covariance(const Linearised& at);
 
 /// What a fit over nuisance and named effects makes of the models: x at `columns` (places of unknowns).
 void update(Models& models, const Linearised& at, const LinearFit& fit, double share);

@@ -46,7 +46,10 @@ double misfit(const Linearised& at) {
                                          at.weights()[static_cast<Index>(j)];
     square[static_cast<Index>(j)] = (y - x * SymmetricSolver(gram).solve(x.transpose() * y)).squaredNorm();
   }
-  for (Index j = 0; j < square.size(); ++j) sum += rows[j] * std::log(std::max(square[j], 1e-300));
+  for (Index j = 0; j < square.size(); ++j) {
+    sum += rows[j] * std::log(std::max(square[j], 1e-300));
+    sum -= 2 * at.log_scale(static_cast<std::size_t>(j));
+  }
   return sum;
 }
 
@@ -83,8 +86,9 @@ void refit(Models& models, const std::vector<SessionLog>& all, const std::vector
       share = 1;
       halvings = 0;
     } else {
-      // Too far.
+      // Too far; or no figures at all, then the models stay as they are.
       models = best;
+      if (!around) return;
       if (++halvings > most_halvings || round >= rounds + most_halvings) return;
       share *= 0.3;
     }
@@ -92,7 +96,7 @@ void refit(Models& models, const std::vector<SessionLog>& all, const std::vector
   }
 }
 
-void name(Models& models, const Group& group, const VectorXd& theta) {
+EffectId name(Models& models, const Group& group, const VectorXd& theta) {
   EffectFit fit;
   fit.effect = group.candidate.effect;
   fit.shape = group.candidate.shape;
@@ -108,8 +112,50 @@ void name(Models& models, const Group& group, const VectorXd& theta) {
     for (std::size_t i = 1; i < fit.linear.size(); ++i)
       fit.linear[i] = std::clamp(fit.linear[i] / fit.linear[0], -10.0, 10.0);
   }
-  (group.on_body ? models.current.body : models.current.joints[group.candidate.joint].effects)
-      .push_back(std::move(fit));
+  const std::size_t joint = group.candidate.joint;
+  auto& effects = group.on_body ? models.current.body : models.current.joints[joint].effects;
+  effects.push_back(std::move(fit));
+  const EffectId id{group.on_body, joint, effects.size() - 1};
+  if (group.candidate.effect == LoadFriction::name && models.current.joints[joint].find(RotorInertia::name) == nullptr) {
+    EffectFit rotor;
+    rotor.effect = RotorInertia::name;
+    rotor.linear = {0};
+    effects.push_back(rotor);
+    if (models.has_baseline) models.healthy.joints[joint].effects.push_back(rotor);
+    models.rotors.push_back(joint);
+  }
+  return id;
+}
+
+namespace {
+
+void remove(Models& models, std::vector<EffectId>& ids, const EffectId& id) {
+  auto& effects = id.body ? models.current.body : models.current.joints[id.joint].effects;
+  effects.erase(effects.begin() + static_cast<std::ptrdiff_t>(id.effect));
+  for (EffectId& other : ids) {
+    if (other.body == id.body && other.joint == id.joint && other.effect > id.effect) --other.effect;
+  }
+}
+
+}  // namespace
+
+void take_back(Models& models, std::vector<EffectId>& ids, const EffectId& id) {
+  const auto& effects = id.body ? models.current.body : models.current.joints[id.joint].effects;
+  const bool of_load = effects[id.effect].effect == LoadFriction::name;
+  remove(models, ids, id);
+  if (of_load) forget_rotor(models, ids, id.joint);
+}
+
+bool forget_rotor(Models& models, std::vector<EffectId>& ids, std::size_t joint) {
+  const auto it = std::find(models.rotors.begin(), models.rotors.end(), joint);
+  if (it == models.rotors.end()) return false;
+  models.rotors.erase(it);
+  const auto is_rotor = [](const EffectFit& fit) { return fit.effect == RotorInertia::name; };
+  const auto& effects = models.current.joints[joint].effects;
+  const auto at = std::find_if(effects.begin(), effects.end(), is_rotor);
+  remove(models, ids, {false, joint, static_cast<std::size_t>(at - effects.begin())});
+  if (models.has_baseline) std::erase_if(models.healthy.joints[joint].effects, is_rotor);
+  return true;
 }
 
 }  // namespace fxdyn::diagnosis

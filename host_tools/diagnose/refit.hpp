@@ -10,7 +10,13 @@ namespace fxdyn::diagnosis {
 void refit(Models& models, const std::vector<SessionLog>& logs, const std::vector<Eigen::VectorXd>& whitening,
            int rounds);
 
-/// Puts an effect into the current model as one that was named. Payload is given in mass and first moment.
-void name(Models& models, const Group& group, const Eigen::VectorXd& theta);
+/// Puts an effect into the current model as one that was named. Payload is given in mass and first moment. Friction in
+/// proportion to the load brings the rotor's inertia with it where that is part of the base parameters: the gear carries
+/// the link, not the rotor.
+EffectId name(Models& models, const Group& group, const Eigen::VectorXd& theta);
+/// Takes a named effect out of the current model; `ids` of others follow.
+void take_back(Models& models, std::vector<EffectId>& ids, const EffectId& id);
+/// Likewise the rotor that name() brought; false: it brought none.
+bool forget_rotor(Models& models, std::vector<EffectId>& ids, std::size_t joint);
 
 }  // namespace fxdyn::diagnosis

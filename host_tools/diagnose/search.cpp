@@ -108,8 +108,14 @@ double Search::penalty(std::size_t g) const {
 double Search::threshold(std::size_t g) const {
   const Group& group = at_.groups()[g];
   if (thresholds_.size() == 0) return least_score;
-  return group.on_body ? std::max(least_score, thresholds_.minCoeff())
-                       : thresholds_[static_cast<Index>(group.candidate.joint)];
+  if (!group.on_body) return thresholds_[static_cast<Index>(group.candidate.joint)];
+  // What a load would stand in for may be on any joint that feels it.
+  double most = least_score;
+  for (std::size_t j = 0; j < at_.joints(); ++j) {
+    if (at_.rows(j).local[static_cast<std::size_t>(group.first)] >= 0)
+      most = std::max(most, thresholds_[static_cast<Index>(j)]);
+  }
+  return most;
 }
 
 std::vector<Index> Search::columns(const std::vector<std::size_t>& groups) const {
@@ -123,7 +129,6 @@ std::vector<Index> Search::columns(const std::vector<std::size_t>& groups) const
 
 bool Search::allowed(const Choice& state, std::size_t g) const {
   const Group& group = at_.groups()[g];
-  if (group.noise_limited) return false;
   if (!group.in_model && !group.on_body && find_effect(group.candidate.effect)->needs_total) {
     // The total that its column is made of has the model's named effects in it: one that is left out would be stood in
     // for.
@@ -213,7 +218,8 @@ std::vector<Search::Scored> Search::score_all(const Choice& state, bool with_thr
   std::vector<char> usable(at_.groups().size(), 0);
   for (std::size_t g = 0; g < at_.groups().size(); ++g) {
     const Group& group = at_.groups()[g];
-    if (group.in_model || group.count == 0 || !allowed(state, g)) continue;
+    const bool open = allowed(state, g);
+    if (group.in_model || group.count == 0 || (!open && !first)) continue;
     const Index at = group.first - from;
     const MatrixXd mine = at_.gram(group.first, group.count);
     size[g] = mine.diagonal();
@@ -221,7 +227,7 @@ std::vector<Search::Scored> Search::score_all(const Choice& state, bool with_thr
     left[g].projection = own.segment(at, group.count);
     const Gain gain = gain_of(left[g], size[g], group.lower, is_share(group));
     if (first) kept_[g] = gain.kept;
-    if (gain.rank == 0) continue;
+    if (gain.rank == 0 || !open) continue;
     usable[g] = 1;
     if (gain.square <= 0) continue;
     double likelihood = gain.square;
@@ -346,7 +352,7 @@ std::size_t Search::refine(const Choice& state, std::size_t g) {
     const double lower = std::max(info.shape[index].lower, centre / ratio);
     double upper = std::min(info.shape[index].upper, centre * ratio);
     if (info.shape[index].name == "time")
-      upper = std::min(upper, static_cast<double>(Delay::largest) * at_.logs().front().log.step_s);
+      upper = std::min(upper, static_cast<double>(Delay::largest) * at_.models().smallest_step_s);
     double next = centre;
     for (const double value : {lower, upper}) {
       const double square = try_shape(value, made);
@@ -413,8 +419,9 @@ Choice Search::run(std::vector<std::size_t> start, Progress& progress) {
     beam = std::move(next);
     best = beam.front();
   }
-  // Early choices stand in for others: swap, then drop.
-  for (int round = 0; round < 3; ++round) {
+  // Early choices stand in for others: swap and drop, the last round drops only.
+  constexpr int rounds = 4;
+  for (int round = 0; round < rounds; ++round) {
     bool changed = false;
     for (std::size_t i = 0; i < best.groups.size(); ++i) {
       std::vector<std::size_t> others = best.groups;
@@ -425,6 +432,7 @@ Choice Search::run(std::vector<std::size_t> start, Progress& progress) {
         changed = true;
         break;
       }
+      if (round == rounds - 1) continue;
       std::size_t tried = 0;
       std::set<std::pair<std::string, std::size_t>> names;
       for (const Scored& one : score_all(without, false)) {

@@ -117,7 +117,7 @@ std::string effect_table(const json& diagnosis) {
 
 std::string evidence_section(const json& evidence) {
   const json joints = evidence.value("joints", json::array());
-  std::string out = subsection("On logs that the search never saw");
+  std::string out = subsection("On held-out logs");
   if (joints.empty()) return out + paragraph("No log was held out.");
   Table table(
       {{"joint"}, {"unit"}, {"RMS before", "n"}, {"after", "n"}, {"after, fixed point", "n"}, {"noise floor", "n"}});
@@ -138,6 +138,7 @@ std::string evidence_section(const json& evidence) {
   }
   out += table.html();
   if (!files.empty()) out += paragraph("Logs: " + files + ".");
+  if (evidence.contains("note")) out += paragraph("Note: " + evidence.value("note", "") + ".");
   const json fixed = evidence.value("fixed_point", json::object());
   if (fixed.contains("why_not")) out += paragraph("No fixed point: " + fixed.value("why_not", "") + ".");
   return out;

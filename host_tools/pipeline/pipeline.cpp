@@ -222,11 +222,10 @@ void Pipeline::diagnose() {
   progress_.step();
   stages.push_back(stage_metrics(model, "diagnosed"));
   progress_.step();
-  // Nothing was fitted on these.
   std::vector<ProcessedLog> held_out = logs(Role::test);
   if (held_out.empty()) held_out = logs(Role::validate);
   json report = diagnosis.report;
-  report["evidence"] = evidence_json(nominal, model, held_out);
+  report["evidence"] = evidence_json(nominal, model, held_out, diagnosis.still);
   progress_.step();
   const json metrics = {{"schema", "fxdyn.metrics/1"},          {"gate", diagnosis.report.at("gate")},
                         {"base_parameters", model.base.size()}, {"notes", data().notes},

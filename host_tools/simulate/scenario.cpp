@@ -117,6 +117,20 @@ ScenarioLog read_scenario_log(Table table) {
   return log;
 }
 
+/// The last log beside the others and the sensors.
+void check_log(const Value& value, const Scenario& scenario) {
+  const ScenarioLog& log = scenario.logs.back();
+  if (log.name.empty() || log.name.find('/') != std::string::npos)
+    value.place().fail(fmt::format("log \"{}\": expected the name of a file, without a folder and .csv", log.name));
+  for (std::size_t i = 0; i + 1 < scenario.logs.size(); ++i) {
+    if (scenario.logs[i].name == log.name)
+      value.place().fail(fmt::format("log \"{}\" is there already; give each log a name of its own", log.name));
+  }
+  if (log.duration_s < 2 * scenario.sample_s)
+    value.place().fail(fmt::format("log \"{}\": {:g} s are less than two samples of {:g} s", log.name, log.duration_s,
+                                   scenario.sample_s));
+}
+
 ScenarioControl read_control(Table table) {
   ScenarioControl control;
   toml_input::set(control.bandwidth_hz, table.find("bandwidth_hz"), toml_input::as_positive);
@@ -213,7 +227,7 @@ Scenario read_scenario(const fs::path& file) {
   if (auto table = root.table("sensors")) {
     toml_input::set(scenario.sample_s, table->find("sample_s"), toml_input::as_positive);
     if (const auto bits = table->find("encoder_bits")) scenario.encoder_bits = bits->count(0);
-    toml_input::set(scenario.torque_noise, table->find("torque_noise"), toml_input::as_number);
+    toml_input::set(scenario.torque_noise, table->find("torque_noise"), not_negative);
     toml_input::set(scenario.ar_noise, table->find("ar_noise"), not_negative);
     toml_input::set(scenario.ar_pole, table->find("ar_pole"), share);
     toml_input::set(scenario.jitter, table->find("jitter"), share);
@@ -240,7 +254,10 @@ Scenario read_scenario(const fs::path& file) {
     check_plant(*effects, scenario);
   }
   if (!logs) throw InputError(file.string() + ": no log to simulate; add a [[log]] with name, duration_s and seed");
-  for (const Value& value : logs->items()) scenario.logs.push_back(read_scenario_log(Table(value)));
+  for (const Value& value : logs->items()) {
+    scenario.logs.push_back(read_scenario_log(Table(value)));
+    check_log(value, scenario);
+  }
   return scenario;
 }
 

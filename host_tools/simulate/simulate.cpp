@@ -94,8 +94,12 @@ PlantRun run_plant(const Scenario& scenario, const ScenarioLog& log, double leng
   return run;
 }
 
-fs::path simulate_log(const Scenario& scenario, std::size_t index, const fs::path& directory) {
-  const ScenarioLog& spec = scenario.logs[index];
+struct Simulated {
+  std::string name;
+  Log log, clean;
+};
+
+Simulated simulate_log(const Scenario& scenario, const ScenarioLog& spec) {
   const Eigen::VectorXd times = sampling_times(scenario, spec);
   const PlantRun run = run_plant(scenario, spec, scenario.sample_s * static_cast<double>(times.size()));
   Log log = sampled(scenario, run, times);
@@ -104,10 +108,7 @@ fs::path simulate_log(const Scenario& scenario, std::size_t index, const fs::pat
   clean.t = log.t;
   clean.tau = log.tau;
   measure(scenario, spec, log);
-  const fs::path file = directory / (spec.name + ".csv");
-  write_log(directory / (spec.name + ".truth.csv"), clean);
-  write_log(file, log);
-  return file;
+  return {spec.name, std::move(log), std::move(clean)};
 }
 
 }  // namespace
@@ -121,10 +122,17 @@ std::string scenario_hash(const fs::path& scenario) {
 
 std::vector<fs::path> simulate(const fs::path& scenario_file, const fs::path& directory) {
   const Scenario scenario = read_scenario(scenario_file);
+  // All of it before any of it is written: a robot that runs away in the last log leaves nothing half done.
+  std::vector<Simulated> all;
+  for (const ScenarioLog& spec : scenario.logs) all.push_back(simulate_log(scenario, spec));
   fs::create_directories(directory);
   write_file(directory / "truth.json", to_json(scenario.plant).dump(1) + "\n");
   std::vector<fs::path> files;
-  for (std::size_t i = 0; i < scenario.logs.size(); ++i) files.push_back(simulate_log(scenario, i, directory));
+  for (const Simulated& one : all) {
+    write_log(directory / (one.name + ".truth.csv"), one.clean);
+    files.push_back(directory / (one.name + ".csv"));
+    write_log(files.back(), one.log);
+  }
   return files;
 }
 

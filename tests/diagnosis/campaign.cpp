@@ -68,6 +68,7 @@ std::vector<json> run_all(const std::vector<Case>& cases, const RunSettings& set
 std::vector<std::string> complaints(const std::vector<json>& results) {
   std::vector<std::string> list;
   std::size_t visible = 0, right = 0;
+  std::vector<double> closures;
   for (const json& result : results) {
     const std::string name = result.at("name");
     if (result.at("status") != "done") {
@@ -79,12 +80,20 @@ std::vector<std::string> complaints(const std::vector<json>& results) {
       if (score.at("false_alarm").get<bool>()) list.push_back(name + ": false alarm");
     } else if (effects.front().value("outside", false)) {
       if (score.at("accepted").get<bool>()) list.push_back(name + ": named, though no name is right");
+      if (!score.at("flagged").get<bool>()) list.push_back(name + ": not seen");
     } else if (effects.front().at("expected").at("verdict") == "visible") {
       ++visible;
       right += static_cast<std::size_t>(result.at("passed").get<bool>());
       if (!result.at("passed").get<bool>()) fmt::print("{}: wrong\n", name);
+      if (!score.at("right_joint").get<bool>()) list.push_back(name + ": at the wrong joint");
+      const bool internal = result.at("truth").at("plant") == "internal";
+      if (internal && score.contains("closure") && effects.front().contains("wanted_share"))
+        closures.push_back(score.at("closure").get<double>());
     }
   }
+  std::sort(closures.begin(), closures.end());
+  if (closures.empty() || closures[closures.size() / 2] < 0.9)
+    list.push_back("half of the gaps are closed by less than 90 %");
   if (10 * right < 9 * visible) list.push_back(fmt::format("{} of {} visible effects named right", right, visible));
   return list;
 }
@@ -95,7 +104,7 @@ int run(int argc, char** argv) {
   settings.program = FXDYN_PROGRAM;
   std::size_t jobs = 2, most = 0;
   bool small = false, check = false, list = false;
-  std::string filter;
+  std::string filter, commit;
   app.add_option("--out", settings.out, "folder for cases and results; what is there already is not run again")
       ->required();
   app.add_flag("--small", small, "the cases of the test");
@@ -103,6 +112,7 @@ int run(int argc, char** argv) {
   app.add_option("--filter", filter, "only cases with this in their name");
   app.add_option("--jobs", jobs, "cases at a time")->check(CLI::Range(1, 64));
   app.add_option("--program", settings.program, "the fxdyn to test");
+  app.add_option("--commit", commit, "what the program was built from, for the page");
   app.add_option("--time-limit", settings.time_limit_s, "of one diagnosis, seconds");
   app.add_flag("--keep", settings.keep, "keep the logs of cases that passed");
   app.add_flag("--check", check, "exit 1 where the figures of the test are not met");
@@ -127,12 +137,13 @@ int run(int argc, char** argv) {
     return 0;
   }
   settings.out = fs::absolute(settings.out);
+  settings.program_hash = hash_of_file(settings.program);
   const std::vector<json> results = run_all(cases, settings, jobs);
 
   const std::string command =
       fmt::format("campaign {}", fmt::join(std::vector<std::string>(argv + 1, argv + argc), " "));
   write_file(settings.out / "results.json", json(results).dump(1) + "\n");
-  write_file(settings.out / "campaign.md", write_up(results, command));
+  write_file(settings.out / "campaign.md", write_up(results, command, commit));
   for (const Figure& figure : figures(results)) {
     if (figure.cases > 0)
       fmt::print("{:62} {:>8} {:7.3f} of {:3} {}\n", figure.what, figure.goal, figure.value, figure.cases,

@@ -102,10 +102,11 @@ json run_case(const Case& wanted, const RunSettings& settings) {
   const fs::path folder = settings.out / "cases" / wanted.name, file = folder / "result.json";
   if (fs::exists(file)) {
     try {
-      return json::parse(read_file(file));
-    } catch (const json::exception&) {
-      fs::remove(file);  // not from this program
+      json before = json::parse(read_file(file));
+      if (before.value("program", "") == settings.program_hash) return before;
+    } catch (const json::exception&) {  // not from this program
     }
+    fs::remove(file);
   }
   fs::create_directories(folder);
   json result;
@@ -116,6 +117,7 @@ json run_case(const Case& wanted, const RunSettings& settings) {
     result["message"] = error.what();
   }
   result["name"] = wanted.name;
+  result["program"] = settings.program_hash;
   result["group"] = to_string(wanted.group);
   const bool passed = result.contains("score") && result["score"].value("passed", false);
   result["passed"] = passed;

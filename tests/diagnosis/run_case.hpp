@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <string>
 
 #include "tests/diagnosis/case.hpp"
 
@@ -10,6 +11,7 @@ namespace fxdyn::campaign {
 struct RunSettings {
   std::filesystem::path out;      ///< of the campaign
   std::filesystem::path program;  ///< fxdyn
+  std::string program_hash;       ///< results of another program are not taken for this one's
   double time_limit_s = 300;      ///< of one diagnosis
   bool keep = false;              ///< logs of cases that passed, too
 };

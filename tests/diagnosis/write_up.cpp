@@ -239,9 +239,9 @@ std::vector<Figure> figures(const std::vector<json>& results) {
   return list;
 }
 
-std::string write_up(const std::vector<json>& results, const std::string& command) {
+std::string write_up(const std::vector<json>& results, const std::string& command, const std::string& commit) {
   std::string text = "# Diagnosis campaign\n\n";
-  text += fmt::format("Version {}. `{}`\n\n", version, command);
+  text += fmt::format("Version {}{}. `{}`\n\n", version, commit.empty() ? "" : ", commit " + commit, command);
   const Filter all = [](const json&) { return true; };
   const auto times = values_of(results, all, "diagnosis_s"), generation = values_of(results, all, "generation_s");
   std::size_t missing = 0, failed = 0;

@@ -22,6 +22,8 @@ struct Figure {
 std::vector<Figure> figures(const std::vector<nlohmann::json>& results);
 
 /// The page for docs/findings: figures, confusion matrices, the cases that failed.
-std::string write_up(const std::vector<nlohmann::json>& results, const std::string& command);
+/// @param commit what the program was built from
+std::string write_up(const std::vector<nlohmann::json>& results, const std::string& command,
+                     const std::string& commit);
 
 }  // namespace fxdyn::campaign

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "host_tools/diagnose/lack_of_fit.hpp"
+#include "host_tools/diagnose/search.hpp"
+
+namespace fxdyn::diagnosis {
+
+/// A named effect of the model and what speaks for it.
+struct Finding {
+  EffectId id;
+  double score = 0;
+  std::vector<Alternative> alternatives;
+};
+
+/// What a search came to.
+struct Outcome {
+  Models models;
+  std::vector<Finding> found;
+  std::unique_ptr<Linearised> at;  ///< around the models, without candidates
+  std::vector<Eigen::MatrixXd> features;
+  std::vector<LackOfFit> lack;
+  std::vector<std::vector<std::string>> not_identifiable;  ///< per joint, and of the robot
+  std::vector<Eigen::VectorXd> whitening;
+
+  bool structured() const;  ///< at any joint
+  /// Linearises around the models again and looks for lack of fit.
+  void look_again(const std::vector<SessionLog>& logs);
+};
+
+/// Groups of the model's named effects, in the model's order.
+std::vector<std::size_t> in_model(const Linearised& at);
+/// The nuisance's columns and those of the groups.
+std::vector<Eigen::Index> columns_of(const Linearised& at, const std::vector<std::size_t>& groups);
+
+/// Search, name, fit again around what was named; once more where that left structure or found several effects.
+Outcome explore(Models models, const std::vector<SessionLog>& logs, const SearchSettings& settings,
+                const std::vector<EffectCandidate>& never, Progress& progress);
+
+}  // namespace fxdyn::diagnosis

@@ -1,0 +1,164 @@
+#include "host_tools/diagnose/gate.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host_tools/diagnose/refit.hpp"
+#include "host_tools/model/effects.hpp"
+#include "host_tools/parallel.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// What an effect must bring on data that did not fit it: squares in units of the noise.
+constexpr double least_gain = 4;
+/// In residuals full of structure that says nothing: there it is a share of the gap.
+constexpr double least_share = 0.02;
+
+HeldOut hold_out(const Linearised& at, const std::vector<MatrixXd>& features, const std::vector<std::size_t>& groups) {
+  const auto n = static_cast<Index>(at.joints());
+  const VectorXd& w = at.weights();
+  const std::vector<Index> with = columns_of(at, groups);
+  HeldOut out;
+  out.before = out.after = out.leftover = out.rows = VectorXd::Zero(n);
+  out.alone.assign(groups.size(), VectorXd::Zero(n));
+  out.fitted_before = at.square(at.solve(at.nuisance()), at.fit_blocks()).cwiseProduct(w);
+  out.fitted_after = at.square(at.solve(with), at.fit_blocks()).cwiseProduct(w);
+  out.fitted_rows = at.row_count(at.fit_blocks());
+  for (const Fold& fold : at.folds()) {
+    out.rows += at.row_count(fold.judge);
+    const LinearFit all = at.solve(with, fold.fit);
+    const VectorXd after = at.square(all, fold.judge).cwiseProduct(w);
+    out.after += after;
+    VectorXd share(n);
+    parallel_for(at.joints(), [&](std::size_t j) {
+      share[static_cast<Index>(j)] = structured_share(at, j, all, features[j], fold.judge);
+    });
+    out.leftover += after.cwiseProduct(share);
+    out.before += at.square(at.solve(at.nuisance(), fold.fit), fold.judge).cwiseProduct(w);
+    for (std::size_t i = 0; i < groups.size(); ++i) {
+      std::vector<std::size_t> others = groups;
+      others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+      out.alone[i] += at.square(at.solve(columns_of(at, others), fold.fit), fold.judge).cwiseProduct(w) - after;
+    }
+  }
+  return out;
+}
+
+/// Where structure remains, what counts is the error in the whole band: whitening would weigh it by how fast it is.
+HeldOut judge(const Outcome& outcome, const std::vector<SessionLog>& logs, const std::vector<std::size_t>& groups) {
+  HeldOut held = hold_out(*outcome.at, outcome.features, groups);
+  if (!outcome.structured()) return held;
+  const std::size_t n = outcome.lack.size();
+  const Linearised at(outcome.models, logs, std::vector<VectorXd>(n, VectorXd::Zero(1)));
+  std::vector<MatrixXd> in_band(n);
+  parallel_for(n, [&](std::size_t j) { in_band[j] = features(at, j); });
+  const HeldOut band = hold_out(at, in_band, groups);
+  for (std::size_t j = 0; j < n; ++j) {
+    if (!outcome.lack[j].structured()) continue;
+    const auto k = static_cast<Index>(j);
+    for (VectorXd HeldOut::*of : {&HeldOut::before, &HeldOut::after, &HeldOut::leftover, &HeldOut::rows,
+                                  &HeldOut::fitted_before, &HeldOut::fitted_after, &HeldOut::fitted_rows})
+      (held.*of)[k] = (band.*of)[k];
+    for (std::size_t i = 0; i < groups.size(); ++i) held.alone[i][k] = band.alone[i][k];
+  }
+  return held;
+}
+
+VectorXd gap_of(const HeldOut& held) { return (held.before - held.after).cwiseMax(0.0) + held.leftover; }
+
+/// Whether an effect brings anything: over all joints, and where its joint has structure left, a share of the gap.
+bool holds(const Outcome& outcome, const Group& group, const HeldOut& held, std::size_t i) {
+  if (held.alone[i].sum() <= least_gain) return false;
+  if (group.on_body || !outcome.lack[group.candidate.joint].structured()) return true;
+  return held.alone[i].sum() > least_share * gap_of(held)[static_cast<Index>(group.candidate.joint)];
+}
+
+/// How fast drift comes to its end shows on the data that follow.
+void choose_time_constants(Outcome& outcome, const std::vector<SessionLog>& logs) {
+  bool drifted = false;
+  for (std::size_t j = 0; j < outcome.models.current.joints.size(); ++j) {
+    for (EffectFit& fit : outcome.models.current.joints[j].effects) {
+      if (fit.effect != FrictionDrift::name || !fit.named) continue;
+      const double found = fit.shape[0];
+      double best = found, least = 1e300;
+      for (const double factor : {1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 2.0}) {
+        fit.shape[0] = std::clamp(found * factor, 0.1, 1e4);
+        const Linearised at(outcome.models, logs, outcome.whitening);
+        double sum = 0;
+        for (const Fold& fold : at.folds())
+          sum += at.square(at.solve(columns_of(at, in_model(at)), fold.fit), fold.judge)[static_cast<Index>(j)];
+        if (sum >= least) continue;
+        least = sum;
+        best = fit.shape[0];
+      }
+      fit.shape[0] = best;
+      drifted = true;
+    }
+  }
+  if (!drifted) return;
+  refit(outcome.models, logs, outcome.whitening, 4);
+  outcome.look_again(logs);
+}
+
+}  // namespace
+
+std::size_t Gate::place(const Linearised& at, const EffectId& id) const {
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    if (at.groups()[groups[i]].id == id) return i;
+  }
+  return groups.size();
+}
+
+Gate pass(Outcome& outcome, const std::vector<SessionLog>& logs, const std::vector<bool>& still) {
+  choose_time_constants(outcome, logs);
+  Gate gate;
+  for (;;) {
+    gate.groups = in_model(*outcome.at);
+    gate.held = judge(outcome, logs, gate.groups);
+    std::size_t worst = gate.groups.size();
+    for (std::size_t i = 0; i < gate.groups.size(); ++i) {
+      if (holds(outcome, outcome.at->groups()[gate.groups[i]], gate.held, i)) continue;
+      if (worst == gate.groups.size() || gate.held.alone[i].sum() < gate.held.alone[worst].sum()) worst = i;
+    }
+    if (worst == gate.groups.size()) break;
+    const EffectId gone = outcome.at->groups()[gate.groups[worst]].id;
+    std::erase_if(outcome.found, [&](const Finding& f) { return f.id == gone; });
+    std::vector<EffectId> ids;
+    for (const Finding& f : outcome.found) ids.push_back(f.id);
+    take_back(outcome.models, ids, gone);
+    for (std::size_t i = 0; i < ids.size(); ++i) outcome.found[i].id = ids[i];
+    refit(outcome.models, logs, outcome.whitening, 3);
+    outcome.look_again(logs);
+  }
+
+  const HeldOut& held = gate.held;
+  const auto n = static_cast<Index>(outcome.lack.size());
+  gate.gap = gap_of(held);
+  gate.closure.setZero(n);
+  for (Index j = 0; j < n; ++j) {
+    const auto k = static_cast<std::size_t>(j);
+    if (gate.gap[j] > 0) gate.closure[j] = (held.before[j] - held.after[j]) / gate.gap[j];
+    gate.remains.push_back(!still[k] && outcome.lack[k].structured() &&
+                           held.leftover[j] > (1 - sure_closure) * gate.gap[j]);
+    gate.accepted.push_back(gate.closure[j] >= (gate.remains.back() ? sure_closure : least_closure));
+  }
+  // An effect on the robot: what comes back without it against what it leaves on the joints that it reaches.
+  gate.robot_closure.assign(gate.groups.size(), 0.0);
+  for (std::size_t i = 0; i < gate.groups.size(); ++i) {
+    if (!outcome.at->groups()[gate.groups[i]].on_body) continue;
+    double left = 0;
+    for (Index j = 0; j < n; ++j) {
+      if (held.alone[i][j] > least_felt) left += held.leftover[j];
+    }
+    const double back = held.alone[i].sum();
+    gate.robot_closure[i] = back / std::max(back + left, 1e-300);
+  }
+  return gate;
+}
+
+}  // namespace fxdyn::diagnosis

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <vector>
+
+#include "host_tools/diagnose/explore.hpp"
+
+namespace fxdyn::diagnosis {
+
+/// A name closes at least this share of the gap above the noise on data that did not fit it ..
+inline constexpr double least_closure = 0.5;
+/// .. and this much where structure remains: another effect may only resemble it.
+inline constexpr double sure_closure = 0.8;
+/// Squares, in units of the noise, from which a joint feels an effect on the robot.
+inline constexpr double least_felt = 6;
+
+/// Squares of judged residuals per joint, whitened and weighted to unit variance.
+struct HeldOut {
+  Eigen::VectorXd before, after, leftover, rows;
+  Eigen::VectorXd fitted_before, fitted_after, fitted_rows;  ///< of the rows that fit, with a fit of all of them
+  std::vector<Eigen::VectorXd> alone;  ///< by named group: what comes back when it alone is removed
+};
+
+/// What the data that fitted no coefficient say of the named effects.
+struct Gate {
+  HeldOut held;
+  std::vector<std::size_t> groups;  ///< of Outcome::at, in the model's order
+  Eigen::VectorXd gap;              ///< what there was to close: closed and left over
+  Eigen::VectorXd closure;
+  std::vector<double> robot_closure;  ///< by group; effects on the body only
+  std::vector<bool> remains;          ///< structure that counts is left
+  std::vector<bool> accepted;         ///< joint's names are believed
+
+  /// Place of an effect in `groups`; groups.size(): it has none.
+  std::size_t place(const Linearised& at, const EffectId& id) const;
+};
+
+/// Judges each fold by a fit of the others; time constants of drift are chosen by that, and names that do not hold are
+/// taken out of the outcome one by one.
+Gate pass(Outcome& outcome, const std::vector<SessionLog>& logs, const std::vector<bool>& still);
+
+}  // namespace fxdyn::diagnosis

@@ -1,0 +1,160 @@
+#include "host_tools/diagnose/sessions.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "host_tools/error.hpp"
+#include "host_tools/model/effects.hpp"
+#include "host_tools/random.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Rows a period of the torque cut-off: two would be Nyquist's.
+constexpr double rows_per_period = 2.5;
+/// Faster than this there is nothing that these rules could name, and many rows.
+constexpr double highest_cutoff_hz = 40;
+/// Into which a single log is cut, as the search does.
+constexpr int blocks_of_one_log = 5;
+/// A robot that rested longer has cooled.
+constexpr double longest_pause_s = 1800;
+
+bool any(const std::vector<bool>& joints) { return std::find(joints.begin(), joints.end(), true) != joints.end(); }
+
+}  // namespace
+
+std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before,
+                                 std::optional<Session>& session) {
+  std::vector<std::array<double, 2>> windows;
+  for (const ProcessedLog& log : now) windows.push_back({log.t[0], log.t[log.t.size() - 1]});
+  std::sort(windows.begin(), windows.end());
+  bool one = true;
+  for (std::size_t i = 1; i < windows.size(); ++i) {
+    const double pause = windows[i][0] - windows[i - 1][1];
+    one &= pause > -1e-9 && pause < longest_pause_s;
+  }
+  if (one) session = {windows.front()[0], windows.back()[1]};
+  std::vector<SessionLog> out;
+  const auto add = [&](const ProcessedLog& log, bool healthy, double start) {
+    SessionLog entry{log, healthy, healthy || log.role == Role::train, std::max(0.0, log.t[0] - start)};
+    double& cutoff = entry.log.filter.torque_cutoff_hz;
+    cutoff = std::min(cutoff, highest_cutoff_hz);
+    entry.log.decimation = std::max<Index>(log.decimation > 8 ? log.decimation / 8 : 1,
+                                           static_cast<Index>(1 / (log.step_s * rows_per_period * cutoff)));
+    out.push_back(std::move(entry));
+  };
+  for (const ProcessedLog& log : now) add(log, false, one ? windows.front()[0] : log.t[0]);
+  for (const ProcessedLog& log : before) add(log, true, log.t[0]);
+  return out;
+}
+
+void check_splits(const std::vector<ProcessedLog>& logs) {
+  constexpr double shortest_s = 1;
+  if (logs.size() > 1) return;
+  const ProcessedLog& log = logs.front();
+  const double seconds = static_cast<double>(log.last - log.first) * log.step_s;
+  if (seconds >= blocks_of_one_log * shortest_s) return;
+  throw DataError(
+      fmt::format("{}: {:.1f} s (after filtering) are too short to split into {} blocks that judge one another: record "
+                  "{:.0f} s or more, or add a log with role = \"validate\"",
+                  log.name, seconds, blocks_of_one_log, 4 * blocks_of_one_log * shortest_s));
+}
+
+std::vector<bool> still_joints(const GateData& data, const std::vector<ProcessedLog>& baseline) {
+  constexpr double times_noise = 6;
+  std::vector<bool> out = moving_joints(data.logs);
+  const std::vector<bool> before = baseline.empty() ? out : moving_joints(baseline);
+  const ProcessedLog& log = data.logs.front();
+  for (std::size_t j = 0; j < out.size(); ++j) {
+    const FilterFit& filter = data.filter;
+    const double noise = std::max(filter.position_noise[j], filter.encoder_step[j] / std::sqrt(12.0));
+    const double cutoff = std::min(filter.position_cutoff_hz, 0.5 / log.step_s);
+    const double noise_dq = 2 * std::numbers::pi * noise * std::sqrt(2 * log.step_s * cutoff * cutoff * cutoff / 3);
+    out[j] = !out[j] || !before[j] || !(data.dq[static_cast<Index>(j)] > times_noise * noise_dq);
+  }
+  return out;
+}
+
+void leave_out(std::vector<ProcessedLog>& logs, const std::vector<bool>& joints) {
+  if (!any(joints)) return;
+  for (ProcessedLog& log : logs) {
+    log.left_out = joints;
+    ProcessedLog alone = log;
+    alone.role = Role::train;
+    const std::vector<bool> moving = moving_joints({alone});
+    for (std::size_t j = 0; j < joints.size(); ++j) {
+      if (!joints[j] || moving[j]) continue;
+      const auto k = static_cast<Index>(j);
+      log.q.col(k).setConstant(log.q.col(k).mean());
+      if (log.measured_dq.size() > 0) log.measured_dq.col(k).setZero();
+      if (log.measured_ddq.size() > 0) log.measured_ddq.col(k).setZero();
+    }
+  }
+}
+
+void mute(std::vector<SessionLog>& logs, const IdentifiedModel& model, const std::vector<bool>& joints) {
+  constexpr double noise = 0.1;  // of rated torque
+  if (!any(joints)) return;
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    ProcessedLog& log = logs[l].log;
+    const MatrixXd torque = predict(model, log);
+    Random random(l + 1);
+    for (std::size_t j = 0; j < joints.size(); ++j) {
+      if (!joints[j]) continue;
+      const auto k = static_cast<Index>(j);
+      for (Index i = 0; i < log.samples(); ++i)
+        log.tau(i, k) = torque(i, k) + noise * model.joints[j].rated_torque * random.normal();
+    }
+  }
+}
+
+void check_same_robot(Models models, const std::vector<SessionLog>& logs, const std::vector<bool>& still) {
+  constexpr double most = 0.2;  // of the torque's power that no fit explains
+  models.background.clear();    // explains anything
+  Linearised at(models, logs, std::vector<VectorXd>(models.current.joints.size(), VectorXd::Zero(1)));
+  const auto first = static_cast<Index>(at.nuisance().size());
+  for (const EffectInfo& info : effect_infos()) {
+    if (info.acts_on != ActsOn::body) continue;
+    Group group;
+    group.candidate = {std::string(info.name), 0, {}};
+    group.on_body = true;
+    at.add(group, at.make(group.candidate));
+  }
+  std::vector<Index> columns = at.nuisance();
+  for (Index c = first; c < at.columns(); ++c) columns.push_back(c);
+  const LinearFit fit = at.solve(columns);
+  std::size_t strange = 0, judged = 0;
+  for (std::size_t j = 0; j < at.joints(); ++j) {
+    if (still[j]) continue;
+    ++judged;
+    bool explained = true;
+    for (const bool healthy : {false, true}) {
+      std::vector<std::size_t> blocks;
+      double whole = 0;
+      for (const std::size_t b : at.fit_blocks()) {
+        if (at.blocks()[b].healthy == healthy) blocks.push_back(b);
+      }
+      for (const SessionLog& entry : logs) {
+        if (entry.healthy != healthy || !entry.fits) continue;
+        whole += entry.log.decimate(entry.log.filter_columns(entry.log.tau.col(static_cast<Index>(j)))).squaredNorm();
+      }
+      explained &= at.square(fit, blocks)[static_cast<Index>(j)] <= most * whole;
+    }
+    strange += !explained;
+  }
+  if (2 * strange >= judged) {
+    throw DataError(fmt::format(
+        "the baseline and these logs can't be of one robot: nothing explains both at {} of {} joints; other "
+        "units, columns or gains? Correct the baseline or remove it (role = \"baseline\")",
+        strange, judged));
+  }
+}
+
+}  // namespace fxdyn::diagnosis

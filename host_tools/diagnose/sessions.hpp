@@ -1,0 +1,36 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "host_tools/diagnose/linearised.hpp"
+#include "host_tools/identify/identify.hpp"
+
+namespace fxdyn::diagnosis {
+
+/// The logs with their ages, decimated to what the torque's band needs; and the session that those of today belong to:
+/// one where no two windows overlap in time and no pause is long, else every log starts its own.
+/// @param now train and validate logs @param before the healthy session's
+std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before,
+                                 std::optional<Session>& session);
+
+/// Without a log that judges and with one trajectory only, its blocks have to.
+/// @throws DataError: too short for that
+void check_splits(const std::vector<ProcessedLog>& logs);
+
+/// Joints that this motion tells nothing of: they stand still, or as good as, beside what the encoder's noise looks
+/// like.
+std::vector<bool> still_joints(const GateData& data, const std::vector<ProcessedLog>& baseline);
+
+/// Keeps joints out of the fit. Where one stands still its encoder's noise is no motion.
+void leave_out(std::vector<ProcessedLog>& logs, const std::vector<bool>& joints);
+
+/// A joint that stands still holds any torque up to its stiction: what was measured says nothing. The model's own
+/// torque takes its place, under so much white noise that the joint counts next to nothing in what all joints share.
+void mute(std::vector<SessionLog>& logs, const IdentifiedModel& model, const std::vector<bool>& joints);
+
+/// Base parameters of the baseline with friction, load and tilt of their own against what both sessions measured.
+/// @throws DataError: nothing explains both
+void check_same_robot(Models models, const std::vector<SessionLog>& logs, const std::vector<bool>& still);
+
+}  // namespace fxdyn::diagnosis

@@ -1,0 +1,291 @@
+#include "host_tools/diagnose/verdict.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "host_tools/diagnose/where.hpp"
+#include "host_tools/excite/sight.hpp"
+#include "host_tools/model/effects.hpp"
+#include "host_tools/model/evaluator.hpp"
+#include "host_tools/parallel.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using nlohmann::json;
+
+bool is_validate(const ProcessedLog& log) { return log.role == Role::validate; }
+
+json parameters_json(const EffectFit& fit, const Joint& joint) {
+  json out = json::array();
+  const EffectInfo& info = *find_effect(fit.effect);
+  const auto add = [&](const ParameterInfo& p, double value, const std::vector<double>& std, std::size_t i) {
+    const bool turns = joint.type == JointType::revolute;
+    json one = {{"name", p.name}, {"value", value}, {"unit", turns ? p.unit : p.unit_prismatic}};
+    one["std"] = i < std.size() && std[i] > 0 ? json(std[i]) : json(nullptr);
+    out.push_back(one);
+  };
+  for (std::size_t i = 0; i < info.shape.size(); ++i) add(info.shape[i], fit.shape[i], fit.shape_std, i);
+  for (std::size_t i = 0; i < info.linear.size(); ++i) add(info.linear[i], fit.linear[i], fit.linear_std, i);
+  return out;
+}
+
+/// Filtered error of a joint over a log, full rate.
+VectorXd error_of(const ProcessedLog& log, const MatrixXd& torque, std::size_t joint) {
+  const auto j = static_cast<Index>(joint);
+  return log.filter_columns(log.tau.col(j) - torque.col(j)).col(0);
+}
+
+class Teller {
+ public:
+  explicit Teller(const Conclusion& told) : t_(told), at_(*told.outcome.at) {
+    // Figures are on logs that decided nothing, where there are any.
+    for (const ProcessedLog& log : t_.test) shown_.push_back(&log);
+    figures_on_ = "test logs";
+    if (shown_.empty()) {
+      figures_on_ = "validate logs, which also decided which names stay";
+      for (const ProcessedLog& log : t_.now) {
+        if (is_validate(log)) shown_.push_back(&log);
+      }
+    }
+    blocks_only_ = shown_.empty();
+    if (blocks_only_) {
+      figures_on_ = gate_of(t_.now);
+      for (const ProcessedLog& log : t_.now) shown_.push_back(&log);
+    }
+    before_.resize(shown_.size());
+    after_.resize(shown_.size());
+    parallel_for(shown_.size(), [&](std::size_t l) {
+      before_[l] = predict(t_.nominal, *shown_[l]);
+      after_[l] = predict(t_.model, *shown_[l]);
+    });
+  }
+
+  json all() {
+    json joints = json::array();
+    for (std::size_t j = 0; j < t_.model.joints.size(); ++j) joints.push_back(t_.still[j] ? still(j) : moving(j));
+    json resembles = json::array();
+    const json robot = of_robot(resembles);
+    // A joint whose gap a load closes is explained by it.
+    for (json& joint : joints) {
+      const bool reached = std::any_of(robot.begin(), robot.end(), [&](const json& r) {
+        return std::find(r["joints"].begin(), r["joints"].end(), joint["index"]) != r["joints"].end();
+      });
+      if (reached && joint["verdict"] == "nothing_missing") joint["verdict"] = "effects_found";
+    }
+    const auto any = [&](const char* verdict) {
+      return std::any_of(joints.begin(), joints.end(), [&](const json& joint) { return joint["verdict"] == verdict; });
+    };
+    const char* verdict = any("unexplained") || !resembles.empty()           ? "unexplained"
+                          : any("effects_found") || any_effect_ || !robot.empty() ? "effects_found"
+                          : any("not_excited")                                ? "not_excited"
+                                                                              : "nothing_missing";
+    return {{"schema", "fxdyn.diagnosis/1"},
+            {"verdict", verdict},
+            {"joints", joints},
+            {"robot_effects", robot},
+            {"resembles", resembles},
+            {"not_identifiable", t_.outcome.not_identifiable.back()},
+            {"next_experiment", next_},
+            {"gate", gate_of(t_.now)},
+            {"figures_on", figures_on_},
+            {"baseline", at_.models().has_baseline}};
+  }
+
+ private:
+  const Joint& joint_of(std::size_t j) const { return t_.model.robot.joints[j]; }
+
+  void advise(const std::string& text) {
+    if (!text.empty() && next_.find(text) == std::string::npos) next_ += (next_.empty() ? "" : "; ") + text;
+  }
+
+  /// Share of the model's torque that an effect has.
+  double model_share(std::size_t j, std::size_t e) const {
+    IdentifiedModel less = t_.model;
+    less.joints[j].effects.erase(less.joints[j].effects.begin() + static_cast<std::ptrdiff_t>(e));
+    const MatrixXd without = predict(less, *shown_.front());
+    const auto k = static_cast<Index>(j);
+    return (after_.front() - without).col(k).norm() / std::max(after_.front().col(k).norm(), 1e-300);
+  }
+
+  json effect_json(const EffectFit& fit, const EffectId& id, double closed) {
+    json alternatives = json::array();
+    const auto found = std::find_if(t_.outcome.found.begin(), t_.outcome.found.end(),
+                                    [&](const Finding& f) { return f.id == id; });
+    const bool known = found != t_.outcome.found.end();
+    for (const Alternative& a : known ? found->alternatives : std::vector<Alternative>{}) {
+      const bool body = find_effect(a.candidate.effect)->acts_on == ActsOn::body;
+      if (!id.body && !body && a.candidate.joint != id.joint) continue;
+      if (std::find(alternatives.begin(), alternatives.end(), a.candidate.effect) != alternatives.end()) continue;
+      alternatives.push_back(a.candidate.effect);
+      const std::size_t joint = id.body && !body ? a.candidate.joint : id.joint;
+      const std::string place = id.body && body ? "" : fmt::format(" at joint {}", joint + 1);
+      advise(fmt::format("{} or {}{}: {}", fit.effect, a.candidate.effect, place, cure(fit.effect, a.candidate.effect)));
+    }
+    return {{"effect", fit.effect},
+            {"parameters", parameters_json(fit, joint_of(id.joint))},
+            {"score", known ? found->score : 0.0},
+            {"held_out_closure", closed},
+            {"alternatives", alternatives}};
+  }
+
+  json still(std::size_t j) {
+    json unseen = json::array();
+    for (const std::string_view effect : joint_effect_names()) unseen.push_back(effect);
+    advise(fmt::format("record a log in which joint {} moves", j + 1));
+    return {{"joint", joint_of(j).name},
+            {"index", j + 1},
+            {"unit", joint_of(j).torque_unit()},
+            {"verdict", "not_excited"},
+            {"gap_before", nullptr},
+            {"gap_after", nullptr},
+            {"noise_floor", nullptr},
+            {"closure", nullptr},
+            {"where", json::array()},
+            {"effects", json::array()},
+            {"resembles", json::array()},
+            {"not_identifiable", unseen}};
+  }
+
+  json moving(std::size_t j) {
+    const auto k = static_cast<Index>(j);
+    const HeldOut& held = t_.gate.held;
+    double before = 0, after = 0, count = 0;
+    std::vector<VectorXd> errors;
+    for (std::size_t l = 0; l < shown_.size(); ++l) {
+      const ProcessedLog& log = *shown_[l];
+      const Index samples = log.last - log.first;
+      errors.push_back(error_of(log, before_[l], j));
+      before += errors.back().segment(log.first, samples).squaredNorm();
+      after += error_of(log, after_[l], j).segment(log.first, samples).squaredNorm();
+      count += static_cast<double>(samples);
+    }
+    if (blocks_only_) {
+      // Errors of what was fitted, by the ratio of judged to fitted ones.
+      const double rows = held.fitted_rows[k] / std::max(held.rows[k], 1.0);
+      before *= rows * held.before[k] / std::max(held.fitted_before[k], 1e-300);
+      after *= rows * held.after[k] / std::max(held.fitted_after[k], 1e-300);
+    }
+    const double rms_before = std::sqrt(before / std::max(count, 1.0)),
+                 rms_after = std::sqrt(after / std::max(count, 1.0));
+    const double floor = rms_after * std::sqrt(std::max(0.0, 1 - held.leftover[k] / std::max(held.after[k], 1e-300)));
+    json effects = json::array(), resembles = json::array();
+    const auto& fits = t_.model.joints[j].effects;
+    for (std::size_t e = 0; e < fits.size(); ++e) {
+      const EffectId id{false, j, e};
+      const std::size_t i = t_.gate.place(at_, id);
+      if (i == t_.gate.groups.size()) continue;  // nominal, or a link encoder's
+      if (!fits[e].named) {
+        resembles.push_back(fits[e].effect);
+        continue;
+      }
+      json one = effect_json(fits[e], id, t_.gate.gap[k] > 0 ? held.alone[i][k] / t_.gate.gap[k] : 0);
+      one["model_share"] = model_share(j, e);
+      effects.push_back(std::move(one));
+    }
+    for (const DeflectionEffect& seen : t_.deflections.found) {
+      if (seen.joint != j) continue;
+      const auto at = std::find_if(fits.begin(), fits.end(),
+                                   [&](const EffectFit& fit) { return fit.named && fit.effect == seen.fit.effect; });
+      effects.push_back({{"effect", seen.fit.effect},
+                         {"parameters", parameters_json(seen.fit, joint_of(j))},
+                         {"score", seen.score},
+                         {"held_out_closure", seen.held_out ? json(seen.closure) : json(nullptr)},
+                         {"signal", "q - qlink"},
+                         {"alternatives", json::array()},
+                         {"model_share", model_share(j, static_cast<std::size_t>(at - fits.begin()))}});
+    }
+    const LackOfFit& lack = t_.outcome.lack[j];
+    const bool unexplained = (lack.structured() && (effects.empty() || t_.gate.remains[j])) || !resembles.empty();
+    const std::string verdict = unexplained ? "unexplained" : !effects.empty() ? "effects_found" : "nothing_missing";
+    any_effect_ |= !effects.empty();
+    std::sort(effects.begin(), effects.end(), [](const json& a, const json& b) { return a["score"] > b["score"]; });
+    json regions = json::array();
+    if (verdict != "nothing_missing" || rms_before >= 1.05 * floor)
+      regions = where(t_.nominal, shown_, j, errors, std::min(floor, rms_before));
+    if (unexplained) {
+      std::string which;
+      if (!regions.empty())
+        which = fmt::format(" where the gap sits ({} from {:.3g} to {:.3g})", regions[0]["signal"].get<std::string>(),
+                            regions[0]["from"].get<double>(), regions[0]["to"].get<double>());
+      advise(fmt::format("record more of joint {}{}", j + 1, which));
+    }
+    return {{"joint", joint_of(j).name},
+            {"index", j + 1},
+            {"unit", joint_of(j).torque_unit()},
+            {"verdict", verdict},
+            {"gap_before", rms_before},
+            {"gap_after", rms_after},
+            {"noise_floor", std::min(floor, rms_after)},
+            {"closure", t_.gate.closure[k]},
+            {"where", regions},
+            {"effects", effects},
+            {"resembles", resembles},
+            {"not_identifiable", t_.outcome.not_identifiable[j]},
+            {"lack_of_fit", {{"state_p", lack.state_p}, {"time_p", lack.time_p}}}};
+  }
+
+  json of_robot(json& resembles) {
+    json robot = json::array();
+    for (std::size_t e = 0; e < t_.model.body.size(); ++e) {
+      const EffectId id{true, 0, e};
+      const std::size_t i = t_.gate.place(at_, id);
+      if (i == t_.gate.groups.size()) continue;
+      if (!t_.model.body[e].named) {
+        resembles.push_back(t_.model.body[e].effect);
+        continue;
+      }
+      json one = effect_json(t_.model.body[e], id, t_.gate.robot_closure[i]);
+      json which = json::array();
+      for (std::size_t j = 0; j < t_.model.joints.size(); ++j) {
+        if (t_.gate.held.alone[i][static_cast<Index>(j)] > least_felt) which.push_back(j + 1);
+      }
+      one["joints"] = which;
+      robot.push_back(std::move(one));
+    }
+    return robot;
+  }
+
+  const Conclusion& t_;
+  const Linearised& at_;
+  std::vector<const ProcessedLog*> shown_;
+  std::string figures_on_, next_;
+  bool blocks_only_ = false, any_effect_ = false;
+  std::vector<MatrixXd> before_, after_;
+};
+
+}  // namespace
+
+std::string gate_of(const std::vector<ProcessedLog>& now) {
+  if (std::any_of(now.begin(), now.end(), is_validate)) return "validate logs";
+  return now.size() == 1 ? "blocks of the train log, each judged by coefficients fitted to the others"
+                         : "train logs, each judged by coefficients fitted to the others";
+}
+
+std::vector<std::string> changed_parameters(const Linearised& at) {
+  constexpr double beyond = 2;  // times what sessions differ by
+  std::vector<std::string> out;
+  const Models& models = at.models();
+  for (const Unknown& u : at.unknowns()) {
+    if (!u.change || u.kind != Unknown::Kind::linear || std::fabs(u.value) < beyond * u.prior_std) continue;
+    const EffectFit& now = models.current.joints[u.joint].effects[u.effect];
+    const Joint& joint = models.current.robot.joints[u.joint];
+    const ParameterInfo& p = find_effect(now.effect)->linear[u.index];
+    const double today = now.linear[u.index];
+    out.push_back(fmt::format("{}: {} ({}) is {:.4g} {}, {:.4g} in the baseline: more than friction differs from session to "
+                              "session, and part of the nominal model",
+                              joint.name, now.effect, p.name, today,
+                              joint.type == JointType::revolute ? p.unit : p.unit_prismatic, today - u.value));
+  }
+  return out;
+}
+
+json verdicts(const Conclusion& told) { return Teller(told).all(); }
+
+}  // namespace fxdyn::diagnosis

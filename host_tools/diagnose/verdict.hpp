@@ -1,0 +1,31 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "host_tools/diagnose/deflection.hpp"
+#include "host_tools/diagnose/gate.hpp"
+
+namespace fxdyn::diagnosis {
+
+/// All that a diagnosis came to.
+struct Conclusion {
+  const IdentifiedModel& nominal;
+  const IdentifiedModel& model;  ///< with the effects; what is not believed is not `named`
+  const Outcome& outcome;
+  const Gate& gate;
+  const Deflections& deflections;
+  const std::vector<bool>& still;
+  const std::vector<ProcessedLog>& now;   ///< train and validate
+  const std::vector<ProcessedLog>& test;  ///< for figures only
+};
+
+/// What judged the names.
+std::string gate_of(const std::vector<ProcessedLog>& now);
+/// Nominal parameters that changed since the healthy session by more than sessions differ, one line each.
+std::vector<std::string> changed_parameters(const Linearised& at);
+/// diagnosis.json, but for its notes.
+nlohmann::json verdicts(const Conclusion& told);
+
+}  // namespace fxdyn::diagnosis
