@@ -45,6 +45,18 @@ void write_file(const std::filesystem::path& file, std::string_view content) {
   }
 }
 
+void check_writable(const std::filesystem::path& directory) {
+  if (directory.empty()) throw InputError("--out \"\": name the directory for the results");
+  std::error_code error;
+  std::filesystem::path there = std::filesystem::absolute(directory);
+  while (!std::filesystem::exists(there, error) && there.has_parent_path() && there != there.parent_path())
+    there = there.parent_path();
+  const bool is_directory = std::filesystem::is_directory(there, error);
+  if (is_directory && ::access(there.c_str(), W_OK | X_OK) == 0) return;
+  throw InputError(fmt::format("{}: can't be written: {} {}; choose another --out", directory.string(), there.string(),
+                               is_directory ? "is not yours to write to" : "is a file"));
+}
+
 namespace {
 
 class Fnv1a {

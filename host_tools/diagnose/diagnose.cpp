@@ -129,6 +129,7 @@ class Work {
   }
 
   Diagnosis run() {
+    check_lengths(data_.logs, baseline_);
     if (models_.has_baseline) {
       learn_baseline();
     } else {
@@ -136,7 +137,6 @@ class Work {
       mute(logs_, models_.current, still_);
       look_at_links(models_.current, logs_);
     }
-    check_splits(data_.logs);
     models_.current.session = session_;
     Diagnosis result;
     result.still = still_;
@@ -153,8 +153,8 @@ class Work {
     add_deviations(before, Linearised(before, logs_));
     result.nominal = before.current;
 
-    Outcome outcome = explore(models_, logs_, settings_, never_, progress_);
-    const Gate gate = pass(outcome, logs_, still_);
+    Outcome outcome = explore(models_, logs_, settings_, never_, 2, progress_);
+    const Gate gate = pass(outcome, models_.current, logs_, still_);
     Models& found = outcome.models;
     if (gate.groups.empty() && deflections_.found.empty()) {
       found.current = models_.current;
@@ -181,6 +181,7 @@ class Work {
       result.model.joints[j].effects.clear();
       result.nominal.joints[j].effects.clear();
     }
+    for (const auto& note : result.report["notes"]) notes_.push_back(note);
     result.report["notes"] = notes_;
     return result;
   }
@@ -274,7 +275,7 @@ class Work {
       structured = !ripples_only.run({}, progress_).groups.empty();
     }
     if (structured) {
-      background = explore(alone, before, modest, never_, progress_);
+      background = explore(alone, before, modest, never_, 1, progress_);
       alone = background.models;
       for (std::size_t j = 0; j < joints(); ++j) {
         for (EffectFit& fit : alone.current.joints[j].effects) {

@@ -1,5 +1,8 @@
 #include "host_tools/diagnose/evidence.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -57,6 +60,34 @@ class Firmware {
   std::optional<Formats> unloaded_;
 };
 
+/// Setpoints outside of the limits that the tables hold: the firmware clamps them, and its torque is that of another motion.
+std::vector<std::string> clamped(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs) {
+  constexpr double worth_a_word = 1e-3;  // of the samples
+  std::vector<std::string> out;
+  for (std::size_t j = 0; j < model.joints.size(); ++j) {
+    const JointFit& joint = model.joints[j];
+    const auto k = static_cast<Index>(j);
+    Index beyond[3] = {0, 0, 0}, all = 0;
+    for (const ProcessedLog* log : logs) {
+      const MotionRows motion = log->motion(log->first, log->last - log->first);
+      const auto q = motion.q.col(k).array();
+      beyond[0] += (q < joint.q_lower || q > joint.q_upper).count();
+      beyond[1] += (motion.dq.col(k).array().abs() > joint.dq_limit).count();
+      beyond[2] += (motion.ddq.col(k).array().abs() > joint.ddq_limit).count();
+      all += q.size();
+    }
+    const char* const names[] = {"position", "velocity", "acceleration"};
+    for (int i = 0; i < 3; ++i) {
+      const double share = static_cast<double>(beyond[i]) / static_cast<double>(std::max<Index>(all, 1));
+      if (share < worth_a_word) continue;
+      out.push_back(fmt::format("{}: {:.1f} % of the held-out samples are beyond its {} limit, where the firmware clamps; "
+                                "[limits] sets wider ones",
+                                model.robot.joints[j].name, 100 * share, names[i]));
+    }
+  }
+  return out;
+}
+
 json log_json(const ProcessedLog& log) {
   return {{"file", log.name}, {"role", to_string(log.role)}, {"from_s", log.from_s}, {"to_s", log.to_s}};
 }
@@ -101,6 +132,7 @@ json evidence_json(const IdentifiedModel& nominal, const IdentifiedModel& diagno
   }
   json out = {{"held_out", logs}, {"joints", joints}, {"fixed_point", {{"computed", !why_not_fixed}}}};
   if (why_not_fixed) out["fixed_point"]["why_not"] = *why_not_fixed;
+  out["fixed_point"]["notes"] = clamped(diagnosed, judged);
   if (judged.empty()) {
     out["note"] = "no log was held out: nothing that the search has not seen";
     out["fixed_point"] = {{"computed", false}, {"why_not", "no log was held out"}};

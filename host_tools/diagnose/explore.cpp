@@ -16,7 +16,6 @@ using Eigen::VectorXd;
 
 /// Squared share of a column that is left: less can't be told from the nominal model.
 constexpr double nothing_left = 1e-5;
-constexpr int most_passes = 2;
 /// A residual of that many times the noise is mostly gap.
 constexpr double much_more = 3;
 
@@ -90,10 +89,10 @@ std::vector<Index> columns_of(const Linearised& at, const std::vector<std::size_
 }
 
 Outcome explore(Models models, const std::vector<SessionLog>& logs, const SearchSettings& settings,
-                const std::vector<EffectCandidate>& never, Progress& progress) {
+                const std::vector<EffectCandidate>& never, int passes, Progress& progress) {
   Outcome out;
   std::vector<VectorXd> whitening = colours(models, logs);
-  for (int pass = 0; pass < most_passes; ++pass) {
+  for (int pass = 0; pass < passes; ++pass) {
     progress.stage(pass == 0 ? "looking for what is missing" : "looking again, around what was found", 8);
     Linearised at(models, logs, whitening);
     std::vector<EffectCandidate> skip = never;

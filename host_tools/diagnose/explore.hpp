@@ -36,8 +36,9 @@ std::vector<std::size_t> in_model(const Linearised& at);
 /// The nuisance's columns and those of the groups.
 std::vector<Eigen::Index> columns_of(const Linearised& at, const std::vector<std::size_t>& groups);
 
-/// Search, name, fit again around what was named; once more where that left structure or found several effects.
+/// Search, name, fit again around what was named; again where that left structure or found several effects.
+/// @param passes at most
 Outcome explore(Models models, const std::vector<SessionLog>& logs, const SearchSettings& settings,
-                const std::vector<EffectCandidate>& never, Progress& progress);
+                const std::vector<EffectCandidate>& never, int passes, Progress& progress);
 
 }  // namespace fxdyn::diagnosis

@@ -5,6 +5,7 @@
 
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/model/effects.hpp"
+#include "host_tools/model/evaluator.hpp"
 #include "host_tools/parallel.hpp"
 
 namespace fxdyn::diagnosis {
@@ -16,8 +17,10 @@ using Eigen::VectorXd;
 
 /// What an effect must bring on data that did not fit it: squares in units of the noise.
 constexpr double least_gain = 4;
-/// In residuals full of structure that says nothing: there it is a share of the gap.
-constexpr double least_share = 0.02;
+/// .. and of the gap at its joint; more where the joint has structure left, whose squares are no noise.
+constexpr double least_share = 0.01, least_share_in_structure = 0.02;
+/// Times the plain error before.
+constexpr double worse = 1.02;
 
 HeldOut hold_out(const Linearised& at, const std::vector<MatrixXd>& features, const std::vector<std::size_t>& groups) {
   const auto n = static_cast<Index>(at.joints());
@@ -71,11 +74,30 @@ HeldOut judge(const Outcome& outcome, const std::vector<SessionLog>& logs, const
 
 VectorXd gap_of(const HeldOut& held) { return (held.before - held.after).cwiseMax(0.0) + held.leftover; }
 
-/// Whether an effect brings anything: over all joints, and where its joint has structure left, a share of the gap.
+/// Whether an effect brings anything: over all joints, and as a share of the gap at its own.
 bool holds(const Outcome& outcome, const Group& group, const HeldOut& held, std::size_t i) {
-  if (held.alone[i].sum() <= least_gain) return false;
-  if (group.on_body || !outcome.lack[group.candidate.joint].structured()) return true;
-  return held.alone[i].sum() > least_share * gap_of(held)[static_cast<Index>(group.candidate.joint)];
+  const double brings = held.alone[i].sum();
+  if (brings <= least_gain) return false;
+  if (group.on_body) return true;
+  const std::size_t j = group.candidate.joint;
+  const double share = outcome.lack[j].structured() ? least_share_in_structure : least_share;
+  return brings > share * gap_of(held)[static_cast<Index>(j)];
+}
+
+/// Mean squares of the filtered error on the logs that judge; empty: there are none.
+VectorXd plain_error(const IdentifiedModel& model, const std::vector<SessionLog>& logs) {
+  std::vector<VectorXd> squares(logs.size());
+  parallel_for(logs.size(), [&](std::size_t l) {
+    if (logs[l].fits) return;
+    const ProcessedLog& log = logs[l].log;
+    const MatrixXd error = log.filter_columns(log.tau - predict(model, log));
+    squares[l] = error.middleRows(log.first, log.last - log.first).colwise().squaredNorm().transpose();
+  });
+  VectorXd sum;
+  for (const VectorXd& square : squares) {
+    if (square.size() > 0) sum = sum.size() > 0 ? VectorXd(sum + square) : square;
+  }
+  return sum;
 }
 
 /// How fast drift comes to its end shows on the data that follow.
@@ -114,15 +136,22 @@ std::size_t Gate::place(const Linearised& at, const EffectId& id) const {
   return groups.size();
 }
 
-Gate pass(Outcome& outcome, const std::vector<SessionLog>& logs, const std::vector<bool>& still) {
+Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs,
+          const std::vector<bool>& still) {
   choose_time_constants(outcome, logs);
+  const VectorXd before = plain_error(nominal, logs);
   Gate gate;
   for (;;) {
     gate.groups = in_model(*outcome.at);
     gate.held = judge(outcome, logs, gate.groups);
+    const VectorXd after =
+        gate.groups.empty() || before.size() == 0 ? before : plain_error(outcome.models.current, logs);
     std::size_t worst = gate.groups.size();
     for (std::size_t i = 0; i < gate.groups.size(); ++i) {
-      if (holds(outcome, outcome.at->groups()[gate.groups[i]], gate.held, i)) continue;
+      const Group& group = outcome.at->groups()[gate.groups[i]];
+      const auto j = static_cast<Index>(group.candidate.joint);
+      const bool spoils = !group.on_body && before.size() > 0 && after[j] > worse * worse * before[j];
+      if (!spoils && holds(outcome, group, gate.held, i)) continue;
       if (worst == gate.groups.size() || gate.held.alone[i].sum() < gate.held.alone[worst].sum()) worst = i;
     }
     if (worst == gate.groups.size()) break;

@@ -54,10 +54,10 @@ MatrixXd only(const Linearised& at, const MatrixXd& x, const std::vector<std::si
   return out;
 }
 
-/// Chance of a chi-squared variable beyond `ratio` times its mean (Wilson and Hilferty).
-double chance(double ratio, double freedom) {
-  const double s = 2 / (9 * freedom);
-  const double z = (std::cbrt(ratio) - (1 - s)) / std::sqrt(s);
+/// Chance of F(freedom, other) beyond `ratio` (Paulson's normal approximation).
+double chance(double ratio, double freedom, double other) {
+  const double a = 2 / (9 * freedom), b = 2 / (9 * other), root = std::cbrt(ratio);
+  const double z = ((1 - b) * root - (1 - a)) / std::sqrt(b * root * root + a);
   return 0.5 * std::erfc(z / std::numbers::sqrt2);
 }
 
@@ -70,6 +70,7 @@ struct InTime {
 /// Lines in the periodograms of the blocks against their neighbourhood.
 InTime lines(const Linearised& at, const VectorXd& e, const std::vector<std::size_t>& blocks) {
   constexpr Index neighbours = 31;
+  constexpr double inside = 0.8;
   constexpr double sure = 5;  // exp(-5): a line that noise has as seldom counts
   struct Line {
     double power, level;
@@ -79,11 +80,14 @@ InTime lines(const Linearised& at, const VectorXd& e, const std::vector<std::siz
   Eigen::FFT<double> fft;
   for (const std::size_t i : blocks) {
     const Block& b = at.blocks()[i];
-    if (b.healthy || b.count < 2 * neighbours) continue;
+    const ProcessedLog& log = at.logs()[b.log].log;
+    const double seconds = static_cast<double>(b.count * log.decimation) * log.step_s;
+    // Towards the cut-off the filter's slope is no line.
+    const auto bins = std::min(b.count / 2, static_cast<Index>(inside * log.filter.torque_cutoff_hz * seconds));
+    if (b.healthy || bins < neighbours) continue;
     const std::vector<double> x(e.data() + b.first, e.data() + b.first + b.count);
     std::vector<std::complex<double>> spectrum;
     fft.fwd(spectrum, x);
-    const Index bins = b.count / 2;
     VectorXd power(bins);
     for (Index k = 0; k < bins; ++k) power[k] = std::norm(spectrum[static_cast<std::size_t>(k + 1)]);
     whole += power.sum();
@@ -96,6 +100,7 @@ InTime lines(const Linearised& at, const VectorXd& e, const std::vector<std::siz
     }
   }
   InTime out;
+  if (all.empty()) return out;  // too short to tell
   const auto count = static_cast<double>(all.size());
   double most = 0, beyond = 0;
   for (const Line& line : all) {
@@ -132,11 +137,7 @@ InTime slow(const Linearised& at, const VectorXd& e, const std::vector<std::size
   }
   InTime out;
   if (count[0] < 5 || count[1] < 5 || !(sum[1] > 0)) return out;
-  const double ratio = sum[0] / count[0] / (sum[1] / count[1]);
-  // Paulson's normal approximation of F
-  const double a = 2 / (9 * count[0]), b = 2 / (9 * count[1]), root = std::cbrt(ratio);
-  const double z = ((1 - b) * root - (1 - a)) / std::sqrt(b * root * root + a);
-  out.p = 0.5 * std::erfc(z / std::numbers::sqrt2);
+  out.p = chance(sum[0] / count[0] / (sum[1] / count[1]), count[0], count[1]);
   if (out.p < 1e-3) out.share = std::max(0.0, sum[0] / count[0] - sum[1] / count[1]) * rows / whole;
   return out;
 }
@@ -268,7 +269,13 @@ LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& 
                variance = (null.array() - mean).square().sum() / static_cast<double>(null.size() - 1);
   const double freedom =
       std::clamp(2 * mean * mean / std::max(variance, 1e-300), 3.0, static_cast<double>(kept.size()));
-  out.state_p = chance(mine / std::max(mean, 1e-300), freedom);
+  // Shares of the residual: with few rows noise alone fills many of its directions.
+  const double whole = w * e.squaredNorm();
+  double fitted = 0;
+  for (const Index c : fit.columns) fitted += rows.local[static_cast<std::size_t>(c)] >= 0 ? 1 : 0;
+  const double rest = std::max(5.0, fit.rows[k] - fitted - static_cast<double>(kept.size()));
+  const auto odds = [&](double part) { return part / std::max(whole - part, 1e-9 * whole); };
+  out.state_p = chance(odds(mine) / std::max(odds(mean), 1e-300), freedom, rest);
   out.time_p = std::min(lines(at, residual, at.fit_blocks()).p,
                         at.models().has_baseline ? slow(at, residual, at.fit_blocks()).p : 1.0);
   return out;

@@ -25,6 +25,8 @@ constexpr double friction_change = 0.3;
 constexpr double offset_change = 0.05;
 /// What a parameter that is zero may change by, of rated torque.
 constexpr double smallest_change = 1e-3;
+/// What a rotor may have of the inertia that rated torque and largest acceleration stand for (standard deviation).
+constexpr double rotor_share = 0.3;
 /// A share that is 1 by definition.
 constexpr double share_std = 1e-3;
 constexpr double difference = 1e-3;
@@ -99,8 +101,9 @@ void add_to(IdentifiedModel& model, const Unknown& u, double step) {
 
 }  // namespace
 
-Linearised::Linearised(const Models& models, const std::vector<SessionLog>& logs, std::vector<VectorXd> whitening)
-    : models_(models), logs_(&logs), whitening_(std::move(whitening)) {
+Linearised::Linearised(const Models& models, const std::vector<SessionLog>& logs, std::vector<VectorXd> whitening,
+                       bool for_steps)
+    : models_(models), logs_(&logs), for_steps_(for_steps), whitening_(std::move(whitening)) {
   chain_ = to_dh(models_.current.robot);
   for (const BaseParameter& parameter : models_.current.base)
     base_.columns.push_back(static_cast<Index>(parameter.column));
@@ -204,7 +207,14 @@ void Linearised::make_unknowns() {
         u.change = false;
         u.prior_std = 0;
         u.value = common.joints[j].effects[before].linear[u.index];
+        const bool brought = std::find(models_.rotors.begin(), models_.rotors.end(), j) != models_.rotors.end();
+        if (fit.effect == RotorInertia::name && brought) {
+          // Where the load is inertia alone nothing tells them apart.
+          u.prior = 0;
+          u.prior_std = rotor_share * joint.rated_torque / std::max(joint.ddq_limit, 1e-9);
+        }
         unknowns_.push_back(u);
+        u.prior_std = 0;
         if (!two || fit.effect == RotorInertia::name) continue;
         u.change = true;
         // Of motions of unit size: a coefficient's own scale.
@@ -321,6 +331,11 @@ MatrixXd Linearised::finish(std::size_t log, std::size_t joint, const MatrixXd& 
   return row_scale_[joint].segment(b.first, b.count).asDiagonal() * whiten(joint, rows);
 }
 
+double Linearised::doubtful(std::size_t joint) const {
+  const auto half = (row_scale_[joint].array() < std::sqrt(0.5)).count();
+  return static_cast<double>(half) / static_cast<double>(row_scale_[joint].size());
+}
+
 double Linearised::log_scale(std::size_t joint) const {
   double sum = 0;
   for (const std::size_t b : fit_blocks_)
@@ -334,34 +349,41 @@ const Group* Linearised::find(const EffectId& id) const {
   return it == groups_.end() ? nullptr : &*it;
 }
 
-/// What a row counts for, as a factor: near standstill the friction that an uncertain velocity makes is noise too,
-///   1 / sqrt(1 + (d tau / d dq  sigma_dq / sigma)^2),
-/// sigma_dq what the position filter leaves of the encoder's noise.
-VectorXd Linearised::certainty(std::size_t log, std::size_t joint, double sigma) const {
+/// Near standstill the friction that an uncertain velocity makes is noise too. Its variance in units of the noise,
+///   u = E[(tau(dq + sigma_dq n) - tau(dq))^2] / sigma^2, n of variance 1:
+/// while sigma_dq is small beside the sign's width its slope counts; else the chance of the wrong sign,
+///   4 F^2 Phi(-|dq| / sigma_dq), F the friction that turns with it.
+/// sigma_dq is what the position filter leaves of the encoder's noise. An encoder that steps more slowly than the filter
+/// is a staircase, no white noise: its velocity is wrong by sqrt(2) cutoff step.
+VectorXd Linearised::doubt(std::size_t log, std::size_t joint, double sigma) const {
   const SessionLog& entry = (*logs_)[log];
   const ProcessedLog& l = entry.log;
   const JointFit& fit = (entry.healthy ? models_.healthy : models_.current).joints[joint];
   const EffectFit* coulomb = fit.find(Coulomb::name);
-  const double noise = std::max(l.filter.position_noise[joint], l.filter.encoder_step[joint] / std::sqrt(12.0));
-  if (coulomb == nullptr || l.measured_dq.size() > 0 || !(noise > 0)) return VectorXd::Ones(l.rows());
+  const double step = l.filter.encoder_step[joint],
+               noise = std::max(l.filter.position_noise[joint], step / std::sqrt(12.0));
+  if (coulomb == nullptr || l.measured_dq.size() > 0 || !(noise > 0)) return VectorXd::Zero(l.rows());
   // Twice white noise's: an encoder at standstill repeats its error.
   const double cutoff = std::min(l.filter.position_cutoff_hz, 0.5 / l.step_s);
-  const double sigma_dq = 2 * 2 * std::numbers::pi * noise * std::sqrt(2 * l.step_s * cutoff * cutoff * cutoff / 3);
-  const double width = fit.sign_width;
+  const double white = 2 * 2 * std::numbers::pi * noise * std::sqrt(2 * l.step_s * cutoff * cutoff * cutoff / 3);
+  const double width = fit.sign_width, slow = cutoff * step;
   // All friction that turns with the sign, some of it in proportion to the load.
   double amplitude = std::fabs(coulomb->linear[0]), of_load = 0;
   if (const EffectFit* stribeck = fit.find(Stribeck::name)) amplitude += std::fabs(stribeck->linear[0]);
   if (const EffectFit* load = fit.find(LoadFriction::name)) of_load = std::fabs(load->linear[0]);
   VectorXd uncertain(l.samples());
   for (Index k = 0; k < l.samples(); ++k) {
-    const double dq = (*motions_[log]).dq(k, static_cast<Index>(joint));
+    const double dq = std::fabs((*motions_[log]).dq(k, static_cast<Index>(joint)));
+    const double stairs = slow > 0 ? slow * std::exp(-0.125 * dq * dq / (slow * slow)) : 0;
+    const double s = std::sqrt(white * white + 2 * stairs * stairs);
     // the mean slope over what the velocity may be
-    const double slope = (std::tanh((dq + sigma_dq) / width) - std::tanh((dq - sigma_dq) / width)) / (2 * sigma_dq);
+    const double slope = 0.5 * (std::tanh((dq + s) / width) - std::tanh((dq - s) / width));
+    const double wrong = std::min(1.0, s * s / (width * width)) * 2 * std::erfc(dq / (s * std::numbers::sqrt2));
     const double load = std::fabs(robot_[log]->structural()(k, static_cast<Index>(joint)));
-    uncertain[k] = (amplitude + of_load * load) * slope * sigma_dq / sigma;
+    const double friction = (amplitude + of_load * load) / sigma;
+    uncertain[k] = friction * friction * std::max(slope * slope, wrong);
   }
-  VectorXd rows = l.decimate(l.filter_columns(uncertain.cwiseAbs2()));
-  return (1 + rows.array().max(0)).sqrt().inverse();
+  return l.decimate(l.filter_columns(uncertain)).col(0).cwiseMax(0);
 }
 
 /// Rows of one log.
@@ -409,7 +431,8 @@ MatrixXd Linearised::base_rows(std::size_t log, std::size_t joint) const {
   std::vector<const EffectFit*> of_load;
   for (const EffectFit& effect : fit.effects) {
     const EffectInfo& info = *find_effect(effect.effect);
-    if (info.acts_on == ActsOn::torque && info.needs_structural && !info.needs_total) of_load.push_back(&effect);
+    if (for_steps_ && info.acts_on == ActsOn::torque && info.needs_structural && !info.needs_total)
+      of_load.push_back(&effect);
   }
   if (of_load.empty() && in_order(fit, true).empty()) return cache.base[joint];
   MatrixXd columns = std::move(base_columns(log, {joint})[joint]);
@@ -571,7 +594,7 @@ void Linearised::make_rows() {
   const LinearFit fit = reweight();
   // What counts for how much comes before the noise's colour: rows near standstill may be far off.
   row_scale_.resize(n);
-  std::vector<VectorXd> coefficients(n);
+  std::vector<VectorXd> coefficients(n), doubts(n);
   parallel_for(n, [&](std::size_t j) {
     const VectorXd e = residual(j, fit);
     // The median: what sticks may be far off without being noise.
@@ -583,19 +606,29 @@ void Linearised::make_rows() {
                      magnitude.end());
     const double sigma =
         std::max(1.4826 * magnitude[magnitude.size() / 2], 1e-12 / std::sqrt(weights_[static_cast<Index>(j)]));
-    row_scale_[j].resize(total);
+    doubts[j].resize(total);
     std::vector<VectorXd> parts;
     for (std::size_t l = 0; l < logs_->size(); ++l) {
       const Block& b = log_rows_[l];
-      row_scale_[j].segment(b.first, b.count) = certainty(l, j, sigma);
+      const VectorXd u = doubt(l, j, sigma);
+      doubts[j].segment(b.first, b.count) = u;
       const bool use = models_.has_baseline ? b.healthy : b.fits;
-      if (use) parts.emplace_back(e.segment(b.first, b.count).cwiseProduct(row_scale_[j].segment(b.first, b.count)));
+      if (use)
+        parts.emplace_back((e.segment(b.first, b.count).array() / (1 + u.array()).sqrt()).matrix());
     }
     coefficients[j] = autoregression(parts);
   });
   if (whitening_.empty()) whitening_ = std::move(coefficients);
   parallel_for(n, [&](std::size_t j) {
     JointRows& rows = rows_[j];
+    // A whitened row is as doubtful as those that it is made of.
+    VectorXd sum = doubts[j];
+    for (const Block& b : log_rows_) {
+      for (Index lag = 1; lag <= whitening_[j].size() && lag < b.count; ++lag)
+        sum.segment(b.first + lag, b.count - lag) +=
+            whitening_[j][lag - 1] * whitening_[j][lag - 1] * doubts[j].segment(b.first, b.count - lag);
+    }
+    row_scale_[j] = (1 + sum.array()).sqrt().inverse();
     for (const Block& b : log_rows_) {
       rows.x.middleRows(b.first, b.count) = whiten(j, rows.x.middleRows(b.first, b.count));
       rows.y.segment(b.first, b.count) = whiten(j, rows.y.segment(b.first, b.count));

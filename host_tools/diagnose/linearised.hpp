@@ -124,7 +124,10 @@ class Linearised {
  public:
   /// @param whitening per joint the autoregressive coefficients; empty: from the residual of the nuisance and the
   /// model's named effects (of the healthy session where there is one).
-  Linearised(const Models& models, const std::vector<SessionLog>& logs, std::vector<Eigen::VectorXd> whitening = {});
+  /// @param for_steps base parameters have their part in friction that grows with the load: for Gauss-Newton's steps.
+  /// Else that friction is its own columns' alone, so that it goes with them.
+  Linearised(const Models& models, const std::vector<SessionLog>& logs, std::vector<Eigen::VectorXd> whitening = {},
+             bool for_steps = false);
 
   std::size_t joints() const { return rows_.size(); }
   Eigen::Index columns() const { return columns_; }
@@ -161,7 +164,9 @@ class Linearised {
   Eigen::VectorXd row_count(const std::vector<std::size_t>& blocks) const;
   /// Whitened residual of a joint, all rows.
   Eigen::VectorXd residual(std::size_t joint, const LinearFit& fit) const;
-  /// Sum of ln(row scale) of the rows that fit, see certainty(): part of their likelihood.
+  /// Share of a joint's rows in which the friction that an uncertain velocity makes is more than the noise.
+  double doubtful(std::size_t joint) const;
+  /// Sum of ln(row scale) of the rows that fit, see doubt(): part of their likelihood.
   double log_scale(std::size_t joint) const;
   /// Prior information on a column of the background; 0 for others.
   double background_information(Eigen::Index column) const;
@@ -187,7 +192,7 @@ class Linearised {
   void make_rows();
   void add_background(std::size_t joint);
   void sum_up(JointRows& rows, Eigen::Index from) const;
-  Eigen::VectorXd certainty(std::size_t log, std::size_t joint, double sigma) const;
+  Eigen::VectorXd doubt(std::size_t log, std::size_t joint, double sigma) const;
   Eigen::MatrixXd whiten(std::size_t joint, Eigen::MatrixXd columns) const;
   Eigen::MatrixXd follow(std::size_t log, std::size_t joint, Eigen::MatrixXd columns) const;
   Eigen::Index first_base(std::size_t joint) const;
@@ -197,6 +202,7 @@ class Linearised {
 
   Models models_;
   const std::vector<SessionLog>* logs_;
+  bool for_steps_;
   DhChain chain_;
   BaseSet base_;
   std::vector<Unknown> unknowns_;
@@ -210,7 +216,7 @@ class Linearised {
   std::vector<Fold> folds_;
   std::vector<std::size_t> fit_blocks_;
   std::vector<Eigen::VectorXd> whitening_;
-  std::vector<Eigen::VectorXd> row_scale_;  ///< per joint, see certainty()
+  std::vector<Eigen::VectorXd> row_scale_;  ///< per joint: one over the root of what doubt() adds to a row's variance
   Eigen::VectorXd weights_;
   std::vector<std::size_t> background_joint_;  ///< of each column after the unknowns
   std::vector<double> background_information_;

@@ -62,17 +62,18 @@ void refit(Models& models, const std::vector<SessionLog>& all, const std::vector
     if (log.fits) logs.push_back(log);
   }
   constexpr int most_halvings = 3;
+  constexpr double converged_below = 1;  // one variance of one parameter
   Models best = models;
   std::unique_ptr<Linearised> around;  // the best so far
   LinearFit step;
   double least = 1e300, share = 1;
   int halvings = 0;
   for (int round = 0;; ++round) {
-    auto at = std::make_unique<Linearised>(models, logs, whitening);
+    auto at = std::make_unique<Linearised>(models, logs, whitening, true);
     whitening = at->whitening();  // one for all rounds, else their misfits can't be compared
     const double now = misfit(*at);
     if (now < least) {
-      const bool converged = least - now < 0.5;
+      const bool converged = least - now < converged_below;
       best = models;
       least = now;
       if (converged || round >= rounds) return;

@@ -26,6 +26,22 @@ constexpr int blocks_of_one_log = 5;
 /// A robot that rested longer has cooled.
 constexpr double longest_pause_s = 1800;
 
+/// Positions without what is faster than the motion by far: noise in regressors is taken for structure, and what a coarse
+/// encoder makes of the acceleration may be more than the torque's own noise.
+void smooth(ProcessedLog& log) {
+  constexpr double above_motion = 12, lowest_hz = 2, edges = 3;
+  double& cutoff = log.filter.position_cutoff_hz;
+  const double wanted = std::max(above_motion * log.filter.excited_hz, lowest_hz);
+  if (log.measured_dq.size() > 0 || wanted >= std::min(cutoff, 0.4 / log.step_s)) return;
+  const auto edge = static_cast<Index>(std::ceil(edges / (wanted * log.step_s)));
+  const Index first = std::max(log.first, edge), last = std::min(log.last, log.samples() - edge);
+  if (last - first < (log.last - log.first) / 2) return;
+  cutoff = wanted;
+  log.q = ZeroPhaseFilter(wanted, log.step_s).apply(log.q);
+  log.first = first;
+  log.last = last;
+}
+
 bool any(const std::vector<bool>& joints) { return std::find(joints.begin(), joints.end(), true) != joints.end(); }
 
 }  // namespace
@@ -45,7 +61,8 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
   const auto add = [&](const ProcessedLog& log, bool healthy, double start) {
     SessionLog entry{log, healthy, healthy || log.role == Role::train, std::max(0.0, log.t[0] - start)};
     double& cutoff = entry.log.filter.torque_cutoff_hz;
-    cutoff = std::min(cutoff, highest_cutoff_hz);
+    cutoff = std::min({cutoff, highest_cutoff_hz, entry.log.filter.position_cutoff_hz});
+    smooth(entry.log);
     entry.log.decimation = std::max<Index>(log.decimation > 8 ? log.decimation / 8 : 1,
                                            static_cast<Index>(1 / (log.step_s * rows_per_period * cutoff)));
     out.push_back(std::move(entry));
@@ -55,16 +72,28 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
   return out;
 }
 
-void check_splits(const std::vector<ProcessedLog>& logs) {
-  constexpr double shortest_s = 1;
-  if (logs.size() > 1) return;
-  const ProcessedLog& log = logs.front();
-  const double seconds = static_cast<double>(log.last - log.first) * log.step_s;
-  if (seconds >= blocks_of_one_log * shortest_s) return;
+void check_lengths(const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& baseline) {
+  constexpr double shortest_s = 2, shortest_block_s = 1;
+  const auto seconds = [](const std::vector<ProcessedLog>& logs) {
+    double sum = 0;
+    for (const ProcessedLog& log : logs) {
+      if (log.role == Role::train) sum += static_cast<double>(log.last - log.first) * log.step_s;
+    }
+    return sum;
+  };
+  const auto check = [&](const std::vector<ProcessedLog>& logs, const char* role) {
+    if (seconds(logs) >= shortest_s) return;
+    throw DataError(fmt::format("role = \"{}\": {:.1f} s (after filtering) are too short to tell anything from; record 40 s, "
+                                "{:g} s at least",
+                                role, seconds(logs), shortest_s));
+  };
+  check(now, "train");
+  if (!baseline.empty()) check(baseline, "baseline");
+  if (now.size() > 1 || seconds(now) >= blocks_of_one_log * shortest_block_s) return;
   throw DataError(
       fmt::format("{}: {:.1f} s (after filtering) are too short to split into {} blocks that judge one another: record "
                   "{:.0f} s or more, or add a log with role = \"validate\"",
-                  log.name, seconds, blocks_of_one_log, 4 * blocks_of_one_log * shortest_s));
+                  now.front().name, seconds(now), blocks_of_one_log, 4 * blocks_of_one_log * shortest_block_s));
 }
 
 std::vector<bool> still_joints(const GateData& data, const std::vector<ProcessedLog>& baseline) {

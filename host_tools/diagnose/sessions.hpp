@@ -14,9 +14,9 @@ namespace fxdyn::diagnosis {
 std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before,
                                  std::optional<Session>& session);
 
-/// Without a log that judges and with one trajectory only, its blocks have to.
-/// @throws DataError: too short for that
-void check_splits(const std::vector<ProcessedLog>& logs);
+/// @throws DataError: train logs or the baseline are too short to fit anything; without a log that judges and with one
+/// trajectory only, its blocks have to, and are too short for that
+void check_lengths(const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& baseline);
 
 /// Joints that this motion tells nothing of: they stand still, or as good as, beside what the encoder's noise looks
 /// like.

@@ -179,6 +179,7 @@ std::string evidence_lines(const json& diagnosis) {
   }
   const json fixed = evidence.value("fixed_point", json::object());
   if (fixed.contains("why_not")) out += indented("no fixed point", fixed.value("why_not", ""));
+  for (const json& note : fixed.value("notes", json::array())) out += indented("fixed point", note.get<std::string>());
   if (!played.empty()) {
     const json failed = forward.value("failed", json::object());
     for (const auto& [which, why] : failed.items())

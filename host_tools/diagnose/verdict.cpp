@@ -20,6 +20,11 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using nlohmann::json;
 
+/// Times the error before: what test logs say against a name.
+constexpr double risen = 1.05;
+/// Share of rows.
+constexpr double much_doubt = 0.1;
+
 bool is_validate(const ProcessedLog& log) { return log.role == Role::validate; }
 
 json parameters_json(const EffectFit& fit, const Joint& joint) {
@@ -95,7 +100,8 @@ class Teller {
             {"next_experiment", next_},
             {"gate", gate_of(t_.now)},
             {"figures_on", figures_on_},
-            {"baseline", at_.models().has_baseline}};
+            {"baseline", at_.models().has_baseline},
+            {"notes", notes_}};
   }
 
  private:
@@ -205,10 +211,28 @@ class Teller {
     const bool unexplained = (lack.structured() && (effects.empty() || t_.gate.remains[j])) || !resembles.empty();
     const std::string verdict = unexplained ? "unexplained" : !effects.empty() ? "effects_found" : "nothing_missing";
     any_effect_ |= !effects.empty();
+    // What only bends leaves no gap in the torque, and noise alone has nothing to close.
+    const bool of_torque = !resembles.empty() || robot_reaches(k) || unexplained ||
+                           std::any_of(effects.begin(), effects.end(), [](const json& e) { return !e.contains("signal"); });
+    const json closure = of_torque ? json(t_.gate.closure[k]) : json(nullptr);
+    if (!effects.empty() && !blocks_only_ && !t_.test.empty() && rms_after > risen * rms_before) {
+      notes_.push_back(fmt::format(
+          "{}: on the test logs the error rises from {:.3g} to {:.3g} {}: what was found does not carry over to their motion",
+          joint_of(j).name, rms_before, rms_after, joint_of(j).torque_unit()));
+    }
     std::sort(effects.begin(), effects.end(), [](const json& a, const json& b) { return a["score"] > b["score"]; });
     json regions = json::array();
     if (verdict != "nothing_missing" || rms_before >= 1.05 * floor)
       regions = where(t_.nominal, shown_, j, errors, std::min(floor, rms_before));
+    const double doubtful = at_.doubtful(j);
+    if (unexplained && doubtful > much_doubt) {
+      const double step = t_.now.front().filter.encoder_step[j];
+      notes_.push_back(fmt::format(
+          "{}: in {:.0f} % of the rows the encoder{} does not tell which way it moves; what is unexplained may be that: faster "
+          "motion or a finer encoder would tell",
+          joint_of(j).name, 100 * doubtful,
+          step > 0 ? fmt::format(" (steps of {:.2g} {})", step, joint_of(j).position_unit()) : std::string()));
+    }
     if (unexplained) {
       std::string which;
       if (!regions.empty())
@@ -223,12 +247,20 @@ class Teller {
             {"gap_before", rms_before},
             {"gap_after", rms_after},
             {"noise_floor", std::min(floor, rms_after)},
-            {"closure", t_.gate.closure[k]},
+            {"closure", closure},
             {"where", regions},
             {"effects", effects},
             {"resembles", resembles},
             {"not_identifiable", t_.outcome.not_identifiable[j]},
             {"lack_of_fit", {{"state_p", lack.state_p}, {"time_p", lack.time_p}}}};
+  }
+
+  /// Whether an effect on the robot is felt at a joint.
+  bool robot_reaches(Index joint) const {
+    for (std::size_t i = 0; i < t_.gate.groups.size(); ++i) {
+      if (at_.groups()[t_.gate.groups[i]].on_body && t_.gate.held.alone[i][joint] > least_felt) return true;
+    }
+    return false;
   }
 
   json of_robot(json& resembles) {
@@ -256,6 +288,7 @@ class Teller {
   const Linearised& at_;
   std::vector<const ProcessedLog*> shown_;
   std::string figures_on_, next_;
+  std::vector<std::string> notes_;
   bool blocks_only_ = false, any_effect_ = false;
   std::vector<MatrixXd> before_, after_;
 };

@@ -25,7 +25,7 @@ struct Conclusion {
 std::string gate_of(const std::vector<ProcessedLog>& now);
 /// Nominal parameters that changed since the healthy session by more than sessions differ, one line each.
 std::vector<std::string> changed_parameters(const Linearised& at);
-/// diagnosis.json, but for its notes.
+/// diagnosis.json; its notes are those that the figures ask for.
 nlohmann::json verdicts(const Conclusion& told);
 
 }  // namespace fxdyn::diagnosis

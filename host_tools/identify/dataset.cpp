@@ -209,11 +209,13 @@ FilterFit choose_filter(const std::vector<Log>& logs, const SignalSettings& sett
           velocity.density[b] = std::max(0.0, velocity.density[b] - 4 * w * w * level);
         }
       }
-      const double ceiling = std::min(30.0, 0.4 * rate);
+      // Above the frequency at which the motion sinks into the noise there is none.
+      const double crossing = crossing_frequency(position);
+      const double ceiling = std::min({30.0, 0.4 * rate, log.dq.size() == 0 ? crossing : 30.0});
       filter.excited_hz = std::max(filter.excited_hz, velocity.frequency_of_share(0.999, ceiling));
       filter.encoder_step[k] = std::max(filter.encoder_step[k], encoder_step(q));
       filter.position_noise[k] = std::max(filter.position_noise[k], position.noise_rms());
-      filter.crossing_hz = std::max(filter.crossing_hz, crossing_frequency(position));
+      filter.crossing_hz = std::max(filter.crossing_hz, crossing);
     }
   }
   const double position = std::min(0.4 * rate, std::max(10.0, 2 * filter.crossing_hz));

@@ -171,6 +171,12 @@ class Header {
       missing(absent, fmt::format("signal {} of joint {}", signal_names[signal], absent.substr(name.size())));
     }
     if (complete) layout_.columns[signal] = columns;
+    const std::string next = fmt::format("{}{}", name, joints + 1);
+    if (signal == q && joints > 1 && std::find(names_.begin(), names_.end(), next) != names_.end()) {
+      throw InputError(fmt::format(
+          "{}:{}: column '{}', but the robot has {} joints; is this another robot's log? Else remove the columns of "
+          "joints that the URDF does not have", file_, line_, next, joints));
+    }
   }
 
   [[noreturn]] void missing(const std::string& name, const std::string& meaning) const {

@@ -81,7 +81,9 @@ json recursion_json(const Fitter::Recursion& recursion, double forgetting) {
 }  // namespace
 
 Pipeline::Pipeline(const fs::path& project, fs::path directory)
-    : project_(read_project(project)), directory_(std::move(directory)) {}
+    : project_(read_project(project)), directory_(std::move(directory)) {
+  check_writable(directory_);
+}
 
 GateData& Pipeline::data() {
   if (!data_) {

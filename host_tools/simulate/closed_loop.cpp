@@ -82,8 +82,8 @@ class Plant {
     m = (0.5 * (m + m.transpose())).eval();
     if (Eigen::LLT<MatrixXd>(m).info() != Eigen::Success) {
       throw DataError(
-          "the model's mass matrix is not positive definite, so it can't be simulated forward; identify with physical "
-          "= true, or with logs that excite more");
+          "the model's mass matrix is not positive definite, so it can't be simulated forward; it needs logs that tell "
+          "the inertias: faster motion");
     }
     return m;
   }
@@ -120,7 +120,7 @@ class Plant {
     q_ += 0.5 * h_ * (v_ + v);
     v_ = v;
     if (!v_.allFinite() || v_.cwiseAbs().maxCoeff() > 1e6)
-      throw DataError("the closed loop runs away; lower bandwidth_hz or the motion's speed");
+      throw DataError("the closed loop runs away");
     take(q_m, v_, a_);
     evaluator_.tick(states_, saturations_);  // for the effects' states
   }

@@ -124,7 +124,14 @@ std::vector<fs::path> simulate(const fs::path& scenario_file, const fs::path& di
   const Scenario scenario = read_scenario(scenario_file);
   // All of it before any of it is written: a robot that runs away in the last log leaves nothing half done.
   std::vector<Simulated> all;
-  for (const ScenarioLog& spec : scenario.logs) all.push_back(simulate_log(scenario, spec));
+  for (const ScenarioLog& spec : scenario.logs) {
+    try {
+      all.push_back(simulate_log(scenario, spec));
+    } catch (const DataError& error) {
+      throw DataError(fmt::format("{}: log \"{}\": {}; lower [control] bandwidth_hz or the motion's speed",
+                                  scenario_file.string(), spec.name, error.what()));
+    }
+  }
   fs::create_directories(directory);
   write_file(directory / "truth.json", to_json(scenario.plant).dump(1) + "\n");
   std::vector<fs::path> files;
