@@ -522,12 +522,12 @@ void Linearised::make_rows() {
         const EffectFit& fit = fit_of(model, u);
         const EffectInfo& info = *find_effect(fit.effect);
         if (by_difference(info)) {
-          IdentifiedModel more = model, less = model;
+          // One-sided: half the work, and steps are all that it is for.
+          IdentifiedModel more = model;
           const double value = u.kind == Unknown::Kind::shape ? 1.0 : std::max(std::fabs(u.value), 1e-6);
           const double step = difference * value;
           add_to(more, u, step);
-          add_to(less, u, -step);
-          const MatrixXd slope = (loaded(more) - loaded(less)) / (2 * step);
+          const MatrixXd slope = (loaded(more) - torque) / step;
           for (std::size_t j = 0; j < n; ++j) columns[j] = slope.col(static_cast<Index>(j));
         } else if (u.kind == Unknown::Kind::linear) {
           columns[u.joint] =
@@ -674,10 +674,13 @@ void Linearised::sum_up(JointRows& rows, Index from) const {
     const auto x = rows.x.middleRows(block.first, block.count);
     const auto y = rows.y.segment(block.first, block.count);
     JointRows::Sums& s = rows.sums[b];
-    const MatrixXd fresh = x.transpose() * x.rightCols(more);
     s.gram.conservativeResize(cols, cols);
-    s.gram.rightCols(more) = fresh;
-    s.gram.bottomRows(more) = fresh.transpose();
+    const auto fresh = x.rightCols(more);
+    s.gram.topRightCorner(from, more).noalias() = x.leftCols(from).transpose() * fresh;
+    s.gram.bottomLeftCorner(more, from) = s.gram.topRightCorner(from, more).transpose();
+    MatrixXd own = MatrixXd::Zero(more, more);
+    own.selfadjointView<Eigen::Lower>().rankUpdate(fresh.transpose());
+    s.gram.bottomRightCorner(more, more) = own.selfadjointView<Eigen::Lower>();
     s.projection.conservativeResize(cols);
     s.projection.tail(more) = x.rightCols(more).transpose() * y;
     s.square = y.squaredNorm();
