@@ -176,6 +176,7 @@ struct Set {
   VectorXd theta;  ///< after the offsets
   VectorXd std;
   double square = 1e300, score = -1e300;
+  double likelihood = -1e300;  ///< score whatever the signs of the coefficients
   double noise = 0;  ///< variance of the whitened residual
 };
 
@@ -220,7 +221,8 @@ void fit(const Rows& rows, const VectorXd& a, Set& set) {
                2 * std::log(part.shape.empty() ? 1.0 : 4.0);
     for (const ParameterInfo& p : info.linear) possible &= set.theta[at++] >= p.lower;
   }
-  set.score = possible ? -n * std::log(std::max(set.square, 1e-300) / n) - penalty : -1e300;
+  set.likelihood = -n * std::log(std::max(set.square, 1e-300) / n) - penalty;
+  set.score = possible ? set.likelihood : -1e300;
 }
 
 /// All three, with middling shapes.
@@ -338,6 +340,7 @@ VectorXd likely_load(const Rows& rows, const VectorXd& a) {
   x << white, offsets;
   const SymmetricSolver solver(x.transpose() * x);
   const VectorXd v = solver.solve(x.transpose() * rows.whiten(rows.delta, a)).head(white.cols());
+  if (!(v.squaredNorm() > 0)) return rows.z;
   const VectorXd s = SymmetricSolver(all.transpose() * all).solve(all.transpose() * load);
   return std::max(v.dot(s) / v.squaredNorm(), 1 / v.norm()) * v - s;
 }
@@ -456,6 +459,9 @@ Deflections find_deflections(const IdentifiedModel& model, const MatrixXd& base_
     std::optional<Rows> old_rows;
     if (!healthy.empty()) {
       old_rows = others(healthy);
+      // The load stays where today's deflection has it: only the product with the compliance is known.
+      old_rows->slopes.clear();
+      old_rows->z.resize(0);
       Uncertain same;
       old = best_set(*old_rows, model, {}, same);
     }
@@ -534,7 +540,7 @@ Deflections find_deflections(const IdentifiedModel& model, const MatrixXd& base_
       less.parts.erase(less.parts.begin() + static_cast<std::ptrdiff_t>(p));
       fit(rows, a, less);
       fit(rows, a, again);
-      effect.score = again.score - less.score;
+      effect.score = again.likelihood - less.likelihood;
       bool alike = false;
       Index old_at = 0;
       for (const Part& was : old.parts) {

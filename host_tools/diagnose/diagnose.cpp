@@ -129,7 +129,7 @@ class Work {
   }
 
   Diagnosis run() {
-    check_lengths(data_.logs, baseline_);
+    check_lengths(logs_);
     if (models_.has_baseline) {
       learn_baseline();
     } else {
@@ -289,6 +289,7 @@ class Work {
       for (EffectFit& fit : alone.current.body) fit.named = false;
     }
     models_.healthy = models_.current = alone.current;
+    models_.rotors = alone.rotors;
     check_same_robot(models_, logs_, still_);
     data_.notes.insert(data_.notes.end(), healthy.notes.begin(), healthy.notes.end());
   }

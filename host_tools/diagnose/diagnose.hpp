@@ -18,7 +18,7 @@ struct Diagnosis {
 /// Finds what the nominal model lacks, names it, adds it, and tells what that is worth on logs that decided nothing.
 /// docs/guide/diagnosis.md explains the rules.
 /// @param data train and validate logs @param baseline a healthy session, role train, filtered alike; may be empty
-/// @param test read for the figures only
+/// @param test read for the figures only; but their sampling step, like that of all logs, bounds a delay
 /// @throws DataError: logs that tell too little, a baseline that can't be the same robot's
 Diagnosis diagnose(const Project& project, GateData& data, const std::vector<ProcessedLog>& baseline,
                    const std::vector<ProcessedLog>& test, Progress& progress);

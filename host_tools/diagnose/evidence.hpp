@@ -11,7 +11,7 @@ namespace fxdyn {
 /// nothing either; validate logs, in their stead, decided which names stay, and "note" says so.
 ///
 /// joints: RMS of measured minus model torque with the model before and after, both torques filtered alike at the
-/// torque cut-off, edges dropped (judge()), logs pooled like pooled_error(): the root of the mean of their squares. The
+/// torque cut-off, edges dropped (judge()), over all samples of the logs. The
 /// same after, with the torque that the fixed-point firmware would compute. null where it can't be told; "fixed_point"
 /// then says why.
 ///

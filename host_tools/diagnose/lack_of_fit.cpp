@@ -71,7 +71,7 @@ struct InTime {
 InTime lines(const Linearised& at, const VectorXd& e, const std::vector<std::size_t>& blocks) {
   constexpr Index neighbours = 31;
   constexpr double inside = 0.8;
-  constexpr double sure = 5;  // exp(-5): a line that noise has as seldom counts
+  constexpr double sure = 0.01;  // what noise has as seldom counts
   struct Line {
     double power, level;
   };
@@ -102,13 +102,22 @@ InTime lines(const Linearised& at, const VectorXd& e, const std::vector<std::siz
   InTime out;
   if (all.empty()) return out;  // too short to tell
   const auto count = static_cast<double>(all.size());
-  double most = 0, beyond = 0;
+  // The level is itself a median of so many: of n exponential variables the chance of c times the median is
+  // prod k / (k + c), k from the middle to n.
+  const auto seldom = [&](const Line& line) {
+    double p = count;
+    for (Index k = (neighbours + 1) / 2; k <= neighbours; ++k) {
+      const auto n = static_cast<double>(k);
+      p *= n / (n + line.power / (line.level * std::numbers::ln2));
+    }
+    return p;
+  };
+  double beyond = 0;
   for (const Line& line : all) {
-    const double ratio = line.power / line.level;
-    most = std::max(most, ratio);
-    if (ratio > std::log(count) + sure) beyond += line.power - line.level;
+    const double p = seldom(line);
+    out.p = std::min(out.p, p);
+    if (p < sure) beyond += line.power - line.level;
   }
-  out.p = std::min(1.0, count * std::exp(-most));
   if (whole > 0) out.share = beyond / whole;
   return out;
 }
@@ -175,7 +184,7 @@ MatrixXd features(const Linearised& at, std::size_t joint, bool healthy) {
     // The load moves a little with each fit; these functions need not.
     const auto motion = 2 * static_cast<Index>(n);
     if (kept.rows.size() > 0 && kept.scales.head(motion) == scales_of.head(motion) &&
-        (kept.scales - scales_of).norm() < 0.05 * scales_of.norm()) {
+        ((kept.scales - scales_of).array().abs() <= 0.05 * scales_of.array()).all()) {
       put(kept.rows);
       continue;
     }
@@ -273,9 +282,16 @@ LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& 
   const double whole = w * e.squaredNorm();
   double fitted = 0;
   for (const Index c : fit.columns) fitted += rows.local[static_cast<std::size_t>(c)] >= 0 ? 1 : 0;
-  const double rest = std::max(5.0, fit.rows[k] - fitted - static_cast<double>(kept.size()));
+  double today = 0;
+  for (const std::size_t i : at.fit_blocks()) {
+    if (!at.blocks()[i].healthy) today += static_cast<double>(at.blocks()[i].count);
+  }
+  // The columns are fitted to both sessions; today's rows bear their share of them.
+  const double rest = today - fitted * today / fit.rows[k] - static_cast<double>(kept.size());
   const auto odds = [&](double part) { return part / std::max(whole - part, 1e-9 * whole); };
-  out.state_p = chance(odds(mine) / std::max(odds(mean), 1e-300), freedom, rest);
+  // With hardly more rows than functions nothing can be told.
+  if (rest > 0.3 * static_cast<double>(kept.size()))
+    out.state_p = chance(odds(mine) / std::max(odds(mean), 1e-300), freedom, rest);
   out.time_p = std::min(lines(at, residual, at.fit_blocks()).p,
                         at.models().has_baseline ? slow(at, residual, at.fit_blocks()).p : 1.0);
   return out;
@@ -285,7 +301,9 @@ double structured_share(const Linearised& at, std::size_t joint, const LinearFit
                         const std::vector<std::size_t>& blocks) {
   const VectorXd e = only(at, at.residual(joint, fit), blocks);
   const MatrixXd f = only(at, all_features, blocks);
-  if (!(e.squaredNorm() > 0)) return 0;
+  Index count = 0;
+  for (const std::size_t b : blocks) count += at.blocks()[b].healthy ? 0 : at.blocks()[b].count;
+  if (!(e.squaredNorm() > 0) || 2 * count < 3 * f.cols()) return 0;
   const VectorXd size = f.colwise().norm().transpose().array().max(1e-300).inverse();
   const MatrixXd gram = size.asDiagonal() * (f.transpose() * f) * size.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(gram);

@@ -84,7 +84,7 @@ void add_to(IdentifiedModel& model, const Unknown& u, double step) {
     case Unknown::Kind::shape: {
       const ParameterInfo& info = find_effect(fit_of(model, u).effect)->shape[u.index];
       double& value = value_of(model, u);
-      value = std::clamp(value * std::exp(step), info.lower, info.upper);
+      value = std::clamp(value * std::exp(step), info.lower, std::min(info.upper, u.upper));
       return;
     }
     case Unknown::Kind::linear: {
@@ -173,6 +173,10 @@ void Linearised::make_unknowns() {
     return std::any_of(models_.fixed.begin(), models_.fixed.end(),
                        [&](const EffectCandidate& c) { return c.joint == j && c.effect == fit.effect; });
   };
+  const auto upper_of = [&](const ParameterInfo& p) {
+    // A delay is so many steps of the finest log.
+    return p.name == "time" ? std::min(p.upper, Delay::largest * models_.smallest_step_s) : p.upper;
+  };
   const IdentifiedModel& common = two ? models_.healthy : now;
   for (std::size_t k = 0; k < now.base.size(); ++k) {
     Unknown u;
@@ -230,6 +234,7 @@ void Linearised::make_unknowns() {
       u.value = 0;
       u.kind = Unknown::Kind::shape;
       for (u.index = 0; u.index < info.shape.size(); ++u.index) {
+        u.upper = upper_of(info.shape[u.index]);
         if (is_shape_free(info, u.index)) unknowns_.push_back(u);
       }
     }
@@ -263,6 +268,7 @@ void Linearised::make_unknowns() {
     u.value = u.prior = u.prior_std = 0;
     for (u.index = 0; u.index < info.shape.size(); ++u.index) {
       if (!is_shape_free(info, u.index)) continue;
+      u.upper = upper_of(info.shape[u.index]);
       unknowns_.push_back(u);
       ++group.nonlinear;
       group.lower.push_back(-1e300);
@@ -341,12 +347,6 @@ double Linearised::log_scale(std::size_t joint) const {
   for (const std::size_t b : fit_blocks_)
     sum += row_scale_[joint].segment(blocks_[b].first, blocks_[b].count).array().log().sum();
   return sum;
-}
-
-const Group* Linearised::find(const EffectId& id) const {
-  const auto it =
-      std::find_if(groups_.begin(), groups_.end(), [&](const Group& g) { return g.in_model && g.id == id; });
-  return it == groups_.end() ? nullptr : &*it;
 }
 
 /// Near standstill the friction that an uncertain velocity makes is noise too. Its variance in units of the noise,
@@ -522,10 +522,11 @@ void Linearised::make_rows() {
         const EffectFit& fit = fit_of(model, u);
         const EffectInfo& info = *find_effect(fit.effect);
         if (by_difference(info)) {
-          // One-sided: half the work, and steps are all that it is for.
+          // One-sided: half the work. Away from the bound of a shape.
           IdentifiedModel more = model;
           const double value = u.kind == Unknown::Kind::shape ? 1.0 : std::max(std::fabs(u.value), 1e-6);
-          const double step = difference * value;
+          double step = difference * value;
+          if (u.kind == Unknown::Kind::shape && fit.shape[u.index] * std::exp(step) > u.upper) step = -step;
           add_to(more, u, step);
           const MatrixXd slope = (loaded(more) - torque) / step;
           for (std::size_t j = 0; j < n; ++j) columns[j] = slope.col(static_cast<Index>(j));

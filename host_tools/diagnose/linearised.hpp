@@ -65,6 +65,7 @@ struct Unknown {
   std::size_t healthy_effect = 0;                ///< the same in the healthy model
   bool body = false;                             ///< effect of IdentifiedModel::body
   bool change = false;                           ///< what the current session has more than the healthy one
+  double upper = 1e300;                          ///< shape: what it may be at most
   double value = 0;                              ///< in the model; 0 for logarithms, whose steps are fitted
   double prior = 0, prior_std = 0;               ///< std 0: none
 };
@@ -134,8 +135,6 @@ class Linearised {
   const std::vector<Unknown>& unknowns() const { return unknowns_; }  ///< of the nuisance and of named effects
   const std::vector<Eigen::Index>& nuisance() const { return nuisance_; }
   const std::vector<Group>& groups() const { return groups_; }
-  /// The group of a named effect; null: it has none (of a link encoder, or not in the model).
-  const Group* find(const EffectId& id) const;
   const JointRows& rows(std::size_t joint) const { return rows_[joint]; }
   const std::vector<Block>& blocks() const { return blocks_; }
   const std::vector<Fold>& folds() const { return folds_; }

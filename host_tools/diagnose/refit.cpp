@@ -1,5 +1,6 @@
 #include "host_tools/diagnose/refit.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -144,7 +145,8 @@ void take_back(Models& models, std::vector<EffectId>& ids, const EffectId& id) {
   const auto& effects = id.body ? models.current.body : models.current.joints[id.joint].effects;
   const bool of_load = effects[id.effect].effect == LoadFriction::name;
   remove(models, ids, id);
-  if (of_load) forget_rotor(models, ids, id.joint);
+  if (of_load && models.current.joints[id.joint].find(LoadFriction::name) == nullptr)
+    forget_rotor(models, ids, id.joint);
 }
 
 bool forget_rotor(Models& models, std::vector<EffectId>& ids, std::size_t joint) {

@@ -72,28 +72,28 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
   return out;
 }
 
-void check_lengths(const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& baseline) {
+void check_lengths(const std::vector<SessionLog>& logs) {
   constexpr double shortest_s = 2, shortest_block_s = 1;
-  const auto seconds = [](const std::vector<ProcessedLog>& logs) {
-    double sum = 0;
-    for (const ProcessedLog& log : logs) {
-      if (log.role == Role::train) sum += static_cast<double>(log.last - log.first) * log.step_s;
-    }
-    return sum;
-  };
-  const auto check = [&](const std::vector<ProcessedLog>& logs, const char* role) {
-    if (seconds(logs) >= shortest_s) return;
-    throw DataError(fmt::format("role = \"{}\": {:.1f} s (after filtering) are too short to tell anything from; record 40 s, "
-                                "{:g} s at least",
-                                role, seconds(logs), shortest_s));
-  };
-  check(now, "train");
-  if (!baseline.empty()) check(baseline, "baseline");
-  if (now.size() > 1 || seconds(now) >= blocks_of_one_log * shortest_block_s) return;
+  double seconds[2] = {0, 0};
+  std::size_t count[2] = {0, 0}, judging = 0;
+  for (const SessionLog& entry : logs) {
+    if (!entry.fits) ++judging;
+    if (!entry.fits) continue;
+    seconds[entry.healthy] += static_cast<double>(entry.log.last - entry.log.first) * entry.log.step_s;
+    ++count[entry.healthy];
+  }
+  for (const bool healthy : {false, true}) {
+    if (count[healthy] == 0 || seconds[healthy] >= shortest_s) continue;
+    throw DataError(
+        fmt::format("role = \"{}\": {:.1f} s (after filtering) are too short to tell anything from; record 40 s, {:g} s at "
+                    "least",
+                    healthy ? "baseline" : "train", seconds[healthy], shortest_s));
+  }
+  if (count[0] + judging > 1 || seconds[0] >= blocks_of_one_log * shortest_block_s) return;
   throw DataError(
       fmt::format("{}: {:.1f} s (after filtering) are too short to split into {} blocks that judge one another: record "
                   "{:.0f} s or more, or add a log with role = \"validate\"",
-                  now.front().name, seconds(now), blocks_of_one_log, 4 * blocks_of_one_log * shortest_block_s));
+                  logs.front().log.name, seconds[0], blocks_of_one_log, 4 * blocks_of_one_log * shortest_block_s));
 }
 
 std::vector<bool> still_joints(const GateData& data, const std::vector<ProcessedLog>& baseline) {

@@ -16,7 +16,7 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
 
 /// @throws DataError: train logs or the baseline are too short to fit anything; without a log that judges and with one
 /// trajectory only, its blocks have to, and are too short for that
-void check_lengths(const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& baseline);
+void check_lengths(const std::vector<SessionLog>& logs);
 
 /// Joints that this motion tells nothing of: they stand still, or as good as, beside what the encoder's noise looks
 /// like.

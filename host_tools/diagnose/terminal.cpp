@@ -103,12 +103,15 @@ std::string where_lines(const json& joints) {
 }
 
 /// Effects that an unexplained gap resembles without being one of them.
-std::string resembling_lines(const json& joints) {
+std::string resembling_lines(const json& diagnosis) {
+  const json joints = diagnosis.value("joints", json::array());
   std::string out;
   for (std::size_t j = 0; j < joints.size(); ++j) {
     const std::string names = words::list(joints[j].value("resembles", json::array()));
     if (!names.empty()) out += indented(words::joint(joints[j], j), names);
   }
+  const std::string robot = words::list(diagnosis.value("resembles", json::array()));
+  if (!robot.empty()) out += indented("robot", robot);
   return out.empty() ? "" : "unexplained, resembles (kept in the model without a name)\n" + out;
 }
 
@@ -177,6 +180,7 @@ std::string evidence_lines(const json& diagnosis) {
     out.erase(out.find_last_not_of(' ') + 1);
     out += "\n";
   }
+  if (evidence.contains("note")) out += indented("note", evidence.value("note", ""));
   const json fixed = evidence.value("fixed_point", json::object());
   if (fixed.contains("why_not")) out += indented("no fixed point", fixed.value("why_not", ""));
   for (const json& note : fixed.value("notes", json::array())) out += indented("fixed point", note.get<std::string>());
@@ -194,7 +198,7 @@ std::string diagnosis_table(const json& diagnosis) {
   const json joints = diagnosis.value("joints", json::array());
   std::string out = "\ndiagnosis: " + words::verdict(diagnosis) + "\n";
   if (const std::string on = words::figures_on(diagnosis); !on.empty()) out += "gaps on " + on + "\n";
-  out += joint_rows(joints) + robot_lines(diagnosis) + where_lines(joints) + resembling_lines(joints) +
+  out += joint_rows(joints) + robot_lines(diagnosis) + where_lines(joints) + resembling_lines(diagnosis) +
          alternative_lines(diagnosis) + hidden_lines(diagnosis) + evidence_lines(diagnosis);
   if (const std::string next = words::next_experiment(diagnosis); !next.empty()) out += indented("next", next);
   for (const json& note : diagnosis.value("notes", json::array())) {

@@ -208,7 +208,8 @@ class Teller {
                          {"model_share", model_share(j, static_cast<std::size_t>(at - fits.begin()))}});
     }
     const LackOfFit& lack = t_.outcome.lack[j];
-    const bool unexplained = (lack.structured() && (effects.empty() || t_.gate.remains[j])) || !resembles.empty();
+    const bool nothing_found = effects.empty() && !robot_reaches(k);
+    const bool unexplained = (lack.structured() && (nothing_found || t_.gate.remains[j])) || !resembles.empty();
     const std::string verdict = unexplained ? "unexplained" : !effects.empty() ? "effects_found" : "nothing_missing";
     any_effect_ |= !effects.empty();
     // What only bends leaves no gap in the torque, and noise alone has nothing to close.
@@ -255,10 +256,11 @@ class Teller {
             {"lack_of_fit", {{"state_p", lack.state_p}, {"time_p", lack.time_p}}}};
   }
 
-  /// Whether an effect on the robot is felt at a joint.
+  /// Whether a named effect on the robot is felt at a joint.
   bool robot_reaches(Index joint) const {
     for (std::size_t i = 0; i < t_.gate.groups.size(); ++i) {
-      if (at_.groups()[t_.gate.groups[i]].on_body && t_.gate.held.alone[i][joint] > least_felt) return true;
+      const Group& group = at_.groups()[t_.gate.groups[i]];
+      if (group.on_body && t_.model.body[group.id.effect].named && t_.gate.held.alone[i][joint] > least_felt) return true;
     }
     return false;
   }
@@ -271,6 +273,8 @@ class Teller {
       if (i == t_.gate.groups.size()) continue;
       if (!t_.model.body[e].named) {
         resembles.push_back(t_.model.body[e].effect);
+        advise(fmt::format("{} explains too little of what it resembles: other loads and postures would tell",
+                           t_.model.body[e].effect));
         continue;
       }
       json one = effect_json(t_.model.body[e], id, t_.gate.robot_closure[i]);

@@ -120,7 +120,7 @@ class Plant {
     q_ += 0.5 * h_ * (v_ + v);
     v_ = v;
     if (!v_.allFinite() || v_.cwiseAbs().maxCoeff() > 1e6)
-      throw DataError("the closed loop runs away");
+      throw RunsAway();
     take(q_m, v_, a_);
     evaluator_.tick(states_, saturations_);  // for the effects' states
   }

@@ -2,9 +2,15 @@
 
 #include <Eigen/Dense>
 
+#include "host_tools/error.hpp"
 #include "host_tools/model/identified_model.hpp"
 
 namespace fxdyn {
+
+/// A loop that its controller can't hold.
+struct RunsAway : DataError {
+  RunsAway() : DataError("the closed loop runs away") {}
+};
 
 /// Where the robot is asked to go: samples x joints, `step_s` apart [rad | m, and per s, s^2].
 struct Reference {
@@ -32,7 +38,7 @@ struct ClosedLoopRun {
 /// The model as a plant: M(q) ddq + h(q, dq) + effects(q, dq) = tau, from the reference's first state on. Effects that
 /// need the running total (delay, saturation, torque_gain) or act on the position (elasticity, backlash, eccentricity)
 /// do not shape the motion.
-/// @throws DataError where the model's mass matrix is not positive definite, or the loop runs away.
+/// @throws DataError where the model's mass matrix is not positive definite, RunsAway.
 ClosedLoopRun run_closed_loop(const IdentifiedModel& plant, const Reference& reference,
                               const ClosedLoopSettings& settings);
 

@@ -116,7 +116,7 @@ class ControlledRobot {
     mj_step(robot_.model.get(), &data);
     for (const int warning : {mjWARN_BADQPOS, mjWARN_BADQVEL, mjWARN_BADQACC}) {
       if (data.warning[warning].number > 0)
-        throw DataError("the closed loop runs away");
+        throw RunsAway();
     }
     read();
   }

@@ -127,7 +127,7 @@ std::vector<fs::path> simulate(const fs::path& scenario_file, const fs::path& di
   for (const ScenarioLog& spec : scenario.logs) {
     try {
       all.push_back(simulate_log(scenario, spec));
-    } catch (const DataError& error) {
+    } catch (const RunsAway& error) {
       throw DataError(fmt::format("{}: log \"{}\": {}; lower [control] bandwidth_hz or the motion's speed",
                                   scenario_file.string(), spec.name, error.what()));
     }

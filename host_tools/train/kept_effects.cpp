@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host_tools/identify/regressor.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/model/evaluator.hpp"
 #include "host_tools/parallel.hpp"
@@ -36,15 +37,22 @@ VectorXd before_total_effects(const JointFit& joint, VectorXd tau, double step_s
 KeptEffects::KeptEffects(IdentifiedModel diagnosed, const std::vector<ProcessedLog>& logs)
     : diagnosed_(std::move(diagnosed)) {
   for (const ProcessedLog& log : logs) warm_ |= age_of(diagnosed_, log) > 0;
-  for (JointFit joint : diagnosed_.joints) {
+  const DhChain chain = to_dh(diagnosed_.robot);
+  BaseSet base;
+  for (const BaseParameter& parameter : diagnosed_.base) base.columns.push_back(static_cast<Index>(parameter.column));
+  for (std::size_t j = 0; j < diagnosed_.joints.size(); ++j)
+    rotor_is_absorbed_.push_back(rotor_inertia_is_absorbed(chain, base, static_cast<Index>(j)));
+  for (std::size_t j = 0; j < diagnosed_.joints.size(); ++j) {
+    JointFit joint = diagnosed_.joints[j];
     joint.bls.reset();
-    std::erase_if(joint.effects, [&](const EffectFit& fit) { return is_kept(fit); });
+    std::erase_if(joint.effects, [&](const EffectFit& fit) { return is_kept(j, fit); });
     design_.push_back(std::move(joint));
   }
 }
 
-bool KeptEffects::is_kept(const EffectFit& fit) const {
+bool KeptEffects::is_kept(std::size_t joint, const EffectFit& fit) const {
   const EffectInfo& info = *find_effect(fit.effect);
+  if (fit.effect == RotorInertia::name && rotor_is_absorbed_[joint]) return true;
   // The Fitter's columns start cold with every log.
   return info.acts_on != ActsOn::torque || info.needs_structural || info.needs_total ||
          (warm_ && fit.effect == FrictionDrift::name);
@@ -57,7 +65,7 @@ IdentifiedModel KeptEffects::restore(IdentifiedModel fitted) const {
     std::vector<EffectFit> all;
     std::size_t next = 0;
     for (const EffectFit& fit : found.effects) {
-      if (is_kept(fit)) {
+      if (is_kept(j, fit)) {
         all.push_back(fit);
         continue;
       }
@@ -88,7 +96,7 @@ std::vector<MatrixXd> KeptEffects::torque(const IdentifiedModel& model, const st
   for (std::size_t j = 0; j < model.joints.size(); ++j) {
     any |= design_[j].effects.size() < diagnosed_.joints[j].effects.size();
     std::erase_if(with.joints[j].effects, acts_on_total);
-    std::erase_if(without.joints[j].effects, [&](const EffectFit& fit) { return is_kept(fit); });
+    std::erase_if(without.joints[j].effects, [&](const EffectFit& fit) { return is_kept(j, fit); });
     with.joints[j].bls.reset();  // the same in both
     without.joints[j].bls.reset();
   }

@@ -5,7 +5,8 @@
 namespace fxdyn {
 
 /// What diagnosis found and the Fitter has no columns for: effects on position or body, those that need the structural
-/// or the total torque, and drift in a session that was warm when a log began. They stay as they are while everything
+/// or the total torque, a rotor that only the load's friction tells from the link, and drift in a session that was warm when
+/// a log began. They stay as they are while everything
 /// else is fitted again.
 class KeptEffects {
  public:
@@ -25,9 +26,10 @@ class KeptEffects {
   void mark_hidden(std::vector<ProcessedLog>& logs) const;
 
  private:
-  bool is_kept(const EffectFit& fit) const;
+  bool is_kept(std::size_t joint, const EffectFit& fit) const;
 
   IdentifiedModel diagnosed_;
+  std::vector<bool> rotor_is_absorbed_;  ///< per joint
   bool warm_ = false;
   std::vector<JointFit> design_;
 };

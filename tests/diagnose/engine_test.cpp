@@ -69,17 +69,37 @@ TEST(Diagnosis, ALinkEncoderShowsWhatBendsUnderALoadTooSmallForTheTorque) {
   const json report = diagnosed("wrist", {.missing = effect("elasticity", 2, "compliance = 5e-3, relaxation = 0.001"),
                                           .sensors = "link_encoders = \"all\"\nlink_encoder_bits = 19",
                                           .fore_mass = 0.03});
-  only(report, 1, "elasticity");
+  const json& gear = only(report, 1, "elasticity");
+  EXPECT_NEAR(parameter(gear, "compliance"), 5e-3, 2e-3);
   EXPECT_TRUE(report.at("joints").at(0).at("effects").empty());
+}
+
+TEST(Diagnosis, AGearThatBentBeforeIsNoFinding) {
+  if (test::sanitized) GTEST_SKIP() << "other cases run the same code";
+  const json report = diagnosed("bent", {.already = effect("elasticity", 2, "compliance = 5e-3, relaxation = 0.001"),
+                                         .sensors = "link_encoders = \"all\"\nlink_encoder_bits = 19",
+                                         .fore_mass = 0.03});
+  EXPECT_EQ(report.at("verdict"), "nothing_missing") << report.dump(1);
 }
 
 TEST(Diagnosis, LoadFrictionLeavesOutTheRotor) {
   if (test::sanitized) GTEST_SKIP() << "other cases run the same code";
   // The shoulder's rotor can't be told from the link but by this.
-  const json report = diagnosed("load_friction", {.missing = effect("load_friction", 1, "coefficient = 0.15")});
+  const auto out = test::diagnose_sessions("load_friction", {.missing = effect("load_friction", 1, "coefficient = 0.15")});
+  const json report = json::parse(read_file(out / "diagnosis.json"));
+  const IdentifiedModel model = read_model(out / "model.json");
+  const EffectFit* rotor = model.joints[0].find("rotor_inertia");
+  ASSERT_NE(rotor, nullptr);
+  EXPECT_NEAR(rotor->linear[0], 0.2, 0.1);
   const json& friction = only(report, 0, "load_friction");
   EXPECT_NEAR(parameter(friction, "coefficient"), 0.15, 0.02);
   EXPECT_GT(report.at("joints").at(0).at("closure"), 0.9);
+}
+
+TEST(Diagnosis, LoadFrictionOfTheHealthyRobotIsNoFinding) {
+  if (test::sanitized) GTEST_SKIP() << "other cases run the same code";
+  const json report = diagnosed("load_before", {.already = effect("load_friction", 1, "coefficient = 0.15")});
+  EXPECT_EQ(report.at("verdict"), "nothing_missing") << report.dump(1);
 }
 
 TEST(Diagnosis, DriftRunsOnThroughTheSession) {

@@ -44,6 +44,7 @@ TEST(DiagnosisVerdict, TestLogsDecideNothing) {
   const test::Sessions one{.missing = drift, .test = false}, other{.missing = drift, .test_starts_s = 0};
   for (const auto& [sessions, model] : {std::pair{&one, &models[0]}, std::pair{&other, &models[1]}}) {
     *model = json::parse(read_file(test::diagnose_sessions("test_logs", *sessions) / "model.json"));
+    EXPECT_NE(model->dump().find("friction_drift"), std::string::npos);
     for (const char* figures : {"logs", "notes", "project_hash"}) model->erase(figures);
   }
   EXPECT_EQ(models[0], models[1]);

@@ -203,6 +203,8 @@ std::vector<Figure> figures(const std::vector<json>& results) {
   list.push_back(at_least("outside the catalogue, >= 0.6 %: flagged", rate(results, outside, "flagged"), 0.95));
   list.push_back(at_most("outside the catalogue, >= 0.6 %: accepted under a wrong name",
                          rate(results, outside, "accepted"), 0.03));
+  list.push_back(at_most("outside the catalogue, >= 0.6 %: a name at that joint beside the flag",
+                         rate(results, outside, "named_beside"), 0.03));
   for (const auto& [size, goal] : {std::pair{0.006, 0.90}, std::pair{0.02, 0.95}}) {
     auto closures = values_of(results, visible(size), "closure");
     const double value = median(closures);

@@ -45,6 +45,7 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"no_torque", "t,q1,dq1,tua1\n0,1,2,3\n", {":1:", "no column 'tau1'", "nearest is 'tua1'", "columns ="}},
         Bad{"no_time", "time,q1,tau1\n0,1,2\n", {":1:", "no column 't'"}},
         Bad{"twice", "t,q1,q1,tau1\n0,1,2,3\n", {":1:", "'q1' appears twice"}},
+        Bad{"other_robot", "t,q1,q2,tau1,tau2\n0,1,2,3,4\n", {":1:", "'q2'", "1 moving joints", "another robot's"}},
         Bad{"header_only", "t,q1,tau1\n", {"fewer than 2 rows"}},
         Bad{"one_row", "t,q1,tau1\n0,1,2\n", {":2:", "fewer than 2 rows"}},
         Bad{"nan", "t,q1,tau1\n0,1,2\n0.1,nan,2\n", {":3:", "'q1'", "'nan' is not a number"}},
