@@ -126,7 +126,7 @@ Outcome explore(Models models, const std::vector<SessionLog>& logs, const Search
     if (changed) refit(models, logs, at.whitening(), 4);
     bool lost = false;
     for (std::size_t j = 0; j < models.current.joints.size(); ++j) {
-      // A rotor that the load's friction does not show is none.
+      // A rotor that does not show is none.
       const EffectFit* rotor = models.current.joints[j].find(RotorInertia::name);
       if (rotor != nullptr && rotor->linear[0] <= 0) lost |= forget_rotor(models, ids, j);
     }

@@ -69,15 +69,13 @@ double read(const IdentifiedModel& model, const Unknown& u) {
 
 void add_to(IdentifiedModel& model, const Unknown& u, double step) {
   switch (u.kind) {
-    case Unknown::Kind::base: {
-      BaseParameter& base = model.base[u.index];
-      base.value += step;
-      LinkInertia<Real>& link = model.inertia[base.column / parameters_per_link];
-      auto values = to_array(link);
-      values[base.column % parameters_per_link] += step;
-      link = to_inertia(values);
+    case Unknown::Kind::base:
+      add_to_base(model, u.index, step);
       return;
-    }
+    case Unknown::Kind::rotor:
+      value_of(model, u) += step;
+      for (std::size_t k = 0; k < model.base.size(); ++k) add_to_base(model, k, -step * u.in_base[static_cast<Index>(k)]);
+      return;
     case Unknown::Kind::width:
       model.joints[u.joint].sign_width *= std::exp(step);
       return;
@@ -101,9 +99,8 @@ void add_to(IdentifiedModel& model, const Unknown& u, double step) {
 
 }  // namespace
 
-Linearised::Linearised(const Models& models, const std::vector<SessionLog>& logs, std::vector<VectorXd> whitening,
-                       bool for_steps)
-    : models_(models), logs_(&logs), for_steps_(for_steps), whitening_(std::move(whitening)) {
+Linearised::Linearised(const Models& models, const std::vector<SessionLog>& logs, std::vector<VectorXd> whitening)
+    : models_(models), logs_(&logs), whitening_(std::move(whitening)) {
   chain_ = to_dh(models_.current.robot);
   for (const BaseParameter& parameter : models_.current.base)
     base_.columns.push_back(static_cast<Index>(parameter.column));
@@ -211,9 +208,12 @@ void Linearised::make_unknowns() {
         u.change = false;
         u.prior_std = 0;
         u.value = common.joints[j].effects[before].linear[u.index];
-        const bool brought = std::find(models_.rotors.begin(), models_.rotors.end(), j) != models_.rotors.end();
-        if (fit.effect == RotorInertia::name && brought) {
+        const auto rotor = std::find_if(models_.rotors.begin(), models_.rotors.end(),
+                                        [&](const Rotor& r) { return r.joint == j && fit.effect == RotorInertia::name; });
+        if (rotor != models_.rotors.end()) {
           // Where the load is inertia alone nothing tells them apart.
+          u.kind = Unknown::Kind::rotor;
+          u.in_base = rotor->in_base;
           u.prior = 0;
           u.prior_std = rotor_share * joint.rated_torque / std::max(joint.ddq_limit, 1e-9);
         }
@@ -414,9 +414,8 @@ std::vector<MatrixXd> Linearised::base_columns(std::size_t log, const std::vecto
   return out;
 }
 
-/// Base columns of a joint as its torque shows them: with friction in proportion to them,
-///   d tau / d pi = (1 + sum coefficient d phi / d structural) Y,
-/// and through what follows in the torque's path; filtered and decimated.
+/// Base columns of a joint as its torque shows them, through what follows in its path; filtered and decimated. What
+/// depends on the load (friction, a gear that bends) is its own columns' alone, so that it goes with them.
 MatrixXd Linearised::base_rows(std::size_t log, std::size_t joint) const {
   const SessionLog& entry = (*logs_)[log];
   RowCache& cache = *entry.cache;
@@ -428,30 +427,9 @@ MatrixXd Linearised::base_rows(std::size_t log, std::size_t joint) const {
     cache.features.resize(joints());
   });
   const JointFit& fit = (entry.healthy ? models_.healthy : models_.current).joints[joint];
-  std::vector<const EffectFit*> of_load;
-  for (const EffectFit& effect : fit.effects) {
-    const EffectInfo& info = *find_effect(effect.effect);
-    if (for_steps_ && info.acts_on == ActsOn::torque && info.needs_structural && !info.needs_total)
-      of_load.push_back(&effect);
-  }
-  if (of_load.empty() && in_order(fit, true).empty()) return cache.base[joint];
-  MatrixXd columns = std::move(base_columns(log, {joint})[joint]);
-  const Motion& motion = *motions_[log];
-  const auto k = static_cast<Index>(joint);
-  const VectorXd structural = robot_[log]->structural().col(k);
-  const double step = difference * std::max(structural.cwiseAbs().maxCoeff(), 1e-9);
-  VectorXd factor = VectorXd::Ones(structural.size());
-  for (const EffectFit* effect : of_load) {
-    const auto at = [&](double by) {
-      const JointSeries series{motion.q.col(k), motion.dq.col(k), motion.ddq.col(k),
-                               (structural.array() + by).matrix(), motion.step_s};
-      return effect_columns(effect->effect, effect->shape, fit.sign_width, series);
-    };
-    const VectorXd theta = Eigen::Map<const VectorXd>(effect->linear.data(), static_cast<Index>(effect->linear.size()));
-    factor += (at(step) - at(-step)) * theta / (2 * step);
-  }
-  columns = factor.asDiagonal() * columns;
-  return entry.log.decimate(entry.log.filter_columns(follow(log, joint, std::move(columns))));
+  if (in_order(fit, true).empty()) return cache.base[joint];
+  MatrixXd columns = follow(log, joint, std::move(base_columns(log, {joint})[joint]));
+  return entry.log.decimate(entry.log.filter_columns(columns));
 }
 
 void Linearised::make_rows() {
@@ -468,7 +446,7 @@ void Linearised::make_rows() {
       bool felt = u.joint == j && !u.body;
       if (u.kind != Unknown::Kind::width) {
         const EffectInfo& info = *find_effect(fit_of(models_.current, u).effect);
-        felt |= u.body || info.acts_on != ActsOn::torque;
+        felt |= u.body || info.acts_on != ActsOn::torque || u.kind == Unknown::Kind::rotor;
       }
       if (felt) rows.column.push_back(c);
     }
@@ -521,10 +499,11 @@ void Linearised::make_rows() {
       } else {
         const EffectFit& fit = fit_of(model, u);
         const EffectInfo& info = *find_effect(fit.effect);
-        if (by_difference(info)) {
+        if (by_difference(info) || u.kind == Unknown::Kind::rotor) {
           // One-sided: half the work. Away from the bound of a shape.
           IdentifiedModel more = model;
-          const double value = u.kind == Unknown::Kind::shape ? 1.0 : std::max(std::fabs(u.value), 1e-6);
+          double value = u.kind == Unknown::Kind::shape ? 1.0 : std::max(std::fabs(u.value), 1e-6);
+          if (u.kind == Unknown::Kind::rotor) value = std::max(value, u.prior_std);
           double step = difference * value;
           if (u.kind == Unknown::Kind::shape && fit.shape[u.index] * std::exp(step) > u.upper) step = -step;
           add_to(more, u, step);
@@ -567,7 +546,7 @@ void Linearised::make_rows() {
   VectorXd x0(columns_);
   for (Index c = 0; c < columns_; ++c) {
     const Unknown& u = unknowns_[static_cast<std::size_t>(c)];
-    x0[c] = u.kind == Unknown::Kind::linear || u.kind == Unknown::Kind::base ? u.value : 0;
+    x0[c] = u.kind == Unknown::Kind::shape || u.kind == Unknown::Kind::width ? 0 : u.value;
   }
   std::vector<Index> all;
   const Index columns_at_start = columns_;
@@ -884,6 +863,15 @@ MatrixXd Linearised::gram(Index first, Index count) const {
       out += weights_[static_cast<Index>(j)] * rows.sums[b].gram.block(at, at, count, count);
   }
   return out;
+}
+
+void add_to_base(IdentifiedModel& model, std::size_t parameter, double step) {
+  BaseParameter& base = model.base[parameter];
+  base.value += step;
+  LinkInertia<Real>& link = model.inertia[base.column / parameters_per_link];
+  auto values = to_array(link);
+  values[base.column % parameters_per_link] += step;
+  link = to_inertia(values);
 }
 
 MatrixXd base_covariance(const Linearised& at) {

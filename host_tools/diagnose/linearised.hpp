@@ -13,6 +13,13 @@
 
 namespace fxdyn::diagnosis {
 
+/// A rotor that is part of the base parameters: what only the link's torque does (friction in proportion to the load, a
+/// gear that bends) tells them apart. See name().
+struct Rotor {
+  std::size_t joint = 0;
+  Eigen::VectorXd in_base;  ///< base parameters of a rotor of 1 kg m^2 (kg)
+};
+
 /// Two states of one robot: before (the baseline, a session known to be healthy) and now. Base parameters are the same;
 /// friction may differ a little, named effects are in `current` only. Without a baseline `healthy` is not used.
 struct Models {
@@ -20,7 +27,7 @@ struct Models {
   bool has_baseline = false;
   std::vector<EffectCandidate> fixed;   ///< what a link encoder gave: the torque does not change it
   std::vector<std::size_t> background;  ///< joints whose healthy session has structure that no effect explains
-  std::vector<std::size_t> rotors;      ///< joints whose rotor is told from the link by load friction alone, see name()
+  std::vector<Rotor> rotors;
   double smallest_step_s = 1;           ///< of all logs and of the drive's tick: what bounds a delay
 };
 
@@ -59,6 +66,7 @@ struct Unknown {
     linear,  ///< coefficient of an effect
     width,   ///< logarithm of a joint's sign width
     shape,   ///< logarithm of an effect's shape parameter
+    rotor,   ///< inertia that is the rotor's and not the link's: the base parameters give what it takes
   };
   Kind kind = Kind::base;
   std::size_t joint = 0, effect = 0, index = 0;  ///< base: index; shape and linear: of the current model's effect
@@ -66,6 +74,7 @@ struct Unknown {
   bool body = false;                             ///< effect of IdentifiedModel::body
   bool change = false;                           ///< what the current session has more than the healthy one
   double upper = 1e300;                          ///< shape: what it may be at most
+  Eigen::VectorXd in_base{};                     ///< rotor: see Rotor
   double value = 0;                              ///< in the model; 0 for logarithms, whose steps are fitted
   double prior = 0, prior_std = 0;               ///< std 0: none
 };
@@ -125,10 +134,7 @@ class Linearised {
  public:
   /// @param whitening per joint the autoregressive coefficients; empty: from the residual of the nuisance and the
   /// model's named effects (of the healthy session where there is one).
-  /// @param for_steps base parameters have their part in friction that grows with the load: for Gauss-Newton's steps.
-  /// Else that friction is its own columns' alone, so that it goes with them.
-  Linearised(const Models& models, const std::vector<SessionLog>& logs, std::vector<Eigen::VectorXd> whitening = {},
-             bool for_steps = false);
+  Linearised(const Models& models, const std::vector<SessionLog>& logs, std::vector<Eigen::VectorXd> whitening = {});
 
   std::size_t joints() const { return rows_.size(); }
   Eigen::Index columns() const { return columns_; }
@@ -201,7 +207,6 @@ class Linearised {
 
   Models models_;
   const std::vector<SessionLog>* logs_;
-  bool for_steps_;
   DhChain chain_;
   BaseSet base_;
   std::vector<Unknown> unknowns_;
@@ -223,6 +228,9 @@ class Linearised {
 
 /// Of the base parameters, whatever else is fitted.
 Eigen::MatrixXd base_covariance(const Linearised& at);
+
+/// Adds to a base parameter of a model and to the inertia that stands for it.
+void add_to_base(IdentifiedModel& model, std::size_t parameter, double step);
 
 /// What a fit over nuisance and named effects makes of the models: x at `columns` (places of unknowns).
 void update(Models& models, const Linearised& at, const LinearFit& fit, double share);

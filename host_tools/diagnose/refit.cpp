@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 
+#include "host_tools/identify/regressor.hpp"
 #include "host_tools/identify/solver.hpp"
 #include "host_tools/model/effects.hpp"
 
@@ -70,7 +71,7 @@ void refit(Models& models, const std::vector<SessionLog>& all, const std::vector
   double least = 1e300, share = 1;
   int halvings = 0;
   for (int round = 0;; ++round) {
-    auto at = std::make_unique<Linearised>(models, logs, whitening, true);
+    auto at = std::make_unique<Linearised>(models, logs, whitening);
     whitening = at->whitening();  // one for all rounds, else their misfits can't be compared
     const double now = misfit(*at);
     if (now < least) {
@@ -98,6 +99,16 @@ void refit(Models& models, const std::vector<SessionLog>& all, const std::vector
   }
 }
 
+namespace {
+
+/// Effects of the link's torque: the rotor has no part in them.
+bool tells_rotor(std::string_view effect) {
+  const EffectInfo& info = *find_effect(effect);
+  return info.needs_structural;
+}
+
+}  // namespace
+
 EffectId name(Models& models, const Group& group, const VectorXd& theta) {
   EffectFit fit;
   fit.effect = group.candidate.effect;
@@ -118,13 +129,19 @@ EffectId name(Models& models, const Group& group, const VectorXd& theta) {
   auto& effects = group.on_body ? models.current.body : models.current.joints[joint].effects;
   effects.push_back(std::move(fit));
   const EffectId id{group.on_body, joint, effects.size() - 1};
-  if (group.candidate.effect == LoadFriction::name && models.current.joints[joint].find(RotorInertia::name) == nullptr) {
+  const JointFit& of = models.current.joints[joint];
+  if (!group.on_body && tells_rotor(group.candidate.effect) && of.find(RotorInertia::name) == nullptr) {
+    BaseSet base;
+    for (const BaseParameter& parameter : models.current.base)
+      base.columns.push_back(static_cast<Index>(parameter.column));
+    Rotor brought{joint, rotor_in_base(to_dh(models.current.robot), base, static_cast<Index>(joint))};
+    if (brought.in_base.size() == 0) return id;
     EffectFit rotor;
     rotor.effect = RotorInertia::name;
     rotor.linear = {0};
     effects.push_back(rotor);
     if (models.has_baseline) models.healthy.joints[joint].effects.push_back(rotor);
-    models.rotors.push_back(joint);
+    models.rotors.push_back(std::move(brought));
   }
   return id;
 }
@@ -142,22 +159,29 @@ void remove(Models& models, std::vector<EffectId>& ids, const EffectId& id) {
 }  // namespace
 
 void take_back(Models& models, std::vector<EffectId>& ids, const EffectId& id) {
-  const auto& effects = id.body ? models.current.body : models.current.joints[id.joint].effects;
-  const bool of_load = effects[id.effect].effect == LoadFriction::name;
   remove(models, ids, id);
-  if (of_load && models.current.joints[id.joint].find(LoadFriction::name) == nullptr)
+  if (id.body) return;
+  const auto& left = models.current.joints[id.joint].effects;
+  if (std::none_of(left.begin(), left.end(), [](const EffectFit& fit) { return tells_rotor(fit.effect); }))
     forget_rotor(models, ids, id.joint);
 }
 
 bool forget_rotor(Models& models, std::vector<EffectId>& ids, std::size_t joint) {
-  const auto it = std::find(models.rotors.begin(), models.rotors.end(), joint);
+  const auto it =
+      std::find_if(models.rotors.begin(), models.rotors.end(), [&](const Rotor& r) { return r.joint == joint; });
   if (it == models.rotors.end()) return false;
-  models.rotors.erase(it);
   const auto is_rotor = [](const EffectFit& fit) { return fit.effect == RotorInertia::name; };
   const auto& effects = models.current.joints[joint].effects;
   const auto at = std::find_if(effects.begin(), effects.end(), is_rotor);
+  const double inertia = at->linear[0];
+  // The base parameters have it back.
+  for (IdentifiedModel* model : {&models.current, &models.healthy}) {
+    for (std::size_t k = 0; k < model->base.size(); ++k)
+      add_to_base(*model, k, inertia * it->in_base[static_cast<Index>(k)]);
+  }
   remove(models, ids, {false, joint, static_cast<std::size_t>(at - effects.begin())});
   if (models.has_baseline) std::erase_if(models.healthy.joints[joint].effects, is_rotor);
+  models.rotors.erase(it);
   return true;
 }
 

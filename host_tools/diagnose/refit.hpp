@@ -10,9 +10,9 @@ namespace fxdyn::diagnosis {
 void refit(Models& models, const std::vector<SessionLog>& logs, const std::vector<Eigen::VectorXd>& whitening,
            int rounds);
 
-/// Puts an effect into the current model as one that was named. Payload is given in mass and first moment. Friction in
-/// proportion to the load brings the rotor's inertia with it where that is part of the base parameters: the gear carries
-/// the link, not the rotor.
+/// Puts an effect into the current model as one that was named. Payload is given in mass and first moment. What the
+/// link's torque does (friction in proportion to the load, a gear that bends) brings the rotor's inertia with it where
+/// that is part of the base parameters: the gear carries the link, not the rotor.
 EffectId name(Models& models, const Group& group, const Eigen::VectorXd& theta);
 /// Takes a named effect out of the current model; `ids` of others follow.
 void take_back(Models& models, std::vector<EffectId>& ids, const EffectId& id);

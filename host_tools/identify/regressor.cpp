@@ -112,15 +112,18 @@ BaseSet find_base(const DhChain& chain) {
   return base;
 }
 
-bool rotor_inertia_is_absorbed(const DhChain& chain, const BaseSet& base, Eigen::Index joint) {
+Eigen::VectorXd rotor_in_base(const DhChain& chain, const BaseSet& base, Eigen::Index joint) {
   const RandomMotions motions = random_motions(chain);
   const Eigen::Index n = motions.ddq.cols();
   Eigen::VectorXd column = Eigen::VectorXd::Zero(motions.y.rows());
   for (Eigen::Index k = 0; k < motions.ddq.rows(); ++k) column[k * n + joint] = motions.ddq(k, joint);
   const Eigen::MatrixXd y = motions.y(Eigen::all, base.columns);
-  const Eigen::VectorXd rest =
-      column - y * Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(y).solve(Eigen::MatrixXd(column)).col(0);
-  return rest.norm() < 1e-8 * column.norm();
+  Eigen::VectorXd c = Eigen::ColPivHouseholderQR<Eigen::MatrixXd>(y).solve(Eigen::MatrixXd(column)).col(0);
+  return (column - y * c).norm() < 1e-8 * column.norm() ? c : Eigen::VectorXd();
+}
+
+bool rotor_inertia_is_absorbed(const DhChain& chain, const BaseSet& base, Eigen::Index joint) {
+  return rotor_in_base(chain, base, joint).size() > 0;
 }
 
 std::string parameter_name(Eigen::Index column) {
