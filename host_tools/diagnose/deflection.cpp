@@ -177,7 +177,7 @@ struct Set {
   VectorXd std;
   double square = 1e300, score = -1e300;
   double likelihood = -1e300;  ///< score whatever the signs of the coefficients
-  double noise = 0;  ///< variance of the whitened residual
+  double noise = 0;            ///< variance of the whitened residual
 };
 
 MatrixXd design(const Rows& rows, const std::vector<Part>& parts) {
@@ -297,8 +297,7 @@ Moved move_load(const Rows& start, const VectorXd& a, const Set& from) {
     x = rows.whiten(x, a);
     MatrixXd gram = x.transpose() * x;
     // What the load at z makes stays on the other side; a priori z is 0 with variance 1.
-    const VectorXd right =
-        x.transpose() * (rows.whiten(rows.delta, a) + x.rightCols(rows.z.size()) * rows.z);
+    const VectorXd right = x.transpose() * (rows.whiten(rows.delta, a) + x.rightCols(rows.z.size()) * rows.z);
     const VectorXd free = (1 + gram.diagonal().tail(rows.z.size()).array() / best.set.noise).log();
     best.score = -cost - free.sum();
     best.z = rows.z;

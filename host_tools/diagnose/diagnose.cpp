@@ -82,7 +82,6 @@ void add_deviations(Models& models, const Linearised& at) {
   }
 }
 
-
 /// In residuals with structure neighbouring rows say the same: a column counts as the residual's slowest part does.
 ///   variance of a mean / that of white noise = S(0) / r(0)
 VectorXd diluted(const Linearised& at) {
@@ -98,9 +97,11 @@ VectorXd diluted(const Linearised& at) {
       r0 += x.squaredNorm();
       // Bartlett's window over two seconds
       const ProcessedLog& log = at.logs()[b.log].log;
-      const auto span = std::min<Index>(b.count, static_cast<Index>(2 / (log.step_s * static_cast<double>(log.decimation))));
+      const auto span =
+          std::min<Index>(b.count, static_cast<Index>(2 / (log.step_s * static_cast<double>(log.decimation))));
       for (Index lag = 1; lag < span; ++lag)
-        sum += 2 * (1 - static_cast<double>(lag) / static_cast<double>(span)) * x.head(b.count - lag).dot(x.tail(b.count - lag));
+        sum += 2 * (1 - static_cast<double>(lag) / static_cast<double>(span)) *
+               x.head(b.count - lag).dot(x.tail(b.count - lag));
     }
     if (r0 > 0) weights[static_cast<Index>(j)] /= std::max(1.0, 1 + sum / r0);
   }
@@ -115,7 +116,8 @@ class Work {
       : project_(project), data_(data), baseline_(baseline), test_(test), still_(still), progress_(progress) {
     models_.has_baseline = !baseline_.empty();
     models_.smallest_step_s = project_.target.tick_s;
-    for (const std::vector<ProcessedLog>* logs : {static_cast<const std::vector<ProcessedLog>*>(&data_.logs), &baseline_, &test_}) {
+    for (const std::vector<ProcessedLog>* logs :
+         {static_cast<const std::vector<ProcessedLog>*>(&data_.logs), &baseline_, &test_}) {
       for (const ProcessedLog& log : *logs) models_.smallest_step_s = std::min(models_.smallest_step_s, log.step_s);
     }
     settings_.max_effects = static_cast<std::size_t>(project_.diagnose.max_effects);
@@ -173,8 +175,7 @@ class Work {
       const auto changed = changed_parameters(*outcome.at);
       notes_.insert(notes_.end(), changed.begin(), changed.end());
     }
-    result.report = verdicts(
-        {result.nominal, result.model, outcome, gate, deflections_, still_, data_.logs, test_});
+    result.report = verdicts({result.nominal, result.model, outcome, gate, deflections_, still_, data_.logs, test_});
     for (std::size_t j = 0; j < joints(); ++j) {
       // What stands still has no friction that these logs tell.
       if (!still_[j]) continue;

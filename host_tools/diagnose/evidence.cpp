@@ -60,7 +60,8 @@ class Firmware {
   std::optional<Formats> unloaded_;
 };
 
-/// Setpoints outside of the limits that the tables hold: the firmware clamps them, and its torque is that of another motion.
+/// Setpoints outside of the limits that the tables hold: the firmware clamps them, and its torque is that of another
+/// motion.
 std::vector<std::string> clamped(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs) {
   constexpr double worth_a_word = 1e-3;  // of the samples
   std::vector<std::string> out;
@@ -80,9 +81,10 @@ std::vector<std::string> clamped(const IdentifiedModel& model, const std::vector
     for (int i = 0; i < 3; ++i) {
       const double share = static_cast<double>(beyond[i]) / static_cast<double>(std::max<Index>(all, 1));
       if (share < worth_a_word) continue;
-      out.push_back(fmt::format("{}: {:.1f} % of the held-out samples are beyond its {} limit, where the firmware clamps; "
-                                "[limits] sets wider ones",
-                                model.robot.joints[j].name, 100 * share, names[i]));
+      out.push_back(
+          fmt::format("{}: {:.1f} % of the held-out samples are beyond its {} limit, where the firmware clamps; "
+                      "[limits] sets wider ones",
+                      model.robot.joints[j].name, 100 * share, names[i]));
     }
   }
   return out;
@@ -121,7 +123,9 @@ json evidence_json(const IdentifiedModel& nominal, const IdentifiedModel& diagno
   }
   for (std::size_t j = 0; j < diagnosed.robot.size() && !judged.empty(); ++j) {
     // Of what stands still these logs tell nothing.
-    const auto figure = [&](const Pooled& of) { return j < still.size() && still[j] ? json(nullptr) : of.rms(j, judged.size()); };
+    const auto figure = [&](const Pooled& of) {
+      return j < still.size() && still[j] ? json(nullptr) : of.rms(j, judged.size());
+    };
     joints.push_back({{"joint", diagnosed.robot.joints[j].name},
                       {"index", j + 1},
                       {"unit", diagnosed.robot.joints[j].torque_unit()},

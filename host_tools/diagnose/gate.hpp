@@ -35,8 +35,8 @@ struct Gate {
 };
 
 /// Judges each fold by a fit of the others; time constants of drift are chosen by that, and names that do not hold are
-/// taken out of the outcome one by one: those that bring nothing, and at joints whose plain error on the validate logs is
-/// larger than that of `nominal` (rows near standstill, of which the search believes little, count there too).
+/// taken out of the outcome one by one: those that bring nothing, and at joints whose plain error on the validate logs
+/// is larger than that of `nominal` (rows near standstill, of which the search believes little, count there too).
 Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs,
           const std::vector<bool>& still);
 

@@ -327,10 +327,9 @@ double structured_share(const Linearised& at, std::size_t joint, const LinearFit
     if (eigen.eigenvalues()[i] > 1e-4) along[i] /= std::sqrt(eigen.eigenvalues()[i]);
   }
   const VectorXd rest = e - f * size.cwiseProduct(eigen.eigenvectors() * along);
-  const double of_time = std::max(lines(at, rest, blocks).share,
-                                  at.models().has_baseline
-                                      ? slow(at, rest + (at.residual(joint, fit) - e), blocks).share
-                                      : 0.0);
+  const double of_time =
+      std::max(lines(at, rest, blocks).share,
+               at.models().has_baseline ? slow(at, rest + (at.residual(joint, fit) - e), blocks).share : 0.0);
   return of_state + (1 - of_state) * std::clamp(of_time, 0.0, 1.0);
 }
 

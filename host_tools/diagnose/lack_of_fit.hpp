@@ -19,8 +19,8 @@ struct LackOfFit {
 /// the same residual at other times, so that noise of any colour counts as noise.
 LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& fit, const Eigen::MatrixXd& features);
 
-/// Share of the squared residual of a fit on the blocks that is a function of the state, or of the rest a matter of time
-/// (lines, slow changes), the expected part of noise taken off; 0..1.
+/// Share of the squared residual of a fit on the blocks that is a function of the state, or of the rest a matter of
+/// time (lines, slow changes), the expected part of noise taken off; 0..1.
 double structured_share(const Linearised& at, std::size_t joint, const LinearFit& fit, const Eigen::MatrixXd& features,
                         const std::vector<std::size_t>& blocks);
 

@@ -74,7 +74,8 @@ void add_to(IdentifiedModel& model, const Unknown& u, double step) {
       return;
     case Unknown::Kind::rotor:
       value_of(model, u) += step;
-      for (std::size_t k = 0; k < model.base.size(); ++k) add_to_base(model, k, -step * u.in_base[static_cast<Index>(k)]);
+      for (std::size_t k = 0; k < model.base.size(); ++k)
+        add_to_base(model, k, -step * u.in_base[static_cast<Index>(k)]);
       return;
     case Unknown::Kind::width:
       model.joints[u.joint].sign_width *= std::exp(step);
@@ -208,8 +209,9 @@ void Linearised::make_unknowns() {
         u.change = false;
         u.prior_std = 0;
         u.value = common.joints[j].effects[before].linear[u.index];
-        const auto rotor = std::find_if(models_.rotors.begin(), models_.rotors.end(),
-                                        [&](const Rotor& r) { return r.joint == j && fit.effect == RotorInertia::name; });
+        const auto rotor = std::find_if(models_.rotors.begin(), models_.rotors.end(), [&](const Rotor& r) {
+          return r.joint == j && fit.effect == RotorInertia::name;
+        });
         if (rotor != models_.rotors.end()) {
           // Where the load is inertia alone nothing tells them apart.
           u.kind = Unknown::Kind::rotor;
@@ -353,8 +355,8 @@ double Linearised::log_scale(std::size_t joint) const {
 ///   u = E[(tau(dq + sigma_dq n) - tau(dq))^2] / sigma^2, n of variance 1:
 /// while sigma_dq is small beside the sign's width its slope counts; else the chance of the wrong sign,
 ///   4 F^2 Phi(-|dq| / sigma_dq), F the friction that turns with it.
-/// sigma_dq is what the position filter leaves of the encoder's noise. An encoder that steps more slowly than the filter
-/// is a staircase, no white noise: its velocity is wrong by sqrt(2) cutoff step.
+/// sigma_dq is what the position filter leaves of the encoder's noise. An encoder that steps more slowly than the
+/// filter is a staircase, no white noise: its velocity is wrong by sqrt(2) cutoff step.
 VectorXd Linearised::doubt(std::size_t log, std::size_t joint, double sigma) const {
   const SessionLog& entry = (*logs_)[log];
   const ProcessedLog& l = entry.log;
@@ -593,8 +595,7 @@ void Linearised::make_rows() {
       const VectorXd u = doubt(l, j, sigma);
       doubts[j].segment(b.first, b.count) = u;
       const bool use = models_.has_baseline ? b.healthy : b.fits;
-      if (use)
-        parts.emplace_back((e.segment(b.first, b.count).array() / (1 + u.array()).sqrt()).matrix());
+      if (use) parts.emplace_back((e.segment(b.first, b.count).array() / (1 + u.array()).sqrt()).matrix());
     }
     coefficients[j] = autoregression(parts);
   });

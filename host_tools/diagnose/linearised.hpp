@@ -28,7 +28,7 @@ struct Models {
   std::vector<EffectCandidate> fixed;   ///< what a link encoder gave: the torque does not change it
   std::vector<std::size_t> background;  ///< joints whose healthy session has structure that no effect explains
   std::vector<Rotor> rotors;
-  double smallest_step_s = 1;           ///< of all logs and of the drive's tick: what bounds a delay
+  double smallest_step_s = 1;  ///< of all logs and of the drive's tick: what bounds a delay
 };
 
 /// An effect of Models::current: of joints[joint].effects, or of body.
@@ -83,7 +83,7 @@ struct Unknown {
 struct Group {
   EffectCandidate candidate;
   bool on_body = false;
-  bool in_model = false;        ///< columns are d torque / d (unknown) around the named effect `id`
+  bool in_model = false;  ///< columns are d torque / d (unknown) around the named effect `id`
   EffectId id{};
   Eigen::Index first = 0;       ///< column
   Eigen::Index count = 0;       ///< columns

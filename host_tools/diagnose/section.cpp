@@ -140,7 +140,8 @@ std::string evidence_section(const json& evidence) {
   if (!files.empty()) out += paragraph("Logs: " + files + ".");
   if (evidence.contains("note")) out += paragraph("Note: " + evidence.value("note", "") + ".");
   const json fixed = evidence.value("fixed_point", json::object());
-  for (const json& note : fixed.value("notes", json::array())) out += paragraph("Fixed point: " + note.get<std::string>() + ".");
+  for (const json& note : fixed.value("notes", json::array()))
+    out += paragraph("Fixed point: " + note.get<std::string>() + ".");
   if (fixed.contains("why_not")) out += paragraph("No fixed point: " + fixed.value("why_not", "") + ".");
   return out;
 }

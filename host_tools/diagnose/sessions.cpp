@@ -26,8 +26,8 @@ constexpr int blocks_of_one_log = 5;
 /// A robot that rested longer has cooled.
 constexpr double longest_pause_s = 1800;
 
-/// Positions without what is faster than the motion by far: noise in regressors is taken for structure, and what a coarse
-/// encoder makes of the acceleration may be more than the torque's own noise.
+/// Positions without what is faster than the motion by far: noise in regressors is taken for structure, and what a
+/// coarse encoder makes of the acceleration may be more than the torque's own noise.
 void smooth(ProcessedLog& log) {
   constexpr double above_motion = 12, lowest_hz = 2, edges = 3;
   double& cutoff = log.filter.position_cutoff_hz;
@@ -84,10 +84,10 @@ void check_lengths(const std::vector<SessionLog>& logs) {
   }
   for (const bool healthy : {false, true}) {
     if (count[healthy] == 0 || seconds[healthy] >= shortest_s) continue;
-    throw DataError(
-        fmt::format("role = \"{}\": {:.1f} s (after filtering) are too short to tell anything from; record 40 s, {:g} s at "
-                    "least",
-                    healthy ? "baseline" : "train", seconds[healthy], shortest_s));
+    throw DataError(fmt::format(
+        "role = \"{}\": {:.1f} s (after filtering) are too short to tell anything from; record 40 s, {:g} s at "
+        "least",
+        healthy ? "baseline" : "train", seconds[healthy], shortest_s));
   }
   if (count[0] + judging > 1 || seconds[0] >= blocks_of_one_log * shortest_block_s) return;
   throw DataError(

@@ -87,10 +87,10 @@ class Teller {
     const auto any = [&](const char* verdict) {
       return std::any_of(joints.begin(), joints.end(), [&](const json& joint) { return joint["verdict"] == verdict; });
     };
-    const char* verdict = any("unexplained") || !resembles.empty()           ? "unexplained"
+    const char* verdict = any("unexplained") || !resembles.empty()                ? "unexplained"
                           : any("effects_found") || any_effect_ || !robot.empty() ? "effects_found"
-                          : any("not_excited")                                ? "not_excited"
-                                                                              : "nothing_missing";
+                          : any("not_excited")                                    ? "not_excited"
+                                                                                  : "nothing_missing";
     return {{"schema", "fxdyn.diagnosis/1"},
             {"verdict", verdict},
             {"joints", joints},
@@ -122,8 +122,8 @@ class Teller {
 
   json effect_json(const EffectFit& fit, const EffectId& id, double closed) {
     json alternatives = json::array();
-    const auto found = std::find_if(t_.outcome.found.begin(), t_.outcome.found.end(),
-                                    [&](const Finding& f) { return f.id == id; });
+    const auto found =
+        std::find_if(t_.outcome.found.begin(), t_.outcome.found.end(), [&](const Finding& f) { return f.id == id; });
     const bool known = found != t_.outcome.found.end();
     for (const Alternative& a : known ? found->alternatives : std::vector<Alternative>{}) {
       const bool body = find_effect(a.candidate.effect)->acts_on == ActsOn::body;
@@ -132,7 +132,8 @@ class Teller {
       alternatives.push_back(a.candidate.effect);
       const std::size_t joint = id.body && !body ? a.candidate.joint : id.joint;
       const std::string place = id.body && body ? "" : fmt::format(" at joint {}", joint + 1);
-      advise(fmt::format("{} or {}{}: {}", fit.effect, a.candidate.effect, place, cure(fit.effect, a.candidate.effect)));
+      advise(
+          fmt::format("{} or {}{}: {}", fit.effect, a.candidate.effect, place, cure(fit.effect, a.candidate.effect)));
     }
     return {{"effect", fit.effect},
             {"parameters", parameters_json(fit, joint_of(id.joint))},
@@ -213,13 +214,15 @@ class Teller {
     const std::string verdict = unexplained ? "unexplained" : !effects.empty() ? "effects_found" : "nothing_missing";
     any_effect_ |= !effects.empty();
     // What only bends leaves no gap in the torque, and noise alone has nothing to close.
-    const bool of_torque = !resembles.empty() || robot_reaches(k) || unexplained ||
-                           std::any_of(effects.begin(), effects.end(), [](const json& e) { return !e.contains("signal"); });
+    const bool of_torque =
+        !resembles.empty() || robot_reaches(k) || unexplained ||
+        std::any_of(effects.begin(), effects.end(), [](const json& e) { return !e.contains("signal"); });
     const json closure = of_torque ? json(t_.gate.closure[k]) : json(nullptr);
     if (!effects.empty() && !blocks_only_ && !t_.test.empty() && rms_after > risen * rms_before) {
-      notes_.push_back(fmt::format(
-          "{}: on the test logs the error rises from {:.3g} to {:.3g} {}: what was found does not carry over to their motion",
-          joint_of(j).name, rms_before, rms_after, joint_of(j).torque_unit()));
+      notes_.push_back(
+          fmt::format("{}: on the test logs the error rises from {:.3g} to {:.3g} {}: what was found does not carry "
+                      "over to their motion",
+                      joint_of(j).name, rms_before, rms_after, joint_of(j).torque_unit()));
     }
     std::sort(effects.begin(), effects.end(), [](const json& a, const json& b) { return a["score"] > b["score"]; });
     json regions = json::array();
@@ -229,7 +232,8 @@ class Teller {
     if (unexplained && doubtful > much_doubt) {
       const double step = t_.now.front().filter.encoder_step[j];
       notes_.push_back(fmt::format(
-          "{}: in {:.0f} % of the rows the encoder{} does not tell which way it moves; what is unexplained may be that: faster "
+          "{}: in {:.0f} % of the rows the encoder{} does not tell which way it moves; what is unexplained may be "
+          "that: faster "
           "motion or a finer encoder would tell",
           joint_of(j).name, 100 * doubtful,
           step > 0 ? fmt::format(" (steps of {:.2g} {})", step, joint_of(j).position_unit()) : std::string()));
@@ -260,7 +264,8 @@ class Teller {
   bool robot_reaches(Index joint) const {
     for (std::size_t i = 0; i < t_.gate.groups.size(); ++i) {
       const Group& group = at_.groups()[t_.gate.groups[i]];
-      if (group.on_body && t_.model.body[group.id.effect].named && t_.gate.held.alone[i][joint] > least_felt) return true;
+      if (group.on_body && t_.model.body[group.id.effect].named && t_.gate.held.alone[i][joint] > least_felt)
+        return true;
     }
     return false;
   }
@@ -315,10 +320,11 @@ std::vector<std::string> changed_parameters(const Linearised& at) {
     const Joint& joint = models.current.robot.joints[u.joint];
     const ParameterInfo& p = find_effect(now.effect)->linear[u.index];
     const double today = now.linear[u.index];
-    out.push_back(fmt::format("{}: {} ({}) is {:.4g} {}, {:.4g} in the baseline: more than friction differs from session to "
-                              "session, and part of the nominal model",
-                              joint.name, now.effect, p.name, today,
-                              joint.type == JointType::revolute ? p.unit : p.unit_prismatic, today - u.value));
+    out.push_back(
+        fmt::format("{}: {} ({}) is {:.4g} {}, {:.4g} in the baseline: more than friction differs from session to "
+                    "session, and part of the nominal model",
+                    joint.name, now.effect, p.name, today,
+                    joint.type == JointType::revolute ? p.unit : p.unit_prismatic, today - u.value));
   }
   return out;
 }

@@ -113,6 +113,7 @@ BaseSet find_base(const DhChain& chain) {
 }
 
 Eigen::VectorXd rotor_in_base(const DhChain& chain, const BaseSet& base, Eigen::Index joint) {
+  if (base.columns.empty()) return {};
   const RandomMotions motions = random_motions(chain);
   const Eigen::Index n = motions.ddq.cols();
   Eigen::VectorXd column = Eigen::VectorXd::Zero(motions.y.rows());

@@ -172,11 +172,15 @@ class Header {
     }
     if (complete) layout_.columns[signal] = columns;
     const std::string next = fmt::format("{}{}", name, joints + 1);
-    const auto has = [&](const std::string& column) { return std::find(names_.begin(), names_.end(), column) != names_.end(); };
+    const auto has = [&](const std::string& column) {
+      return std::find(names_.begin(), names_.end(), column) != names_.end();
+    };
     if (signal == q && has(name + "1") && has(next)) {
-      throw InputError(fmt::format(
-          "{}:{}: column '{}', but the robot has {} moving joints; is this another robot's log? Else remove the columns of "
-          "joints that the URDF does not have", file_, line_, next, joints));
+      throw InputError(
+          fmt::format("{}:{}: column '{}', but the robot has {} moving joints; is this another robot's log? Else "
+                      "remove the columns of "
+                      "joints that the URDF does not have",
+                      file_, line_, next, joints));
     }
   }
 

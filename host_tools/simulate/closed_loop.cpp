@@ -119,8 +119,7 @@ class Plant {
     a_ = (v - v_) / h_;
     q_ += 0.5 * h_ * (v_ + v);
     v_ = v;
-    if (!v_.allFinite() || v_.cwiseAbs().maxCoeff() > 1e6)
-      throw RunsAway();
+    if (!v_.allFinite() || v_.cwiseAbs().maxCoeff() > 1e6) throw RunsAway();
     take(q_m, v_, a_);
     evaluator_.tick(states_, saturations_);  // for the effects' states
   }

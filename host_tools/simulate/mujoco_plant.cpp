@@ -115,8 +115,7 @@ class ControlledRobot {
       data.qfrc_applied[robot_.motor[static_cast<std::size_t>(j)]] = applied[j];
     mj_step(robot_.model.get(), &data);
     for (const int warning : {mjWARN_BADQPOS, mjWARN_BADQVEL, mjWARN_BADQACC}) {
-      if (data.warning[warning].number > 0)
-        throw RunsAway();
+      if (data.warning[warning].number > 0) throw RunsAway();
     }
     read();
   }

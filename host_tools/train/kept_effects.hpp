@@ -5,9 +5,8 @@
 namespace fxdyn {
 
 /// What diagnosis found and the Fitter has no columns for: effects on position or body, those that need the structural
-/// or the total torque, a rotor that only the load's friction tells from the link, and drift in a session that was warm when
-/// a log began. They stay as they are while everything
-/// else is fitted again.
+/// or the total torque, a rotor that only the load's friction tells from the link, and drift in a session that was warm
+/// when a log began. They stay as they are while everything else is fitted again.
 class KeptEffects {
  public:
   /// @param logs on which is fitted

@@ -85,7 +85,8 @@ TEST(Diagnosis, AGearThatBentBeforeIsNoFinding) {
 TEST(Diagnosis, LoadFrictionLeavesOutTheRotor) {
   if (test::sanitized) GTEST_SKIP() << "other cases run the same code";
   // The shoulder's rotor can't be told from the link but by this.
-  const auto out = test::diagnose_sessions("load_friction", {.missing = effect("load_friction", 1, "coefficient = 0.15")});
+  const auto out =
+      test::diagnose_sessions("load_friction", {.missing = effect("load_friction", 1, "coefficient = 0.15")});
   const json report = json::parse(read_file(out / "diagnosis.json"));
   const IdentifiedModel model = read_model(out / "model.json");
   const EffectFit* rotor = model.joints[0].find("rotor_inertia");

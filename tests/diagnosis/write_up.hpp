@@ -23,7 +23,6 @@ std::vector<Figure> figures(const std::vector<nlohmann::json>& results);
 
 /// The page for docs/findings: figures, confusion matrices, the cases that failed.
 /// @param commit what the program was built from
-std::string write_up(const std::vector<nlohmann::json>& results, const std::string& command,
-                     const std::string& commit);
+std::string write_up(const std::vector<nlohmann::json>& results, const std::string& command, const std::string& commit);
 
 }  // namespace fxdyn::campaign

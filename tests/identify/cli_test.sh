@@ -57,7 +57,7 @@ awk -F, 'BEGIN { OFS = "," } NR > 1 { $5 = 0 } { print }' "$work/good.csv" >"$wo
 project zero.toml '[[log]]' 'file = "zero.csv"' 'role = "train"'
 run 1 "torque of joint 2 (second) never changes" zero.toml
 project few.toml '[signals]' 'position_cutoff_hz = 100' 'torque_cutoff_hz = 100' 'edge_s = 0.001' '[[log]]' 'file = "good.csv"' 'role = "train"' 'to_s = 0.026'
-run 1 "parameters" few.toml
+run 1 "too short" few.toml
 project twice.toml '[identify]' 'effects = ["viscous", "viscous"]' '[[log]]' 'file = "good.csv"' 'role = "train"'
 run 2 "there twice" twice.toml
 make short.csv 0.7 12

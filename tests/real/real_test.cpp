@@ -47,7 +47,8 @@ TEST_P(Real, HeldOutErrorIsNoWorseThanTheBaseline) {
       for (std::size_t j = 0; j < set.baseline.size(); ++j) {
         const double rmse = log.at("joints").at(j).at("rmse"), ratio = rmse / set.baseline[j];
         sum += std::log(ratio);
-        fmt::print(" {:.3g} ({:.1f} %, x{:.2f})", rmse, 100 * log.at("joints").at(j).at("relative").get<double>(), ratio);
+        fmt::print(" {:.3g} ({:.1f} %, x{:.2f})", rmse, 100 * log.at("joints").at(j).at("relative").get<double>(),
+                   ratio);
       }
     }
     const double mean = std::exp(sum / static_cast<double>(set.baseline.size()));
