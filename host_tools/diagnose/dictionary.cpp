@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "host_tools/diagnose/search.hpp"
+#include "host_tools/identify/regressor.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/parallel.hpp"
 
@@ -93,6 +94,14 @@ std::vector<std::vector<double>> grids(const EffectInfo& info, std::size_t joint
   return out;
 }
 
+/// A rotor that an effect of the gear's load would tell from the base parameters, which have it; null: none.
+std::shared_ptr<const Rotor> hidden_rotor(const Linearised& at, const DhChain& chain, const BaseSet& base,
+                                          std::size_t joint) {
+  if (at.models().current.joints[joint].find(RotorInertia::name) != nullptr) return nullptr;
+  Rotor rotor{joint, rotor_in_base(chain, base, static_cast<Index>(joint))};
+  return rotor.in_base.size() > 0 ? std::make_shared<const Rotor>(std::move(rotor)) : nullptr;
+}
+
 bool is_nominal(std::string_view effect) {
   return effect == Viscous::name || effect == Coulomb::name || effect == Offset::name || effect == RotorInertia::name;
 }
@@ -111,6 +120,14 @@ std::vector<Group> dictionary(const Linearised& at, const std::vector<EffectCand
   std::vector<Group> out;
   const std::size_t n = at.joints();
   const Robot& robot = at.models().current.robot;
+  const BaseSet base = base_of(at.models().current);
+  const DhChain chain = to_dh(robot);
+  std::vector<std::shared_ptr<const Rotor>> rotors(n);
+  std::vector<double> inertia(n);
+  for (std::size_t j = 0; j < n; ++j) {
+    rotors[j] = hidden_rotor(at, chain, base, j);
+    if (rotors[j]) inertia[j] = least_inertia(at, j);
+  }
   for (const EffectInfo& info : effect_infos()) {
     if (is_nominal(info.name) || info.name == Ripple::name) continue;
     if (info.needs_peers && n < 2) continue;
@@ -149,7 +166,18 @@ std::vector<Group> dictionary(const Linearised& at, const std::vector<EffectCand
         group.log_grid = std::log(std::max(
             1.0, static_cast<double>(shapes.size()) / std::max(1.0, continuous) * std::max(1.0, 0.5 * continuous)));
         for (const ParameterInfo& p : info.linear) group.lower.push_back(p.lower);
-        out.push_back(std::move(group));
+        if (info.needs_structural) group.rotor = rotors[j];
+        out.push_back(group);
+        if (!group.rotor || inertia[j] == 0) continue;
+        // Refined once it is among the best; a column of an effect with two shapes costs more tries.
+        const std::vector<double> shares =
+            info.shape.size() > 1 ? std::vector<double>{0.5} : std::vector<double>{0.3, 0.6, 0.9};
+        ++group.nonlinear;
+        group.log_grid += std::log(1.0 + static_cast<double>(shares.size()));
+        for (const double share : shares) {
+          group.rotor_inertia = share * inertia[j];
+          out.push_back(group);
+        }
       }
     }
   }

@@ -74,8 +74,7 @@ void add_to(IdentifiedModel& model, const Unknown& u, double step) {
       return;
     case Unknown::Kind::rotor:
       value_of(model, u) += step;
-      for (std::size_t k = 0; k < model.base.size(); ++k)
-        add_to_base(model, k, -step * u.in_base[static_cast<Index>(k)]);
+      take_from_base(model, u.in_base, step);
       return;
     case Unknown::Kind::width:
       model.joints[u.joint].sign_width *= std::exp(step);
@@ -103,8 +102,7 @@ void add_to(IdentifiedModel& model, const Unknown& u, double step) {
 Linearised::Linearised(const Models& models, const std::vector<SessionLog>& logs, std::vector<VectorXd> whitening)
     : models_(models), logs_(&logs), whitening_(std::move(whitening)) {
   chain_ = to_dh(models_.current.robot);
-  for (const BaseParameter& parameter : models_.current.base)
-    base_.columns.push_back(static_cast<Index>(parameter.column));
+  base_ = base_of(models_.current);
   rows_.resize(models_.current.joints.size());
   weights_ = VectorXd::Ones(static_cast<Index>(rows_.size()));
   motions_.resize(logs.size());
@@ -114,7 +112,7 @@ Linearised::Linearised(const Models& models, const std::vector<SessionLog>& logs
     MotionRows m = log.motion();
     motions_[l] = std::make_unique<Motion>(
         Motion{log.name, log.step_s, log.t, std::move(m.q), std::move(m.dq), std::move(m.ddq)});
-    robot_[l] = std::make_unique<RobotColumns>(with_load_of(log, logs[l].healthy ? models_.healthy : models_.current),
+    robot_[l] = std::make_shared<RobotColumns>(with_load_of(log, logs[l].healthy ? models_.healthy : models_.current),
                                                *motions_[l]);
   });
   make_blocks();
@@ -311,18 +309,18 @@ MatrixXd Linearised::follow(std::size_t log, std::size_t joint, MatrixXd columns
   return columns;
 }
 
-EffectColumns Linearised::full_rate(std::size_t log, const EffectCandidate& candidate) const {
+EffectColumns Linearised::full_rate(std::size_t log, const EffectCandidate& candidate, const RobotColumns& of) const {
   const EffectInfo& info = *find_effect(candidate.effect);
-  if (info.acts_on != ActsOn::torque || info.needs_total) return (*robot_[log])(candidate);
+  if (info.acts_on != ActsOn::torque || info.needs_total) return of(candidate);
   EffectColumns out;
   out.joints.resize(joints());
-  out.joints[candidate.joint] = robot_[log]->phi(candidate);
+  out.joints[candidate.joint] = of.phi(candidate);
   if (candidate.effect == FrictionDrift::name && (*logs_)[log].age_s > 0) {
     // w(t + age) = w(t) + (1 - w(t)) w(age)
     const double w = -std::expm1(-(*logs_)[log].age_s / candidate.shape[0]);
     MatrixXd warm(out.joints[candidate.joint].rows(), 2);
-    warm << robot_[log]->phi({std::string(Coulomb::name), candidate.joint, {}}),
-        robot_[log]->phi({std::string(Viscous::name), candidate.joint, {}});
+    warm << of.phi({std::string(Coulomb::name), candidate.joint, {}}),
+        of.phi({std::string(Viscous::name), candidate.joint, {}});
     out.joints[candidate.joint] = (1 - w) * out.joints[candidate.joint] + w * warm;
   }
   out.joints[candidate.joint] = follow(log, candidate.joint, std::move(out.joints[candidate.joint]));
@@ -669,12 +667,31 @@ void Linearised::sum_up(JointRows& rows, Index from) const {
   }
 }
 
-std::vector<MatrixXd> Linearised::make(const EffectCandidate& candidate) const {
+/// The robot's motion with some inertia of a joint its rotor's: the same torque, but another load on the gear.
+std::shared_ptr<const RobotColumns> Linearised::with_rotor(std::size_t log, const Group& group) const {
+  if (!group.rotor || group.rotor_inertia == 0) return robot_[log];
+  const std::tuple key(log, group.candidate.joint, group.rotor_inertia);
+  {
+    const std::lock_guard lock(with_rotor_mutex_);
+    if (const auto at = with_rotor_.find(key); at != with_rotor_.end()) return at->second;
+  }
+  IdentifiedModel model = models_.current;
+  EffectFit rotor;
+  rotor.effect = RotorInertia::name;
+  rotor.linear = {group.rotor_inertia};
+  model.joints[group.candidate.joint].effects.push_back(std::move(rotor));
+  take_from_base(model, group.rotor->in_base, group.rotor_inertia);
+  auto made = std::make_shared<const RobotColumns>(with_load_of((*logs_)[log].log, std::move(model)), *motions_[log]);
+  const std::lock_guard lock(with_rotor_mutex_);
+  return with_rotor_.emplace(key, std::move(made)).first->second;
+}
+
+std::vector<MatrixXd> Linearised::make(const Group& group) const {
   std::vector<MatrixXd> out(joints());
   const Index total = log_rows_.back().first + log_rows_.back().count;
   for (std::size_t l = 0; l < logs_->size(); ++l) {
     if ((*logs_)[l].healthy) continue;
-    const EffectColumns full = full_rate(l, candidate);
+    const EffectColumns full = full_rate(l, group.candidate, *with_rotor(l, group));
     for (std::size_t j = 0; j < joints(); ++j) {
       if (full.joints[j].size() == 0) continue;
       if (out[j].size() == 0) out[j].setZero(total, full.joints[j].cols());
@@ -710,7 +727,7 @@ std::size_t Linearised::add(const Group& group, const std::vector<MatrixXd>& col
 void Linearised::add_all(std::vector<Group> groups) {
   if (groups.empty()) return;
   std::vector<std::vector<MatrixXd>> made(groups.size());
-  parallel_for(groups.size(), [&](std::size_t g) { made[g] = make(groups[g].candidate); });
+  parallel_for(groups.size(), [&](std::size_t g) { made[g] = make(groups[g]); });
   std::vector<Index> from(joints());
   for (std::size_t j = 0; j < joints(); ++j) from[j] = rows_[j].x.cols();
   for (std::size_t g = 0; g < groups.size(); ++g) {
@@ -873,6 +890,37 @@ void add_to_base(IdentifiedModel& model, std::size_t parameter, double step) {
   auto values = to_array(link);
   values[base.column % parameters_per_link] += step;
   link = to_inertia(values);
+}
+
+BaseSet base_of(const IdentifiedModel& model) {
+  BaseSet base;
+  for (const BaseParameter& parameter : model.base) base.columns.push_back(static_cast<Index>(parameter.column));
+  return base;
+}
+
+void take_from_base(IdentifiedModel& model, const VectorXd& rotor_in_base, double inertia) {
+  for (std::size_t k = 0; k < model.base.size(); ++k)
+    add_to_base(model, k, -inertia * rotor_in_base[static_cast<Index>(k)]);
+}
+
+double least_inertia(const Linearised& at, std::size_t joint) {
+  constexpr Index poses = 200;
+  const IdentifiedModel& model = at.models().current;
+  const auto n = static_cast<Index>(at.joints());
+  const auto j = static_cast<Index>(joint);
+  Regressor regressor(to_dh(model.robot));
+  VectorXd values = VectorXd::Zero(n * static_cast<Index>(parameters_per_link));
+  for (const BaseParameter& parameter : model.base) values[static_cast<Index>(parameter.column)] = parameter.value;
+  const VectorXd still = VectorXd::Zero(n), unit = VectorXd::Unit(n, j);
+  double least = 1e300;
+  for (std::size_t l = 0; l < at.logs().size(); ++l) {
+    const MatrixXd& q = at.motion(l).q;
+    for (Index k = 0; k < q.rows(); k += std::max<Index>(1, q.rows() / poses)) {
+      const double with = regressor(q.row(k), still, unit).row(j) * values;
+      least = std::min(least, with - regressor(q.row(k), still, still).row(j) * values);
+    }
+  }
+  return least < 1e300 ? std::max(0.0, least) : 0;
 }
 
 MatrixXd base_covariance(const Linearised& at) {

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "host_tools/excite/motion.hpp"
@@ -85,11 +87,13 @@ struct Group {
   bool on_body = false;
   bool in_model = false;  ///< columns are d torque / d (unknown) around the named effect `id`
   EffectId id{};
-  Eigen::Index first = 0;       ///< column
-  Eigen::Index count = 0;       ///< columns
-  int nonlinear = 0;            ///< shape parameters that were searched
-  double log_grid = 0;          ///< ln of the number of independent shapes tried
-  std::vector<double> lower{};  ///< bounds of the coefficients
+  Eigen::Index first = 0;                ///< column
+  Eigen::Index count = 0;                ///< columns
+  int nonlinear = 0;                     ///< shape parameters that were searched
+  std::shared_ptr<const Rotor> rotor{};  ///< of a candidate that would tell it from the base parameters, else null
+  double rotor_inertia = 0;              ///< .. what of them is taken for the rotor's [kg m^2 | kg]
+  double log_grid = 0;                   ///< ln of the number of independent shapes tried
+  std::vector<double> lower{};           ///< bounds of the coefficients
 };
 
 /// Rows that are used or left out together.
@@ -156,7 +160,7 @@ class Linearised {
 
   /// Columns of candidates (current session), whitened: per joint rows x columns; 0 x 0 where nothing is felt.
   /// Safe from several threads.
-  std::vector<Eigen::MatrixXd> make(const EffectCandidate& candidate) const;
+  std::vector<Eigen::MatrixXd> make(const Group& group) const;
   /// Appends them as a group; returns its index.
   std::size_t add(const Group& group, const std::vector<Eigen::MatrixXd>& columns);
   void add_all(std::vector<Group> groups);
@@ -203,7 +207,11 @@ class Linearised {
   Eigen::Index first_base(std::size_t joint) const;
   std::vector<Eigen::MatrixXd> base_columns(std::size_t log, const std::vector<std::size_t>& of) const;
   Eigen::MatrixXd base_rows(std::size_t log, std::size_t joint) const;
-  EffectColumns full_rate(std::size_t log, const EffectCandidate& candidate) const;
+  EffectColumns full_rate(std::size_t log, const EffectCandidate& candidate, const RobotColumns& of) const;
+  EffectColumns full_rate(std::size_t log, const EffectCandidate& candidate) const {
+    return full_rate(log, candidate, *robot_[log]);
+  }
+  std::shared_ptr<const RobotColumns> with_rotor(std::size_t log, const Group& group) const;
 
   Models models_;
   const std::vector<SessionLog>* logs_;
@@ -214,7 +222,10 @@ class Linearised {
   std::vector<Group> groups_;
   Eigen::Index columns_ = 0;
   std::vector<std::unique_ptr<Motion>> motions_;
-  std::vector<std::unique_ptr<RobotColumns>> robot_;
+  std::vector<std::shared_ptr<const RobotColumns>> robot_;
+  /// By log, joint and the rotor's inertia.
+  mutable std::map<std::tuple<std::size_t, std::size_t, double>, std::shared_ptr<const RobotColumns>> with_rotor_;
+  mutable std::mutex with_rotor_mutex_;
   std::vector<JointRows> rows_;
   std::vector<Block> blocks_, log_rows_;
   std::vector<Fold> folds_;
@@ -226,11 +237,20 @@ class Linearised {
   std::vector<double> background_information_;
 };
 
+/// The base parameters of a model as a set of columns; its grouping is not there.
+BaseSet base_of(const IdentifiedModel& model);
+
+/// What of a joint's own inertia is the same in every pose, at most: the smallest element M_jj of the mass matrix along
+/// the logs. A rotor has no more.
+double least_inertia(const Linearised& at, std::size_t joint);
+
 /// Of the base parameters, whatever else is fitted.
 Eigen::MatrixXd base_covariance(const Linearised& at);
 
 /// Adds to a base parameter of a model and to the inertia that stands for it.
 void add_to_base(IdentifiedModel& model, std::size_t parameter, double step);
+/// Takes a rotor's inertia from the base parameters.
+void take_from_base(IdentifiedModel& model, const Eigen::VectorXd& rotor_in_base, double inertia);
 
 /// What a fit over nuisance and named effects makes of the models: x at `columns` (places of unknowns).
 void update(Models& models, const Linearised& at, const LinearFit& fit, double share);

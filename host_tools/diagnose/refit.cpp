@@ -4,7 +4,6 @@
 #include <cmath>
 #include <memory>
 
-#include "host_tools/identify/regressor.hpp"
 #include "host_tools/identify/solver.hpp"
 #include "host_tools/model/effects.hpp"
 
@@ -130,18 +129,17 @@ EffectId name(Models& models, const Group& group, const VectorXd& theta) {
   effects.push_back(std::move(fit));
   const EffectId id{group.on_body, joint, effects.size() - 1};
   const JointFit& of = models.current.joints[joint];
-  if (!group.on_body && tells_rotor(group.candidate.effect) && of.find(RotorInertia::name) == nullptr) {
-    BaseSet base;
-    for (const BaseParameter& parameter : models.current.base)
-      base.columns.push_back(static_cast<Index>(parameter.column));
-    Rotor brought{joint, rotor_in_base(to_dh(models.current.robot), base, static_cast<Index>(joint))};
-    if (brought.in_base.size() == 0) return id;
+  if (group.rotor && of.find(RotorInertia::name) == nullptr) {
     EffectFit rotor;
     rotor.effect = RotorInertia::name;
-    rotor.linear = {0};
+    rotor.linear = {group.rotor_inertia};
     effects.push_back(rotor);
-    if (models.has_baseline) models.healthy.joints[joint].effects.push_back(rotor);
-    models.rotors.push_back(std::move(brought));
+    take_from_base(models.current, group.rotor->in_base, group.rotor_inertia);
+    if (models.has_baseline) {
+      models.healthy.joints[joint].effects.push_back(rotor);
+      take_from_base(models.healthy, group.rotor->in_base, group.rotor_inertia);
+    }
+    models.rotors.push_back(*group.rotor);
   }
   return id;
 }
@@ -173,12 +171,8 @@ bool forget_rotor(Models& models, std::vector<EffectId>& ids, std::size_t joint)
   const auto is_rotor = [](const EffectFit& fit) { return fit.effect == RotorInertia::name; };
   const auto& effects = models.current.joints[joint].effects;
   const auto at = std::find_if(effects.begin(), effects.end(), is_rotor);
-  const double inertia = at->linear[0];
   // The base parameters have it back.
-  for (IdentifiedModel* model : {&models.current, &models.healthy}) {
-    for (std::size_t k = 0; k < model->base.size(); ++k)
-      add_to_base(*model, k, inertia * it->in_base[static_cast<Index>(k)]);
-  }
+  for (IdentifiedModel* model : {&models.current, &models.healthy}) take_from_base(*model, it->in_base, -at->linear[0]);
   remove(models, ids, {false, joint, static_cast<std::size_t>(at - effects.begin())});
   if (models.has_baseline) std::erase_if(models.healthy.joints[joint].effects, is_rotor);
   models.rotors.erase(it);

@@ -295,19 +295,16 @@ std::vector<Search::Scored> Search::score_all(const Choice& state, bool with_thr
 
 std::size_t Search::refine(const Choice& state, std::size_t g) {
   const int searched = searched_shape(at_.groups()[g].candidate);
-  if (searched < 0) return g;
+  if (searched < 0 && !at_.groups()[g].rotor) return g;
   const Group start = at_.groups()[g];
-  const auto index = static_cast<std::size_t>(searched);
   const EffectInfo& info = *find_effect(start.candidate.effect);
   // The state's part of a new column.
   MatrixXd gram;
   VectorXd projection;
   at_.normal(state.fit.columns, at_.fit_blocks(), gram, projection);
   const MatrixXd inverse = SymmetricSolver(gram).inverse();
-  const auto try_shape = [&](double value, std::vector<MatrixXd>& made) {
-    EffectCandidate candidate = start.candidate;
-    candidate.shape[index] = value;
-    made = at_.make(candidate);
+  const auto gain = [&](const Group& tried, std::vector<MatrixXd>& made) {
+    made = at_.make(tried);
     Left left;
     left.gram = MatrixXd::Zero(start.count, start.count);
     left.projection = VectorXd::Zero(start.count);
@@ -335,38 +332,42 @@ std::size_t Search::refine(const Choice& state, std::size_t g) {
     left.projection -= z.transpose() * projection;
     return gain_of(left, size, start.lower, is_share(start)).square;
   };
-  double ratio = 1.5;
-  if (start.candidate.effect == Ripple::name) {
-    const auto j = static_cast<Index>(start.candidate.joint);
-    double range = 1e-9;
-    for (std::size_t l = 0; l < at_.logs().size(); ++l) range = std::max(range, at_.logs()[l].log.q_range[j]);
-    ratio = 1 + 1.0 / (range * start.candidate.shape[index]);
-  }
-  double centre = start.candidate.shape[index], best = -1;
+  Group fine = start;
   std::vector<MatrixXd> best_columns, made;
-  best = try_shape(centre, best_columns);
+  double best = gain(fine, best_columns);
   const double first = best;
   // A column of an effect on the position costs a simulation.
   const int rounds = info.acts_on == ActsOn::torque ? 4 : 2;
-  for (int round = 0; round < rounds; ++round, ratio = std::sqrt(ratio)) {
-    const double lower = std::max(info.shape[index].lower, centre / ratio);
-    double upper = std::min(info.shape[index].upper, centre * ratio);
-    if (info.shape[index].name == "time")
-      upper = std::min(upper, static_cast<double>(Delay::largest) * at_.models().smallest_step_s);
-    double next = centre;
-    for (const double value : {lower, upper}) {
-      const double square = try_shape(value, made);
-      if (square <= best) continue;
-      best = square;
-      next = value;
-      best_columns = made;
+  const auto search = [&](double& value, double ratio, double least, double most) {
+    for (int round = 0; round < rounds; ++round, ratio = std::sqrt(ratio)) {
+      const double centre = value;
+      double next = centre;
+      for (const double there : {std::max(least, centre / ratio), std::min(most, centre * ratio)}) {
+        value = there;
+        const double square = gain(fine, made);
+        if (square <= best) continue;
+        best = square;
+        next = there;
+        best_columns = made;
+      }
+      value = next;
     }
-    centre = next;
+  };
+  if (searched >= 0) {
+    const auto index = static_cast<std::size_t>(searched);
+    const ParameterInfo& shape = info.shape[index];
+    double ratio = 1.5, most = shape.upper;
+    if (start.candidate.effect == Ripple::name) {
+      const auto j = static_cast<Index>(start.candidate.joint);
+      double range = 1e-9;
+      for (std::size_t l = 0; l < at_.logs().size(); ++l) range = std::max(range, at_.logs()[l].log.q_range[j]);
+      ratio = 1 + 1.0 / (range * start.candidate.shape[index]);
+    }
+    if (shape.name == "time") most = std::min(most, static_cast<double>(Delay::largest) * at_.models().smallest_step_s);
+    search(fine.candidate.shape[index], ratio, shape.lower, most);
   }
-  if (best <= first) return g;
-  Group fine = start;
-  fine.candidate.shape[index] = centre;
-  return at_.add(fine, best_columns);
+  if (fine.rotor_inertia > 0) search(fine.rotor_inertia, 1.25, 0, 1.1 * fine.rotor_inertia);
+  return best > first ? at_.add(fine, best_columns) : g;
 }
 
 void Search::find_ripples(const Choice& state) {

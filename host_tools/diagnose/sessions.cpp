@@ -26,12 +26,15 @@ constexpr int blocks_of_one_log = 5;
 /// A robot that rested longer has cooled.
 constexpr double longest_pause_s = 1800;
 
-/// Positions without what is faster than the motion by far: noise in regressors is taken for structure, and what a
-/// coarse encoder makes of the acceleration may be more than the torque's own noise.
+/// Positions without what is faster than the motion: noise in regressors is taken for structure, what a coarse encoder
+/// makes of the acceleration may be more than the torque's own noise, and a gear that bends shows in the fourth
+/// derivative.
 void smooth(ProcessedLog& log) {
-  constexpr double above_motion = 12, lowest_hz = 2, edges = 3;
+  constexpr double above_motion = 12, above_crossing = 1.2, lowest_hz = 2, edges = 3;
   double& cutoff = log.filter.position_cutoff_hz;
-  const double wanted = std::max(above_motion * log.filter.excited_hz, lowest_hz);
+  double wanted = above_motion * log.filter.excited_hz;
+  if (log.filter.crossing_hz > 0) wanted = std::min(wanted, above_crossing * log.filter.crossing_hz);
+  wanted = std::max(wanted, lowest_hz);
   if (log.measured_dq.size() > 0 || wanted >= std::min(cutoff, 0.4 / log.step_s)) return;
   const auto edge = static_cast<Index>(std::ceil(edges / (wanted * log.step_s)));
   const Index first = std::max(log.first, edge), last = std::min(log.last, log.samples() - edge);
@@ -154,7 +157,7 @@ void check_same_robot(Models models, const std::vector<SessionLog>& logs, const 
     Group group;
     group.candidate = {std::string(info.name), 0, {}};
     group.on_body = true;
-    at.add(group, at.make(group.candidate));
+    at.add(group, at.make(group));
   }
   std::vector<Index> columns = at.nuisance();
   for (Index c = first; c < at.columns(); ++c) columns.push_back(c);

@@ -120,6 +120,17 @@ class Teller {
     return (after_.front() - without).col(k).norm() / std::max(after_.front().col(k).norm(), 1e-300);
   }
 
+  /// A tilted base makes the masses about a first joint that stood upright felt, as a balancer there would be: with a
+  /// tilt they are its own.
+  bool part_of_tilt(std::size_t j, const EffectFit& fit) const {
+    if (j != 0 || fit.effect != GravityCompensator::name) return false;
+    const Robot& robot = t_.model.robot;
+    const Eigen::Vector3d axis = robot.joints[0].origin.linear() * robot.joints[0].axis;
+    const bool upright = axis.cross(robot.gravity).norm() < 1e-3 * robot.gravity.norm();
+    return upright && std::any_of(t_.model.body.begin(), t_.model.body.end(),
+                                  [](const EffectFit& body) { return body.named && body.effect == GravityTilt::name; });
+  }
+
   json effect_json(const EffectFit& fit, const EffectId& id, double closed) {
     json alternatives = json::array();
     const auto found =
@@ -190,6 +201,13 @@ class Teller {
       if (i == t_.gate.groups.size()) continue;  // nominal, or a link encoder's
       if (!fits[e].named) {
         resembles.push_back(fits[e].effect);
+        continue;
+      }
+      if (part_of_tilt(j, fits[e])) {
+        notes_.push_back(fmt::format(
+            "{}: the tilt makes masses about this axis felt, which no upright robot shows: the model carries them as "
+            "gravity_compensator",
+            joint_of(j).name));
         continue;
       }
       json one = effect_json(fits[e], id, t_.gate.gap[k] > 0 ? held.alone[i][k] / t_.gate.gap[k] : 0);
