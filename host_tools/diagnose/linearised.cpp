@@ -106,12 +106,19 @@ Linearised::Linearised(const Models& models, const std::vector<SessionLog>& logs
   rows_.resize(models_.current.joints.size());
   weights_ = VectorXd::Ones(static_cast<Index>(rows_.size()));
   motions_.resize(logs.size());
+  slow_.resize(logs.size());
   robot_.resize(logs.size());
   parallel_for(logs.size(), [&](std::size_t l) {
     const ProcessedLog& log = logs[l].log;
     MotionRows m = log.motion();
     motions_[l] = std::make_unique<Motion>(
         Motion{log.name, log.step_s, log.t, std::move(m.q), std::move(m.dq), std::move(m.ddq)});
+    if (const double cutoff = logs[l].bending_hz; cutoff > 0) {
+      const Motion& all = *motions_[l];
+      const ZeroPhaseFilter filter(cutoff, log.step_s);
+      slow_[l] = std::make_unique<Motion>(
+          Motion{all.name, all.step_s, all.t, filter.apply(all.q), filter.apply(all.dq), filter.apply(all.ddq)});
+    }
     robot_[l] = std::make_shared<RobotColumns>(with_load_of(log, logs[l].healthy ? models_.healthy : models_.current),
                                                *motions_[l]);
   });
@@ -467,10 +474,7 @@ void Linearised::make_rows() {
       full[j].setZero(log.samples(), static_cast<Index>(rows_[j].column.size()) - (nb - first_unknown(j)) + 1);
       rows_[j].x.block(at, 0, count, nb - first_unknown(j)) = base_rows(l, j);
     }
-    const MatrixXd& torque = robot_[l]->torque();
-    const auto loaded = [&](IdentifiedModel m) {
-      return fxdyn::predict(with_load_of(log, std::move(m)), motion.q, motion.dq, motion.ddq, log.step_s);
-    };
+    const MatrixXd torque = torque_of(l, model);
     MatrixXd predicted = torque;
     for (Index c = nb; c < columns_; ++c) {
       const Unknown& common = unknowns_[static_cast<std::size_t>(c)];
@@ -507,7 +511,7 @@ void Linearised::make_rows() {
           double step = difference * value;
           if (u.kind == Unknown::Kind::shape && fit.shape[u.index] * std::exp(step) > u.upper) step = -step;
           add_to(more, u, step);
-          const MatrixXd slope = (loaded(more) - torque) / step;
+          const MatrixXd slope = (torque_of(l, more) - torque) / step;
           for (std::size_t j = 0; j < n; ++j) columns[j] = slope.col(static_cast<Index>(j));
         } else if (u.kind == Unknown::Kind::linear) {
           columns[u.joint] =
@@ -667,23 +671,39 @@ void Linearised::sum_up(JointRows& rows, Index from) const {
   }
 }
 
-/// The robot's motion with some inertia of a joint its rotor's: the same torque, but another load on the gear.
-std::shared_ptr<const RobotColumns> Linearised::with_rotor(std::size_t log, const Group& group) const {
-  if (!group.rotor || group.rotor_inertia == 0) return robot_[log];
-  const std::tuple key(log, group.candidate.joint, group.rotor_inertia);
+/// Columns around a model in which some of a joint's inertia is its rotor's: the same torque, but another load on the
+/// gear. What bends is of the motion that is not noise.
+std::shared_ptr<const RobotColumns> Linearised::columns_for(std::size_t log, const Group& group) const {
+  const bool rotor = group.rotor && group.rotor_inertia != 0, slow = slow_[log] && bends(group.candidate.effect);
+  if (!rotor && !slow) return robot_[log];
+  const std::tuple key(log, rotor ? group.candidate.joint : 0, rotor ? group.rotor_inertia : 0.0, slow);
   {
-    const std::lock_guard lock(with_rotor_mutex_);
-    if (const auto at = with_rotor_.find(key); at != with_rotor_.end()) return at->second;
+    const std::lock_guard lock(for_group_mutex_);
+    if (const auto at = for_group_.find(key); at != for_group_.end()) return at->second;
   }
   IdentifiedModel model = models_.current;
-  EffectFit rotor;
-  rotor.effect = RotorInertia::name;
-  rotor.linear = {group.rotor_inertia};
-  model.joints[group.candidate.joint].effects.push_back(std::move(rotor));
-  take_from_base(model, group.rotor->in_base, group.rotor_inertia);
-  auto made = std::make_shared<const RobotColumns>(with_load_of((*logs_)[log].log, std::move(model)), *motions_[log]);
-  const std::lock_guard lock(with_rotor_mutex_);
-  return with_rotor_.emplace(key, std::move(made)).first->second;
+  if (rotor) {
+    EffectFit fit;
+    fit.effect = RotorInertia::name;
+    fit.linear = {group.rotor_inertia};
+    model.joints[group.candidate.joint].effects.push_back(std::move(fit));
+    take_from_base(model, group.rotor->in_base, group.rotor_inertia);
+  }
+  auto made = std::make_shared<const RobotColumns>(with_load_of((*logs_)[log].log, std::move(model)),
+                                                   slow ? *slow_[log] : *motions_[log]);
+  const std::lock_guard lock(for_group_mutex_);
+  return for_group_.emplace(key, std::move(made)).first->second;
+}
+
+/// What a model says of a log's motion; its gears bend by what is not noise.
+MatrixXd Linearised::torque_of(std::size_t log, IdentifiedModel model) const {
+  const auto torque = [&](const IdentifiedModel& m, const Motion& motion) {
+    return fxdyn::predict(m, motion.q, motion.dq, motion.ddq, motion.step_s);
+  };
+  model = with_load_of((*logs_)[log].log, std::move(model));
+  const auto stiff = slow_[log] ? stiffened(model) : std::nullopt;
+  if (!stiff) return torque(model, *motions_[log]);
+  return torque(*stiff, *motions_[log]) + torque(model, *slow_[log]) - torque(*stiff, *slow_[log]);
 }
 
 std::vector<MatrixXd> Linearised::make(const Group& group) const {
@@ -691,7 +711,7 @@ std::vector<MatrixXd> Linearised::make(const Group& group) const {
   const Index total = log_rows_.back().first + log_rows_.back().count;
   for (std::size_t l = 0; l < logs_->size(); ++l) {
     if ((*logs_)[l].healthy) continue;
-    const EffectColumns full = full_rate(l, group.candidate, *with_rotor(l, group));
+    const EffectColumns full = full_rate(l, group.candidate, *columns_for(l, group));
     for (std::size_t j = 0; j < joints(); ++j) {
       if (full.joints[j].size() == 0) continue;
       if (out[j].size() == 0) out[j].setZero(total, full.joints[j].cols());

@@ -55,9 +55,10 @@ struct RowCache {
 /// A log of one of the two sessions. Rows are decimated to `log.decimation`.
 struct SessionLog {
   ProcessedLog log;
-  bool healthy = false;  ///< of the baseline
-  bool fits = true;      ///< else it judges only (validate)
-  double age_s = 0;      ///< of the session when the log begins: what drifts has drifted so far
+  bool healthy = false;   ///< of the baseline
+  bool fits = true;       ///< else it judges only (validate)
+  double age_s = 0;       ///< of the session when the log begins: what drifts has drifted so far
+  double bending_hz = 0;  ///< gears bend by the load of the motion below; 0: of all of it
   std::shared_ptr<RowCache> cache = std::make_shared<RowCache>();
 };
 
@@ -211,7 +212,8 @@ class Linearised {
   EffectColumns full_rate(std::size_t log, const EffectCandidate& candidate) const {
     return full_rate(log, candidate, *robot_[log]);
   }
-  std::shared_ptr<const RobotColumns> with_rotor(std::size_t log, const Group& group) const;
+  std::shared_ptr<const RobotColumns> columns_for(std::size_t log, const Group& group) const;
+  Eigen::MatrixXd torque_of(std::size_t log, IdentifiedModel model) const;
 
   Models models_;
   const std::vector<SessionLog>* logs_;
@@ -222,10 +224,11 @@ class Linearised {
   std::vector<Group> groups_;
   Eigen::Index columns_ = 0;
   std::vector<std::unique_ptr<Motion>> motions_;
+  std::vector<std::unique_ptr<Motion>> slow_;  ///< by log: its motion below bending_hz; null: the same
   std::vector<std::shared_ptr<const RobotColumns>> robot_;
-  /// By log, joint and the rotor's inertia.
-  mutable std::map<std::tuple<std::size_t, std::size_t, double>, std::shared_ptr<const RobotColumns>> with_rotor_;
-  mutable std::mutex with_rotor_mutex_;
+  /// By log, joint, the rotor's inertia, and whether the effect bends.
+  mutable std::map<std::tuple<std::size_t, std::size_t, double, bool>, std::shared_ptr<const RobotColumns>> for_group_;
+  mutable std::mutex for_group_mutex_;
   std::vector<JointRows> rows_;
   std::vector<Block> blocks_, log_rows_;
   std::vector<Fold> folds_;

@@ -26,15 +26,14 @@ constexpr int blocks_of_one_log = 5;
 /// A robot that rested longer has cooled.
 constexpr double longest_pause_s = 1800;
 
-/// Positions without what is faster than the motion: noise in regressors is taken for structure, what a coarse encoder
-/// makes of the acceleration may be more than the torque's own noise, and a gear that bends shows in the fourth
-/// derivative.
-void smooth(ProcessedLog& log) {
-  constexpr double above_motion = 12, above_crossing = 1.2, lowest_hz = 2, edges = 3;
+/// Positions without what is faster than the motion by far: noise in regressors is taken for structure, and what a
+/// coarse encoder makes of the acceleration may be more than the torque's own noise.
+void smooth(SessionLog& entry) {
+  constexpr double above_motion = 12, lowest_hz = 2, edges = 3;
+  ProcessedLog& log = entry.log;
+  entry.bending_hz = bending_hz(log);
   double& cutoff = log.filter.position_cutoff_hz;
-  double wanted = above_motion * log.filter.excited_hz;
-  if (log.filter.crossing_hz > 0) wanted = std::min(wanted, above_crossing * log.filter.crossing_hz);
-  wanted = std::max(wanted, lowest_hz);
+  const double wanted = std::max(above_motion * log.filter.excited_hz, lowest_hz);
   if (log.measured_dq.size() > 0 || wanted >= std::min(cutoff, 0.4 / log.step_s)) return;
   const auto edge = static_cast<Index>(std::ceil(edges / (wanted * log.step_s)));
   const Index first = std::max(log.first, edge), last = std::min(log.last, log.samples() - edge);
@@ -65,7 +64,7 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
     SessionLog entry{log, healthy, healthy || log.role == Role::train, std::max(0.0, log.t[0] - start)};
     double& cutoff = entry.log.filter.torque_cutoff_hz;
     cutoff = std::min({cutoff, highest_cutoff_hz, entry.log.filter.position_cutoff_hz});
-    smooth(entry.log);
+    smooth(entry);
     entry.log.decimation = std::max<Index>(log.decimation > 8 ? log.decimation / 8 : 1,
                                            static_cast<Index>(1 / (log.step_s * rows_per_period * cutoff)));
     out.push_back(std::move(entry));

@@ -9,6 +9,7 @@
 
 #include "host_tools/error.hpp"
 #include "host_tools/log/spectrum.hpp"
+#include "host_tools/model/effects.hpp"
 #include "host_tools/model/evaluator.hpp"
 #include "model/catalogue.hpp"
 
@@ -335,7 +336,28 @@ std::vector<bool> moving_joints(const std::vector<ProcessedLog>& logs) {
   return out;
 }
 
-MatrixXd predict(const IdentifiedModel& model, const ProcessedLog& log) {
+double bending_hz(const ProcessedLog& log) {
+  constexpr double lowest_hz = 2;
+  const double cutoff = std::max(log.filter.crossing_hz, lowest_hz);
+  return log.filter.crossing_hz > 0 && cutoff < std::min(log.filter.position_cutoff_hz, 0.4 / log.step_s) ? cutoff : 0;
+}
+
+bool bends(std::string_view effect) {
+  const EffectInfo& info = *find_effect(effect);
+  return info.acts_on == ActsOn::position && info.needs_structural;
+}
+
+std::optional<IdentifiedModel> stiffened(const IdentifiedModel& model) {
+  IdentifiedModel out = model;
+  std::size_t bent = 0;
+  for (JointFit& joint : out.joints)
+    bent += std::erase_if(joint.effects, [](const EffectFit& fit) { return bends(fit.effect); });
+  return bent > 0 ? std::optional(std::move(out)) : std::nullopt;
+}
+
+namespace {
+
+MatrixXd predict_by_blocks(const IdentifiedModel& model, const ProcessedLog& log) {
   Predictor predictor(with_load_of(log, model), log.step_s, age_of(model, log));
   constexpr Index block = 8192;
   MatrixXd tau(log.samples(), log.q.cols());
@@ -346,6 +368,20 @@ MatrixXd predict(const IdentifiedModel& model, const ProcessedLog& log) {
   }
   if (model.filter.torque_lead_s == 0) return tau;
   return at_other_times(tau, model.filter.torque_lead_s / log.step_s);
+}
+
+}  // namespace
+
+MatrixXd predict(const IdentifiedModel& model, const ProcessedLog& log) {
+  const double cutoff = bending_hz(log);
+  const auto stiff = cutoff > 0 ? stiffened(model) : std::nullopt;
+  if (!stiff) return predict_by_blocks(model, log);
+  ProcessedLog slow = log;
+  const ZeroPhaseFilter filter(cutoff, log.step_s);
+  for (MatrixXd* columns : {&slow.q, &slow.measured_dq, &slow.measured_ddq}) {
+    if (columns->size() > 0) *columns = filter.apply(*columns);
+  }
+  return predict_by_blocks(*stiff, log) + predict_by_blocks(model, slow) - predict_by_blocks(*stiff, slow);
 }
 
 }  // namespace fxdyn

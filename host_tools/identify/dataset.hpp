@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "host_tools/log/log.hpp"
@@ -100,9 +101,18 @@ double age_of(const IdentifiedModel& model, const ProcessedLog& log);
 /// Whether each joint moves in the train logs by more than its encoder's noise.
 std::vector<bool> moving_joints(const std::vector<ProcessedLog>& logs);
 
+/// Effects that bend under their load follow the fourth derivative of the position: above the frequency at which the
+/// motion sinks into the noise there is nothing in it but noise. The cut-off [Hz] of the motion that bends them; 0: the
+/// log's own.
+double bending_hz(const ProcessedLog& log);
+/// Whether an effect is such a one.
+bool bends(std::string_view effect);
+/// The model without them; nothing: it has none.
+std::optional<IdentifiedModel> stiffened(const IdentifiedModel& model);
+
 /// Torques of the model over a log, block by block, with the log's known load, as warm as the robot was
 /// (age_of()), and at the times at which the log's torque column shows them (torque_lead_s of the model's filter):
-/// samples x joints [N*m | N].
+/// samples x joints [N*m | N]. What gears bend by follows the motion below bending_hz(), the rest all of it.
 Eigen::MatrixXd predict(const IdentifiedModel& model, const ProcessedLog& log);
 
 }  // namespace fxdyn
