@@ -82,7 +82,7 @@ int run(int argc, char** argv) {
     verb->add_option("--out", out, "directory for the results")->required();
     return verb;
   };
-  const CLI::App* run_verb = stage("run", "identify, diagnose, train, export and report in one go.");
+  const CLI::App* run_verb = stage("run", "diagnose, train, export and report in one go.");
   const CLI::App* identify_verb =
       stage("identify", "Structure and friction from the train logs: model.json, metrics.json.");
   const CLI::App* diagnose_verb =

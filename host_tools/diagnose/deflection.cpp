@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "host_tools/diagnose/autoregression.hpp"
+#include "host_tools/diagnose/linearised.hpp"
 #include "host_tools/identify/regressor.hpp"
 #include "host_tools/identify/solver.hpp"
 #include "host_tools/model/effects.hpp"
@@ -115,9 +116,20 @@ Rows rows_of(const IdentifiedModel& model, const std::vector<LinkedLog>& logs, s
 struct Uncertain {
   MatrixXd spread;  ///< of base parameters [columns x directions]
   std::vector<Index> columns;
+  double rotor = 0;  ///< one more direction: so much of the inertia is a rotor's, a priori; 0: none is hidden
 };
 
-MatrixXd slopes_of(const ProcessedLog& log, std::size_t joint, const IdentifiedModel& model, const Uncertain& u) {
+/// Half of what a rotor can have at most, 0 where the base parameters have none.
+double hidden_rotor(const Rows& rows, const IdentifiedModel& model) {
+  if (model.joints[rows.joint].find(RotorInertia::name) != nullptr) return 0;
+  if (!rotor_inertia_is_absorbed(to_dh(model.robot), base_of(model), static_cast<Index>(rows.joint))) return 0;
+  std::vector<const MatrixXd*> q;
+  for (const ProcessedLog* log : rows.logs) q.push_back(&log->q);
+  return 0.5 * least_inertia(model, rows.joint, q);
+}
+
+MatrixXd slopes_of(const ProcessedLog& log, const JointSeries& series, std::size_t joint, const IdentifiedModel& model,
+                   const Uncertain& u) {
   Regressor regressor(to_dh(model.robot));
   const MotionRows m = log.motion();
   MatrixXd own(log.samples(), static_cast<Index>(u.columns.size()));
@@ -126,16 +138,21 @@ MatrixXd slopes_of(const ProcessedLog& log, std::size_t joint, const IdentifiedM
     for (Index c = 0; c < own.cols(); ++c)
       own(k, c) = y(static_cast<Index>(joint), u.columns[static_cast<std::size_t>(c)]);
   }
-  return own * u.spread;
+  MatrixXd out(own.rows(), u.spread.cols() + (u.rotor > 0));
+  out.leftCols(u.spread.cols()) = own * u.spread;
+  if (u.rotor > 0) out.rightCols(1) = -u.rotor * series.ddq;
+  return out;
 }
 
 /// Gives the rows their slopes. @param u as before, or to be found
 void add_slopes(Rows& rows, const IdentifiedModel& model, const Uncertain& u) {
-  for (const ProcessedLog* log : rows.logs) rows.slopes.push_back(slopes_of(*log, rows.joint, model, u));
-  rows.z = VectorXd::Zero(u.spread.cols());
+  rows.slopes.clear();
+  for (std::size_t l = 0; l < rows.logs.size(); ++l)
+    rows.slopes.push_back(slopes_of(*rows.logs[l], rows.series[l], rows.joint, model, u));
+  rows.z = VectorXd::Zero(rows.slopes.front().cols());
 }
 
-Uncertain uncertainty(Rows& rows, const IdentifiedModel& model, const MatrixXd& covariance) {
+Uncertain uncertainty(Rows& rows, const IdentifiedModel& model, const MatrixXd& covariance, bool with_rotor) {
   constexpr double little = 1e-3;  // of the load
   Uncertain u;
   const auto j = static_cast<Index>(rows.joint);
@@ -160,10 +177,9 @@ Uncertain uncertainty(Rows& rows, const IdentifiedModel& model, const MatrixXd& 
   for (Index i = 0; i < gram.rows(); ++i) {
     if (principal.eigenvalues()[i] > little * little * load) kept.push_back(i);
   }
-  const MatrixXd turn = principal.eigenvectors()(Eigen::all, kept);
-  u.spread = u.spread * turn;
-  for (MatrixXd& slopes : rows.slopes) slopes = slopes * turn;
-  rows.z = VectorXd::Zero(turn.cols());
+  u.spread = u.spread * principal.eigenvectors()(Eigen::all, kept);
+  if (with_rotor) u.rotor = hidden_rotor(rows, model);
+  add_slopes(rows, model, u);
   return u;
 }
 
@@ -260,9 +276,8 @@ void tune(const Rows& rows, const VectorXd& a, Set& set, bool from_grid) {
   }
 }
 
-bool bends(const Set& set) {
-  return std::any_of(set.parts.begin(), set.parts.end(),
-                     [](const Part& part) { return part.effect != Eccentricity::name; });
+bool any_bends(const Set& set) {
+  return std::any_of(set.parts.begin(), set.parts.end(), [](const Part& part) { return bends(part.effect); });
 }
 
 /// A set with the load where torque and deflection together have it most likely: Gauss-Newton over coefficients and z.
@@ -277,7 +292,7 @@ Moved move_load(const Rows& start, const VectorXd& a, const Set& from) {
   constexpr double h = 0.02;  // of a standard deviation
   Rows rows = start;
   Moved best{from, rows.z, from.score};
-  if (rows.z.size() == 0 || !bends(from)) return best;
+  if (rows.z.size() == 0 || !any_bends(from)) return best;
   double cost = -from.score + rows.z.squaredNorm();
   for (int round = 0; round < most_rounds; ++round) {
     const MatrixXd own = design(rows, best.set.parts);
@@ -345,7 +360,8 @@ VectorXd likely_load(const Rows& rows, const VectorXd& a) {
 }
 
 /// Forward: the effect that brings most, as long as one brings something; the load moves with it.
-Set best_set(Rows& rows, const IdentifiedModel& model, const MatrixXd& covariance, Uncertain& uncertain) {
+Set best_set(Rows& rows, const IdentifiedModel& model, const MatrixXd& covariance, Uncertain& uncertain,
+             bool with_rotor = true) {
   const std::vector<Part> full = all_parts(largest_load(rows));
   // Colour of what no set explains.
   const VectorXd a = colour(rows, residual(design(rows, full), rows.delta));
@@ -367,7 +383,7 @@ Set best_set(Rows& rows, const IdentifiedModel& model, const MatrixXd& covarianc
     double most = -1e300;
     for (const Moved& one : next) most = std::max(most, one.set.score);
     if (most < best.set.score + least_score) break;
-    if (level == 0 && covariance.size() > 0) uncertain = uncertainty(rows, model, covariance);
+    if (level == 0 && covariance.size() > 0) uncertain = uncertainty(rows, model, covariance, with_rotor);
     std::size_t chosen = 0;
     for (Moved& one : next) one = move_load(rows, a, one.set);
     if (level == 0 && rows.z.size() > 0) {
@@ -426,6 +442,14 @@ Deflections find_deflections(const IdentifiedModel& model, const MatrixXd& base_
     Rows rows = rows_of(model, train, j);
     Uncertain uncertain;
     Set set = best_set(rows, model, base_covariance, uncertain);
+    double rotor = uncertain.rotor > 0 ? uncertain.rotor * rows.z.tail(1)[0] : 0;
+    if (rotor < 0) {
+      // No rotor has less than nothing.
+      rows = rows_of(model, train, j);
+      uncertain = {};
+      set = best_set(rows, model, base_covariance, uncertain, false);
+      rotor = 0;
+    }
     // Other logs of the joint with the load that was found.
     const auto others = [&](const std::vector<LinkedLog>& logs) {
       Rows out = rows_of(model, logs, j);
@@ -465,11 +489,11 @@ Deflections find_deflections(const IdentifiedModel& model, const MatrixXd& base_
       old = best_set(*old_rows, model, {}, same);
     }
     // What judges, with coefficients fitted to something else: the validate logs, or each train log by the others.
-    struct Fold {
+    struct Judged {
       Rows rows;
       VectorXd theta;
     };
-    std::vector<Fold> folds;
+    std::vector<Judged> folds;
     const bool held_out = !judge.empty() || train.size() > 1;
     if (!judge.empty()) {
       folds.push_back({others(judge), set.theta});
@@ -487,7 +511,7 @@ Deflections find_deflections(const IdentifiedModel& model, const MatrixXd& base_
     }
     double square = 0, after = 0, white = 0;
     std::vector<double> without(set.parts.size(), 0.0);
-    for (const Fold& fold : folds) {
+    for (const Judged& fold : folds) {
       const Rows& judged = fold.rows;
       std::vector<VectorXd> part_of;
       VectorXd all = VectorXd::Zero(judged.delta.size());
@@ -535,6 +559,7 @@ Deflections find_deflections(const IdentifiedModel& model, const MatrixXd& base_
       effect.fit.shape_std.assign(part.shape.size(), 0.0);
       effect.closure = (without[p] - after) / gap;
       effect.held_out = held_out;
+      if (bends(part.effect)) effect.rotor = rotor;
       Set less = set, again = set;
       less.parts.erase(less.parts.begin() + static_cast<std::ptrdiff_t>(p));
       fit(rows, a, less);

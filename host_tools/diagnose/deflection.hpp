@@ -16,6 +16,7 @@ struct DeflectionEffect {
   double score = 0;      ///< N ln(RSS without / RSS with) - penalties
   double closure = 0;    ///< share of the deflection's power on data that did not fit it
   bool held_out = true;  ///< else there were none, and it is that of the rows that fitted
+  double rotor = 0;      ///< inertia that the base parameters have and the gear does not carry [kg m^2 | kg]
 };
 
 struct Deflections {
@@ -28,7 +29,8 @@ struct Deflections {
 /// load the rigid-body torque of `model` through the gear's relaxation: every set of them on an autoregressive noise,
 /// shapes on a grid and refined; the set with the best score. The load of a joint that carries little is known from the
 /// torque only within its noise, but encoders are fine: the base parameters move within their covariance to where the
-/// deflection fits best (maximum a posteriori, Gauss-Newton over parameters of load and effects). What a healthy
+/// deflection fits best (maximum a posteriori, Gauss-Newton over parameters of load and effects). A rotor that the base
+/// parameters have is found the same way: the gear does not carry it. What a healthy
 /// session has alike (within a third) is not reported but returned in `background`.
 /// @param base_covariance of the model's base parameters
 /// @param now logs of the current session (train fits, validate judges) @param before healthy ones, may be empty

@@ -12,9 +12,9 @@
 #include "host_tools/diagnose/sessions.hpp"
 #include "host_tools/diagnose/verdict.hpp"
 #include "host_tools/error.hpp"
+#include "host_tools/identify/regressor.hpp"
 #include "host_tools/identify/solver.hpp"
 #include "host_tools/model/effects.hpp"
-#include "host_tools/report/metrics.hpp"
 
 namespace fxdyn {
 namespace {
@@ -37,8 +37,11 @@ IdentifiedModel nominal_model(Project project, GateData& data, bool healthy, Pro
     std::erase_if(data.notes, [](const std::string& note) { return note.starts_with("the torque column is"); });
   }
   IdentifiedModel model = finish_model(*fitter, project, data).model;
-  for (JointFit& joint : model.joints)
+  // What bends is found here, with its rivals.
+  for (JointFit& joint : model.joints) {
     std::erase_if(joint.effects, [](const EffectFit& fit) { return fit.effect == Elasticity::name; });
+    joint.flexible.reset();
+  }
   return model;
 }
 
@@ -46,9 +49,6 @@ IdentifiedModel nominal_model(Project project, GateData& data, bool healthy, Pro
 void add_deviations(Models& models, const Linearised& at) {
   std::vector<Index> columns;
   for (Index c = 0; c < static_cast<Index>(at.unknowns().size()); ++c) columns.push_back(c);
-  for (const Index c : at.nuisance()) {
-    if (c >= static_cast<Index>(at.unknowns().size())) columns.push_back(c);  // background
-  }
   const LinearFit fit = at.solve(columns);
   const MatrixXd covariance = SymmetricSolver(fit.information).inverse();
   IdentifiedModel& model = models.current;
@@ -75,7 +75,12 @@ void add_deviations(Models& models, const Linearised& at) {
         effect.shape_std[u.index] = std * effect.shape[u.index];
       } else {
         double& place = effect.linear_std[u.index];
-        place = std::hypot(place, std);  // common part and change
+        place = std;
+        if (u.change) {
+          // Right after the common part: their sum is today's.
+          const auto i = static_cast<Index>(c);
+          place = std::sqrt(std::max(0.0, variance + covariance(i - 1, i - 1) + 2 * covariance(i - 1, i)));
+        }
         if (effect.effect == Payload::name && u.index > 0) place = std / std::max(effect.linear[0], 1e-9);
       }
     }
@@ -145,11 +150,14 @@ class Work {
     // The model before: no effect that is to be found, its parameters the best without.
     Models before = models_;
     refit(before, logs_, plain(), 8);
+    check_judges(before.current, data_.logs, still_);
     if (deflections_.found.empty()) {
       models_ = before;
     } else {
-      for (const DeflectionEffect& effect : deflections_.found)
+      for (const DeflectionEffect& effect : deflections_.found) {
         models_.current.joints[effect.joint].effects.push_back(effect.fit);
+        add_rotor(models_, effect);
+      }
       refit(models_, logs_, plain(), 8);
     }
     add_deviations(before, Linearised(before, logs_));
@@ -192,6 +200,16 @@ class Work {
   std::size_t joints() const { return project_.robot.size(); }
   std::vector<VectorXd> plain() const { return std::vector<VectorXd>(joints(), VectorXd::Zero(1)); }
   const std::string& name_of(std::size_t j) const { return project_.robot.joints[j].name; }
+
+  /// The rotor that a link encoder told from the link.
+  static void add_rotor(Models& models, const DeflectionEffect& effect) {
+    constexpr double share = 0.1;  // of it, standard deviation
+    if (effect.rotor <= 0 || models.current.joints[effect.joint].find(RotorInertia::name) != nullptr) return;
+    const IdentifiedModel& model = models.current;
+    Rotor rotor{effect.joint, rotor_in_base(to_dh(model.robot), base_of(model), static_cast<Index>(effect.joint)),
+                effect.rotor, share * effect.rotor};
+    bring_rotor(models, rotor, effect.rotor);
+  }
 
   /// A link encoder shows what bends before any torque is looked at.
   void look_at_links(const IdentifiedModel& model, const std::vector<SessionLog>& fitted) {
@@ -261,6 +279,7 @@ class Work {
     alone.current = models_.healthy;
     alone.fixed = models_.fixed;
     alone.smallest_step_s = models_.smallest_step_s;
+    for (const DeflectionEffect& effect : bent_already_) add_rotor(alone, effect);
     for (int round = 0; round < 2; ++round) refit(alone, before, {}, 4);
     Outcome background;
     background.models = alone;

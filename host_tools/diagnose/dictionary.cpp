@@ -124,9 +124,11 @@ std::vector<Group> dictionary(const Linearised& at, const std::vector<EffectCand
   const DhChain chain = to_dh(robot);
   std::vector<std::shared_ptr<const Rotor>> rotors(n);
   std::vector<double> inertia(n);
+  std::vector<const MatrixXd*> positions;
+  for (std::size_t l = 0; l < at.logs().size(); ++l) positions.push_back(&at.motion(l).q);
   for (std::size_t j = 0; j < n; ++j) {
     rotors[j] = hidden_rotor(at, chain, base, j);
-    if (rotors[j]) inertia[j] = least_inertia(at, j);
+    if (rotors[j]) inertia[j] = least_inertia(at.models().current, j, positions);
   }
   for (const EffectInfo& info : effect_infos()) {
     if (is_nominal(info.name) || info.name == Ripple::name) continue;

@@ -45,11 +45,16 @@ VectorXd only(const Linearised& at, const VectorXd& e, const std::vector<std::si
   return out;
 }
 
-MatrixXd only(const Linearised& at, const MatrixXd& x, const std::vector<std::size_t>& blocks) {
+/// Features on today's rows. Where the encoder does not tell which way the joint moves they are zero: friction's mean
+/// over what the velocity may be is a smoother function of it than friction is, and that is no structure of the robot.
+MatrixXd only(const Linearised& at, std::size_t joint, const MatrixXd& x, const std::vector<std::size_t>& blocks) {
   MatrixXd out = MatrixXd::Zero(x.rows(), x.cols());
   for (const std::size_t i : blocks) {
     const Block& b = at.blocks()[i];
-    if (!b.healthy) out.middleRows(b.first, b.count) = x.middleRows(b.first, b.count);
+    if (b.healthy) continue;
+    for (Index row = b.first; row < b.first + b.count; ++row) {
+      if (!at.is_doubtful(joint, row)) out.row(row) = x.row(row);
+    }
   }
   return out;
 }
@@ -244,7 +249,7 @@ LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& 
   const VectorXd residual = at.residual(joint, fit);
   if (fit.square[k] * at.weights()[k] < 1e-10 * fit.rows[k]) return out;
   const VectorXd e = only(at, residual, at.fit_blocks());
-  const MatrixXd f = only(at, all_features, at.fit_blocks());
+  const MatrixXd f = only(at, joint, all_features, at.fit_blocks());
   const JointRows& rows = at.rows(joint);
   MatrixXd cross = MatrixXd::Zero(static_cast<Index>(fit.columns.size()), f.cols());
   MatrixXd surrogate = shifted(at, joint, e, at.fit_blocks());
@@ -257,6 +262,14 @@ LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& 
   }
   const MatrixXd z = SymmetricSolver(fit.information).inverse() * cross;
   MatrixXd gram = w * (f.transpose() * f) - cross.transpose() * z;
+  // What the background takes of them.
+  const Background* background = at.background(joint);
+  MatrixXd taken;  // functions x features
+  if (background != nullptr) {
+    const MatrixXd products = background->b.transpose() * f;
+    taken = w * background->inverse * products;
+    gram -= products.transpose() * taken;
+  }
   const VectorXd size = (w * f.colwise().squaredNorm().transpose().array()).max(1e-300).sqrt().inverse();
   gram = size.asDiagonal() * gram * size.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(gram);
@@ -271,7 +284,8 @@ LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& 
     return along.cwiseAbs2().dot(inverse);
   };
   const double mine = statistic(w * f.transpose() * e);
-  const MatrixXd b = w * (f.transpose() * surrogate) - z.transpose() * theirs;
+  MatrixXd b = w * (f.transpose() * surrogate) - z.transpose() * theirs;
+  if (background != nullptr) b -= taken.transpose() * (background->b.transpose() * surrogate);
   VectorXd null(surrogate.cols());
   for (Index s = 0; s < null.size(); ++s) null[s] = statistic(b.col(s));
   const double mean = null.mean(),
@@ -280,7 +294,7 @@ LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& 
       std::clamp(2 * mean * mean / std::max(variance, 1e-300), 3.0, static_cast<double>(kept.size()));
   // Shares of the residual: with few rows noise alone fills many of its directions.
   const double whole = w * e.squaredNorm();
-  double fitted = 0;
+  auto fitted = static_cast<double>(background != nullptr ? background->b.cols() : 0);
   for (const Index c : fit.columns) fitted += rows.local[static_cast<std::size_t>(c)] >= 0 ? 1 : 0;
   double today = 0;
   for (const std::size_t i : at.fit_blocks()) {
@@ -300,7 +314,7 @@ LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& 
 double structured_share(const Linearised& at, std::size_t joint, const LinearFit& fit, const MatrixXd& all_features,
                         const std::vector<std::size_t>& blocks) {
   const VectorXd e = only(at, at.residual(joint, fit), blocks);
-  const MatrixXd f = only(at, all_features, blocks);
+  const MatrixXd f = only(at, joint, all_features, blocks);
   Index count = 0;
   for (const std::size_t b : blocks) count += at.blocks()[b].healthy ? 0 : at.blocks()[b].count;
   if (!(e.squaredNorm() > 0) || 2 * count < 3 * f.cols()) return 0;

@@ -12,7 +12,7 @@ Eigen::MatrixXd features(const Linearised& at, std::size_t joint, bool healthy =
 struct LackOfFit {
   double state_p = 1;  ///< chance that noise looks as much like a function of the state
   double time_p = 1;   ///< .. like something periodic or slow in time
-  bool structured() const { return state_p < 1e-6 || time_p < 1e-8; }
+  bool structured() const { return state_p < 1e-6 || time_p < 1e-6; }
 };
 
 /// Is there structure in what a fit leaves of a joint, on the rows that fit? The statistic's distribution comes from

@@ -107,6 +107,7 @@ Linearised::Linearised(const Models& models, const std::vector<SessionLog>& logs
   weights_ = VectorXd::Ones(static_cast<Index>(rows_.size()));
   motions_.resize(logs.size());
   slow_.resize(logs.size());
+  background_.resize(rows_.size());
   robot_.resize(logs.size());
   parallel_for(logs.size(), [&](std::size_t l) {
     const ProcessedLog& log = logs[l].log;
@@ -221,8 +222,9 @@ void Linearised::make_unknowns() {
           // Where the load is inertia alone nothing tells them apart.
           u.kind = Unknown::Kind::rotor;
           u.in_base = rotor->in_base;
-          u.prior = 0;
-          u.prior_std = rotor_share * joint.rated_torque / std::max(joint.ddq_limit, 1e-9);
+          u.prior = rotor->inertia;
+          u.prior_std =
+              rotor->std > 0 ? rotor->std : rotor_share * joint.rated_torque / std::max(joint.ddq_limit, 1e-9);
         }
         unknowns_.push_back(u);
         u.prior_std = 0;
@@ -442,12 +444,11 @@ MatrixXd Linearised::base_rows(std::size_t log, std::size_t joint) const {
 void Linearised::make_rows() {
   const std::size_t n = joints();
   const Index total = log_rows_.back().first + log_rows_.back().count;
-  const auto first_unknown = [&](std::size_t j) { return first_base(j); };
   const auto nb = static_cast<Index>(base_.columns.size());
   // Which unknowns each joint feels: its base columns, its own, and everything that is not an effect on its torque.
   for (std::size_t j = 0; j < n; ++j) {
     JointRows& rows = rows_[j];
-    for (Index c = first_unknown(j); c < nb; ++c) rows.column.push_back(c);
+    for (Index c = first_base(j); c < nb; ++c) rows.column.push_back(c);
     for (Index c = nb; c < columns_; ++c) {
       const Unknown& u = unknowns_[static_cast<std::size_t>(c)];
       bool felt = u.joint == j && !u.body;
@@ -471,8 +472,8 @@ void Linearised::make_rows() {
     const Index at = log_rows_[l].first, count = log_rows_[l].count;
     std::vector<MatrixXd> full(n);  // everything but the base columns, and the prediction
     for (std::size_t j = 0; j < n; ++j) {
-      full[j].setZero(log.samples(), static_cast<Index>(rows_[j].column.size()) - (nb - first_unknown(j)) + 1);
-      rows_[j].x.block(at, 0, count, nb - first_unknown(j)) = base_rows(l, j);
+      full[j].setZero(log.samples(), static_cast<Index>(rows_[j].column.size()) - (nb - first_base(j)) + 1);
+      rows_[j].x.block(at, 0, count, nb - first_base(j)) = base_rows(l, j);
     }
     const MatrixXd torque = torque_of(l, model);
     MatrixXd predicted = torque;
@@ -532,7 +533,7 @@ void Linearised::make_rows() {
       }
       for (std::size_t j = 0; j < n; ++j) {
         const Index local = rows_[j].local[static_cast<std::size_t>(c)];
-        if (local >= 0 && columns[j].size() > 0) full[j].col(local - (nb - first_unknown(j))) = columns[j];
+        if (local >= 0 && columns[j].size() > 0) full[j].col(local - (nb - first_base(j))) = columns[j];
       }
     }
     const double lead = model.filter.torque_lead_s / log.step_s;
@@ -540,7 +541,7 @@ void Linearised::make_rows() {
       const auto k = static_cast<Index>(j);
       full[j].rightCols(1) = predicted.col(k);
       const MatrixXd kept = log.decimate(log.filter_columns(full[j]));
-      rows_[j].x.block(at, nb - first_unknown(j), count, kept.cols() - 1) = kept.leftCols(kept.cols() - 1);
+      rows_[j].x.block(at, nb - first_base(j), count, kept.cols() - 1) = kept.leftCols(kept.cols() - 1);
       MatrixXd tau = log.filter_columns(log.tau.col(k));
       if (lead != 0) tau = at_other_times(tau, -lead);
       rows_[j].y.segment(at, count) = log.decimate(tau) - kept.rightCols(1);
@@ -553,7 +554,6 @@ void Linearised::make_rows() {
     x0[c] = u.kind == Unknown::Kind::shape || u.kind == Unknown::Kind::width ? 0 : u.value;
   }
   std::vector<Index> all;
-  const Index columns_at_start = columns_;
   for (Index c = 0; c < columns_; ++c) all.push_back(c);
   parallel_for(n, [&](std::size_t j) {
     JointRows& rows = rows_[j];
@@ -622,41 +622,54 @@ void Linearised::make_rows() {
     sum_up(rows, 0);
   });
   for (const std::size_t j : models_.background) add_background(j);
-  for (Index c = columns_at_start; c < columns_; ++c) all.push_back(c);
   reweight();
 }
 
-/// Functions of the state of both sessions become nuisance: what a healthy joint has that no effect explains.
+/// What a healthy joint has that no effect explains.
 void Linearised::add_background(std::size_t joint) {
-  JointRows& rows = rows_[joint];
-  const MatrixXd more = features(*this, joint, true);
-  const Index from = rows.x.cols();
-  rows.x.conservativeResize(Eigen::NoChange, from + more.cols());
+  auto background = std::make_unique<Background>();
+  background->b = features(*this, joint, true);
+  MatrixXd& b = background->b;
   // Of the size of the noise each at most: friction and base parameters must not hide in it.
-  const VectorXd rms =
-      (more.colwise().norm() / std::sqrt(static_cast<double>(more.rows()))).transpose().array().max(1e-300);
-  rows.x.rightCols(more.cols()) = more * rms.cwiseInverse().asDiagonal();
-  background_information_.resize(joints(), 0.0);
-  background_information_[joint] = 4 * weights_[static_cast<Index>(joint)];
-  background_joint_.resize(static_cast<std::size_t>(more.cols()) + background_joint_.size(), joint);
-  for (Index i = 0; i < more.cols(); ++i) {
-    rows.column.push_back(columns_ + i);
-    nuisance_.push_back(columns_ + i);
+  const VectorXd rms = (b.colwise().norm() / std::sqrt(static_cast<double>(b.rows()))).transpose().array().max(1e-300);
+  b = b * rms.cwiseInverse().asDiagonal();
+  MatrixXd gram = MatrixXd::Identity(b.cols(), b.cols()) * Background::prior;
+  for (const std::size_t i : fit_blocks_) {
+    const auto rows = b.middleRows(blocks_[i].first, blocks_[i].count);
+    gram.noalias() += rows.transpose() * rows;
   }
-  columns_ += more.cols();
-  for (JointRows& other : rows_) other.local.resize(static_cast<std::size_t>(columns_), -1);
-  for (Index i = 0; i < more.cols(); ++i) rows.local[static_cast<std::size_t>(columns_ - more.cols() + i)] = from + i;
-  sum_up(rows, from);
+  background->inverse = SymmetricSolver(gram).inverse();
+  background_[joint] = std::move(background);
+  JointRows& rows = rows_[joint];
+  const Index total = rows.x.rows();
+  const MatrixXd x = without_background(joint, rows.x), y = without_background(joint, rows.y);
+  rows.x = x.topRows(total);
+  rows.y = y.topRows(total);
+  rows.more_x = x.bottomRows(x.rows() - total);
+  rows.more_y = y.bottomRows(y.rows() - total);
+  rows.sums.clear();
+  sum_up(rows, 0);
+}
+
+MatrixXd Linearised::without_background(std::size_t joint, const MatrixXd& x) const {
+  if (!background_[joint]) return x;
+  const Background& background = *background_[joint];
+  MatrixXd products = MatrixXd::Zero(background.b.cols(), x.cols());
+  for (const std::size_t i : fit_blocks_) {
+    const Block& block = blocks_[i];
+    products.noalias() +=
+        background.b.middleRows(block.first, block.count).transpose() * x.middleRows(block.first, block.count);
+  }
+  const MatrixXd c = background.inverse * products;
+  MatrixXd out(x.rows() + c.rows(), x.cols());
+  out.topRows(x.rows()) = x - background.b * c;
+  out.bottomRows(c.rows()) = -std::sqrt(Background::prior) * c;
+  return out;
 }
 
 void Linearised::sum_up(JointRows& rows, Index from) const {
   const Index cols = rows.x.cols(), more = cols - from;
-  rows.sums.resize(blocks_.size());
-  for (std::size_t b = 0; b < blocks_.size(); ++b) {
-    const Block& block = blocks_[b];
-    const auto x = rows.x.middleRows(block.first, block.count);
-    const auto y = rows.y.segment(block.first, block.count);
-    JointRows::Sums& s = rows.sums[b];
+  const auto add = [&](JointRows::Sums& s, const Eigen::Ref<const MatrixXd>& x, const Eigen::Ref<const VectorXd>& y) {
     s.gram.conservativeResize(cols, cols);
     const auto fresh = x.rightCols(more);
     s.gram.topRightCorner(from, more).noalias() = x.leftCols(from).transpose() * fresh;
@@ -665,10 +678,16 @@ void Linearised::sum_up(JointRows& rows, Index from) const {
     own.selfadjointView<Eigen::Lower>().rankUpdate(fresh.transpose());
     s.gram.bottomRightCorner(more, more) = own.selfadjointView<Eigen::Lower>();
     s.projection.conservativeResize(cols);
-    s.projection.tail(more) = x.rightCols(more).transpose() * y;
+    s.projection.tail(more) = fresh.transpose() * y;
     s.square = y.squaredNorm();
-    s.rows = static_cast<double>(block.count);
+    s.rows = static_cast<double>(y.size());
+  };
+  rows.sums.resize(blocks_.size());
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    const Block& block = blocks_[b];
+    add(rows.sums[b], rows.x.middleRows(block.first, block.count), rows.y.segment(block.first, block.count));
   }
+  if (rows.more_y.size() > 0) add(rows.more, rows.more_x, rows.more_y);
 }
 
 /// Columns around a model in which some of a joint's inertia is its rotor's: the same torque, but another load on the
@@ -718,6 +737,9 @@ std::vector<MatrixXd> Linearised::make(const Group& group) const {
       out[j].middleRows(log_rows_[l].first, log_rows_[l].count) = prepare(l, j, full.joints[j]);
     }
   }
+  for (std::size_t j = 0; j < joints(); ++j) {
+    if (out[j].size() > 0) out[j] = without_background(j, out[j]);
+  }
   return out;
 }
 
@@ -733,7 +755,9 @@ std::size_t Linearised::add(const Group& group, const std::vector<MatrixXd>& col
     if (columns[j].size() == 0) return;
     const Index from = rows.x.cols();
     rows.x.conservativeResize(Eigen::NoChange, from + g.count);
-    rows.x.rightCols(g.count) = columns[j];
+    rows.x.rightCols(g.count) = columns[j].topRows(rows.x.rows());
+    rows.more_x.conservativeResize(rows.more_y.size(), from + g.count);
+    rows.more_x.rightCols(g.count) = columns[j].bottomRows(rows.more_y.size());
     for (Index i = 0; i < g.count; ++i) {
       rows.local[static_cast<std::size_t>(g.first + i)] = from + i;
       rows.column.push_back(g.first + i);
@@ -768,9 +792,12 @@ void Linearised::add_all(std::vector<Group> groups) {
       }
     }
     rows.x.conservativeResize(Eigen::NoChange, at);
+    rows.more_x.conservativeResize(rows.more_y.size(), at);
     for (std::size_t g = 0; g < groups.size(); ++g) {
-      if (made[g][j].size() > 0)
-        rows.x.middleCols(rows.local[static_cast<std::size_t>(groups[g].first)], groups[g].count) = made[g][j];
+      if (made[g][j].size() == 0) continue;
+      const Index place = rows.local[static_cast<std::size_t>(groups[g].first)];
+      rows.x.middleCols(place, groups[g].count) = made[g][j].topRows(rows.x.rows());
+      rows.more_x.middleCols(place, groups[g].count) = made[g][j].bottomRows(rows.more_y.size());
     }
     sum_up(rows, from[j]);
   });
@@ -796,23 +823,17 @@ void Linearised::normal(const std::vector<Index>& columns, const std::vector<std
       gram(place, place) += w * rows.sums[b].gram(local, local);
       projection(place) += w * rows.sums[b].projection(local);
     }
+    if (rows.more_y.size() == 0) continue;
+    gram(place, place) += w * rows.more.gram(local, local);
+    projection(place) += w * rows.more.projection(local);
   }
   for (Index i = 0; i < p; ++i) {
     const auto c = static_cast<std::size_t>(columns[static_cast<std::size_t>(i)]);
-    if (c >= unknowns_.size()) {
-      gram(i, i) += background_information(static_cast<Index>(c));
-      continue;
-    }
-    if (unknowns_[c].prior_std == 0) continue;
+    if (c >= unknowns_.size() || unknowns_[c].prior_std == 0) continue;
     const double information = 1 / (unknowns_[c].prior_std * unknowns_[c].prior_std);
     gram(i, i) += information;
     projection[i] += information * unknowns_[c].prior;
   }
-}
-
-double Linearised::background_information(Index column) const {
-  const std::size_t at = static_cast<std::size_t>(column) - unknowns_.size();
-  return at < background_joint_.size() ? background_information_[background_joint_[at]] : 0;
 }
 
 LinearFit Linearised::solve(const std::vector<Index>& columns, const std::vector<std::size_t>& blocks) const {
@@ -873,6 +894,7 @@ MatrixXd Linearised::cross(const std::vector<Index>& columns, Index from) const 
     }
     const double w = weights_[static_cast<Index>(j)];
     for (const std::size_t b : fit_blocks_) out(place, there) += w * rows.sums[b].gram(local, theirs);
+    if (rows.more_y.size() > 0) out(place, there) += w * rows.more.gram(local, theirs);
   }
   return out;
 }
@@ -884,8 +906,10 @@ VectorXd Linearised::projection(Index from) const {
     for (std::size_t i = 0; i < rows.column.size(); ++i) {
       const Index c = rows.column[i];
       if (c < from) continue;
-      for (const std::size_t b : fit_blocks_)
-        out[c - from] += weights_[static_cast<Index>(j)] * rows.sums[b].projection[static_cast<Index>(i)];
+      const auto local = static_cast<Index>(i);
+      double sum = rows.more_y.size() > 0 ? rows.more.projection[local] : 0;
+      for (const std::size_t b : fit_blocks_) sum += rows.sums[b].projection[local];
+      out[c - from] += weights_[static_cast<Index>(j)] * sum;
     }
   }
   return out;
@@ -899,6 +923,7 @@ MatrixXd Linearised::gram(Index first, Index count) const {
     if (at < 0) continue;
     for (const std::size_t b : fit_blocks_)
       out += weights_[static_cast<Index>(j)] * rows.sums[b].gram.block(at, at, count, count);
+    if (rows.more_y.size() > 0) out += weights_[static_cast<Index>(j)] * rows.more.gram.block(at, at, count, count);
   }
   return out;
 }
@@ -923,21 +948,19 @@ void take_from_base(IdentifiedModel& model, const VectorXd& rotor_in_base, doubl
     add_to_base(model, k, -inertia * rotor_in_base[static_cast<Index>(k)]);
 }
 
-double least_inertia(const Linearised& at, std::size_t joint) {
+double least_inertia(const IdentifiedModel& model, std::size_t joint, const std::vector<const MatrixXd*>& logs) {
   constexpr Index poses = 200;
-  const IdentifiedModel& model = at.models().current;
-  const auto n = static_cast<Index>(at.joints());
+  const auto n = static_cast<Index>(model.joints.size());
   const auto j = static_cast<Index>(joint);
   Regressor regressor(to_dh(model.robot));
   VectorXd values = VectorXd::Zero(n * static_cast<Index>(parameters_per_link));
   for (const BaseParameter& parameter : model.base) values[static_cast<Index>(parameter.column)] = parameter.value;
   const VectorXd still = VectorXd::Zero(n), unit = VectorXd::Unit(n, j);
   double least = 1e300;
-  for (std::size_t l = 0; l < at.logs().size(); ++l) {
-    const MatrixXd& q = at.motion(l).q;
-    for (Index k = 0; k < q.rows(); k += std::max<Index>(1, q.rows() / poses)) {
-      const double with = regressor(q.row(k), still, unit).row(j) * values;
-      least = std::min(least, with - regressor(q.row(k), still, still).row(j) * values);
+  for (const MatrixXd* q : logs) {
+    for (Index k = 0; k < q->rows(); k += std::max<Index>(1, q->rows() / poses)) {
+      const double with = regressor(q->row(k), still, unit).row(j) * values;
+      least = std::min(least, with - regressor(q->row(k), still, still).row(j) * values);
     }
   }
   return least < 1e300 ? std::max(0.0, least) : 0;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -19,7 +20,8 @@ namespace fxdyn::diagnosis {
 /// gear that bends) tells them apart. See name().
 struct Rotor {
   std::size_t joint = 0;
-  Eigen::VectorXd in_base;  ///< base parameters of a rotor of 1 kg m^2 (kg)
+  Eigen::VectorXd in_base;      ///< base parameters of a rotor of 1 kg m^2 (kg)
+  double inertia = 0, std = 0;  ///< known beforehand, from a link encoder; std 0: it is not
 };
 
 /// Two states of one robot: before (the baseline, a session known to be healthy) and now. Base parameters are the same;
@@ -107,10 +109,22 @@ struct Fold {
   std::vector<std::size_t> fit, judge;  ///< blocks
 };
 
+/// Functions of the state that a healthy joint has already and no effect explains, with a prior that keeps each to the
+/// size of the noise: |y - X x - B b|^2 + prior |b|^2. Their coefficients are never of interest, so b is eliminated
+/// once: with C(v) = (B^T B + prior)^-1 B^T v of the rows that fit, every column v becomes v - B C(v) and gets rows
+/// more, - sqrt(prior) C(v). Sums of products of such columns are those of the whole problem less b.
+struct Background {
+  static constexpr double prior = 4;
+  Eigen::MatrixXd b;        ///< rows x functions, of RMS 1
+  Eigen::MatrixXd inverse;  ///< (B^T B + prior)^-1
+};
+
 /// One joint's whitened rows and their sums of products by block.
 struct JointRows {
   Eigen::MatrixXd x;
   Eigen::VectorXd y;
+  Eigen::MatrixXd more_x;  ///< what a Background adds
+  Eigen::VectorXd more_y;
   std::vector<Eigen::Index> column;  ///< of each column of x: its place in the whole
   std::vector<Eigen::Index> local;   ///< the inverse, -1: the joint does not feel it
   struct Sums {
@@ -119,6 +133,7 @@ struct JointRows {
     double square = 0, rows = 0;
   };
   std::vector<Sums> sums;
+  Sums more;  ///< of more_x and more_y; empty without a background
 };
 
 /// A fit of chosen columns.
@@ -159,8 +174,8 @@ class Linearised {
   const Eigen::VectorXd& weights() const { return weights_; }
   void set_weights(const Eigen::VectorXd& weights) { weights_ = weights; }
 
-  /// Columns of candidates (current session), whitened: per joint rows x columns; 0 x 0 where nothing is felt.
-  /// Safe from several threads.
+  /// Columns of candidates (current session), whitened: per joint rows x columns, below them those that the joint's
+  /// background adds; 0 x 0 where nothing is felt. Safe from several threads.
   std::vector<Eigen::MatrixXd> make(const Group& group) const;
   /// Appends them as a group; returns its index.
   std::size_t add(const Group& group, const std::vector<Eigen::MatrixXd>& columns);
@@ -176,10 +191,11 @@ class Linearised {
   Eigen::VectorXd residual(std::size_t joint, const LinearFit& fit) const;
   /// Share of a joint's rows in which the friction that an uncertain velocity makes is more than the noise.
   double doubtful(std::size_t joint) const;
+  bool is_doubtful(std::size_t joint, Eigen::Index row) const { return row_scale_[joint][row] < std::sqrt(0.5); }
   /// Sum of ln(row scale) of the rows that fit, see doubt(): part of their likelihood.
   double log_scale(std::size_t joint) const;
-  /// Prior information on a column of the background; 0 for others.
-  double background_information(Eigen::Index column) const;
+  /// Null: the joint has none.
+  const Background* background(std::size_t joint) const { return background_[joint].get(); }
   /// X^T W X and X^T W y.
   void normal(const std::vector<Eigen::Index>& columns, const std::vector<std::size_t>& blocks, Eigen::MatrixXd& gram,
               Eigen::VectorXd& projection) const;
@@ -201,6 +217,7 @@ class Linearised {
   void make_blocks();
   void make_rows();
   void add_background(std::size_t joint);
+  Eigen::MatrixXd without_background(std::size_t joint, const Eigen::MatrixXd& x) const;
   void sum_up(JointRows& rows, Eigen::Index from) const;
   Eigen::VectorXd doubt(std::size_t log, std::size_t joint, double sigma) const;
   Eigen::MatrixXd whiten(std::size_t joint, Eigen::MatrixXd columns) const;
@@ -236,16 +253,15 @@ class Linearised {
   std::vector<Eigen::VectorXd> whitening_;
   std::vector<Eigen::VectorXd> row_scale_;  ///< per joint: one over the root of what doubt() adds to a row's variance
   Eigen::VectorXd weights_;
-  std::vector<std::size_t> background_joint_;  ///< of each column after the unknowns
-  std::vector<double> background_information_;
+  std::vector<std::unique_ptr<Background>> background_;  ///< per joint
 };
 
 /// The base parameters of a model as a set of columns; its grouping is not there.
 BaseSet base_of(const IdentifiedModel& model);
 
 /// What of a joint's own inertia is the same in every pose, at most: the smallest element M_jj of the mass matrix along
-/// the logs. A rotor has no more.
-double least_inertia(const Linearised& at, std::size_t joint);
+/// positions (samples x joints each). A rotor has no more.
+double least_inertia(const IdentifiedModel& model, std::size_t joint, const std::vector<const Eigen::MatrixXd*>& q);
 
 /// Of the base parameters, whatever else is fitted.
 Eigen::MatrixXd base_covariance(const Linearised& at);

@@ -25,28 +25,8 @@ double misfit(const Linearised& at) {
     now.x[static_cast<Index>(c)] = u.value;
     if (u.prior_std > 0) sum += std::pow((u.value - u.prior) / u.prior_std, 2);
   }
-  VectorXd square = at.square(now, at.fit_blocks());
+  const VectorXd square = at.square(now, at.fit_blocks());
   const VectorXd rows = at.row_count(at.fit_blocks());
-  // A background has no values to keep: the best it can do.
-  for (const std::size_t j : at.models().background) {
-    const VectorXd e = at.residual(j, now);
-    std::vector<Index> local, used;
-    for (const Index c : at.nuisance()) {
-      const Index place = at.rows(j).local[static_cast<std::size_t>(c)];
-      if (c >= static_cast<Index>(at.unknowns().size()) && place >= 0) local.push_back(place);
-    }
-    for (const std::size_t b : at.fit_blocks()) {
-      for (Index i = 0; i < at.blocks()[b].count; ++i) used.push_back(at.blocks()[b].first + i);
-    }
-    const Eigen::MatrixXd x = at.rows(j).x(used, local);
-    const VectorXd y = e(used);
-    Eigen::MatrixXd gram = x.transpose() * x;
-    gram.diagonal().array() += local.empty()
-                                   ? 0
-                                   : at.background_information(at.rows(j).column[static_cast<std::size_t>(local[0])]) /
-                                         at.weights()[static_cast<Index>(j)];
-    square[static_cast<Index>(j)] = (y - x * SymmetricSolver(gram).solve(x.transpose() * y)).squaredNorm();
-  }
   for (Index j = 0; j < square.size(); ++j) {
     sum += rows[j] * std::log(std::max(square[j], 1e-300));
     sum -= 2 * at.log_scale(static_cast<std::size_t>(j));
@@ -81,9 +61,6 @@ void refit(Models& models, const std::vector<SessionLog>& all, const std::vector
       around = std::move(at);
       std::vector<Index> columns;
       for (Index c = 0; c < static_cast<Index>(around->unknowns().size()); ++c) columns.push_back(c);
-      for (const Index c : around->nuisance()) {
-        if (c >= static_cast<Index>(around->unknowns().size())) columns.push_back(c);
-      }
       step = around->solve(columns);
       share = 1;
       halvings = 0;
@@ -108,6 +85,19 @@ bool tells_rotor(std::string_view effect) {
 
 }  // namespace
 
+void bring_rotor(Models& models, const Rotor& rotor, double inertia) {
+  EffectFit fit;
+  fit.effect = RotorInertia::name;
+  fit.linear = {inertia};
+  std::vector<IdentifiedModel*> of{&models.current};
+  if (models.has_baseline) of.push_back(&models.healthy);
+  for (IdentifiedModel* model : of) {
+    model->joints[rotor.joint].effects.push_back(fit);
+    take_from_base(*model, rotor.in_base, inertia);
+  }
+  models.rotors.push_back(rotor);
+}
+
 EffectId name(Models& models, const Group& group, const VectorXd& theta) {
   EffectFit fit;
   fit.effect = group.candidate.effect;
@@ -130,16 +120,7 @@ EffectId name(Models& models, const Group& group, const VectorXd& theta) {
   const EffectId id{group.on_body, joint, effects.size() - 1};
   const JointFit& of = models.current.joints[joint];
   if (group.rotor && of.find(RotorInertia::name) == nullptr) {
-    EffectFit rotor;
-    rotor.effect = RotorInertia::name;
-    rotor.linear = {group.rotor_inertia};
-    effects.push_back(rotor);
-    take_from_base(models.current, group.rotor->in_base, group.rotor_inertia);
-    if (models.has_baseline) {
-      models.healthy.joints[joint].effects.push_back(rotor);
-      take_from_base(models.healthy, group.rotor->in_base, group.rotor_inertia);
-    }
-    models.rotors.push_back(*group.rotor);
+    bring_rotor(models, *group.rotor, group.rotor_inertia);
   }
   return id;
 }

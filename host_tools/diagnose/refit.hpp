@@ -14,6 +14,8 @@ void refit(Models& models, const std::vector<SessionLog>& logs, const std::vecto
 /// link's torque does (friction in proportion to the load, a gear that bends) brings the rotor's inertia with it where
 /// that is part of the base parameters: the gear carries the link, not the rotor.
 EffectId name(Models& models, const Group& group, const Eigen::VectorXd& theta);
+/// Makes some of the base parameters' inertia a rotor's, in both models.
+void bring_rotor(Models& models, const Rotor& rotor, double inertia);
 /// Takes a named effect out of the current model; `ids` of others follow.
 void take_back(Models& models, std::vector<EffectId>& ids, const EffectId& id);
 /// Likewise the rotor that name() brought; false: it brought none.

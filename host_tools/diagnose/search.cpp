@@ -325,6 +325,13 @@ std::size_t Search::refine(const Choice& state, std::size_t g) {
             cross.row(static_cast<Index>(i)) += w * rows.x.col(at).segment(block.first, block.count).transpose() * c;
         }
       }
+      const auto more = made[j].bottomRows(rows.more_y.size());
+      left.gram += w * more.transpose() * more;
+      left.projection += w * more.transpose() * rows.more_y;
+      for (std::size_t i = 0; i < state.fit.columns.size(); ++i) {
+        const Index at = rows.local[static_cast<std::size_t>(state.fit.columns[i])];
+        if (at >= 0 && more.rows() > 0) cross.row(static_cast<Index>(i)) += w * rows.more_x.col(at).transpose() * more;
+      }
     }
     const VectorXd size = left.gram.diagonal();
     const MatrixXd z = inverse * cross;

@@ -188,4 +188,33 @@ void check_same_robot(Models models, const std::vector<SessionLog>& logs, const 
   }
 }
 
+void check_judges(const IdentifiedModel& model, const std::vector<ProcessedLog>& now, const std::vector<bool>& still) {
+  constexpr double alike = 0.9;  // of the torque's power is the model's times a factor
+  constexpr double factor = 3;   // more than any load or change makes of all joints
+  for (const ProcessedLog& log : now) {
+    if (log.role != Role::validate) continue;
+    const MatrixXd ours = log.filter_columns(predict(model, log)), theirs = log.filter_columns(log.tau);
+    const Index count = log.last - log.first;
+    std::size_t judged = 0, odd = 0;
+    double last = 1;
+    for (std::size_t j = 0; j < still.size(); ++j) {
+      if (still[j]) continue;
+      ++judged;
+      const auto k = static_cast<Index>(j);
+      const auto x = ours.col(k).segment(log.first, count), y = theirs.col(k).segment(log.first, count);
+      const double xy = x.dot(y), xx = x.squaredNorm(), yy = y.squaredNorm();
+      const double times = xy / std::max(xx, 1e-300);
+      const bool scaled = times < 1 / factor || times > factor;
+      if (!scaled || xy * xy < alike * xx * yy) continue;
+      ++odd;
+      last = times;
+    }
+    if (judged == 0 || odd < judged) continue;
+    throw DataError(fmt::format(
+        "{}: its torques are {:.3g} times those of the train logs' motion, at every joint: other units, gains or sign? "
+        "Correct it or remove it (role = \"validate\")",
+        log.name, last));
+  }
+}
+
 }  // namespace fxdyn::diagnosis

@@ -24,19 +24,8 @@ struct Signal {
 };
 // The names of diagnosis.json; what is not among them is shown as it is.
 constexpr std::array signals{
-    Signal{"q", "position", "rad"},
-    Signal{"position", "position", "rad"},
-    Signal{"dq", "velocity", "rad/s"},
-    Signal{"velocity", "velocity", "rad/s"},
-    Signal{"ddq", "acceleration", "rad/s^2"},
-    Signal{"acceleration", "acceleration", "rad/s^2"},
-    Signal{"t", "time", "s"},
-    Signal{"time", "time", "s"},
-    Signal{"load", "load", "N*m"},
-    Signal{"tau", "torque", "N*m"},
-    Signal{"structural", "load", "N*m"},
-    Signal{"frequency", "frequency", "Hz"},
-    Signal{"f", "frequency", "Hz"},
+    Signal{"q", "position", "rad"}, Signal{"dq", "velocity", "rad/s"}, Signal{"ddq", "acceleration", "rad/s^2"},
+    Signal{"t", "time", "s"},       Signal{"load", "load", "N*m"},     Signal{"frequency", "frequency", "Hz"},
 };
 
 std::string unit_for(std::string_view revolute, const std::string& torque_unit) {

@@ -217,21 +217,33 @@ class ProjectReader {
     set(train.enhancement, table.find("enhancement"), as_count);
     set(train.activation, table.find("activation"), as_string);
     set(train.ridge, table.find("ridge"), as_positive);
-    if (auto pso = table.table("pso")) read_pso(*pso);
+    if (auto pso = table.table("pso")) train.pso = read_pso(*pso);
     table.finish();
   }
 
-  static void read_pso(Table& table) {
-    for (const char* key : {"particles", "iterations", "stall"}) {
-      if (const auto value = table.find(key)) value->count(1);
-    }
+  static PsoSettings read_pso(Table& table) {
+    PsoSettings pso;
+    set(pso.particles, table.find("particles"), between(2, 1000));
+    set(pso.iterations, table.find("iterations"), between(1, 10000));
+    set(pso.stall, table.find("stall"), between(1, 10000));
     if (auto bounds = table.table("bounds")) {
-      for (const char* key : {"windows", "nodes", "enhancement", "ridge"}) {
-        if (const auto value = bounds->find(key)) value->numbers(2, "lower, upper");
-      }
+      const auto read = [&](std::array<double, 2>& to, const char* key, double least, double most) {
+        const auto value = bounds->find(key);
+        if (!value) return;
+        const std::vector<double> ends = value->numbers(2, "lower, upper");
+        if (!(ends[0] >= least && ends[0] <= ends[1] && ends[1] <= most))
+          value->place().fail(fmt::format("expected {:g} <= lower <= upper <= {:g}", least, most));
+        to = {ends[0], ends[1]};
+      };
+      read(pso.windows, "windows", 1, 100);
+      // Linear feature nodes fold into the enhancement nodes: one number counts.
+      read(pso.nodes, "nodes", 1, 300);
+      read(pso.nodes, "enhancement", 1, 300);
+      read(pso.ridge, "ridge", 1e-8, 1e3);
       bounds->finish();
     }
     table.finish();
+    return pso;
   }
 
   void read_excite(Table& table) {

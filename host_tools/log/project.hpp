@@ -42,6 +42,13 @@ struct DiagnoseSettings {
   int max_effects = 3;  ///< per joint
 };
 
+/// Search of the BLS's hyperparameters by a particle swarm (host_tools/train/swarm.hpp).
+struct PsoSettings {
+  int particles = 30, iterations = 40, stall = 10;
+  /// Lowest and highest; nodes: of all windows.
+  std::array<double, 2> windows{1, 4}, nodes{4, 40}, ridge{1e-4, 1e-1};
+};
+
 struct TrainSettings {
   bool enabled = true;
   std::uint64_t seed = 1;
@@ -49,6 +56,7 @@ struct TrainSettings {
   std::optional<int> windows, nodes, enhancement;
   std::string activation = "tanh";
   std::optional<double> ridge;
+  std::optional<PsoSettings> pso;  ///< none: a small grid
 };
 
 struct TargetSettings {

@@ -283,14 +283,17 @@ void Pipeline::train() {
   follow(diagnosed);
   json training = json::array();
   if (settings.enabled) {
-    const auto outcomes = fxdyn::train(fitter, settings, progress_);
+    // The model holds the hashes of project and logs: all that the outcome depends on.
+    const ResumeFile resume{directory_ / "train.pso.json", hash_of(to_json(diagnosed).dump())};
+    const auto outcomes = fxdyn::train(fitter, settings, progress_, resume);
     for (std::size_t j = 0; j < outcomes.size(); ++j) {
       training.push_back({{"joint", project_.robot.joints[j].name},
                           {"index", j + 1},
                           {"unit", project_.robot.joints[j].torque_unit()},
                           {"held_out_without", outcomes[j].error_without},
                           {"held_out_with", outcomes[j].error_with},
-                          {"kept", outcomes[j].kept}});
+                          {"kept", outcomes[j].kept},
+                          {"evaluations", outcomes[j].evaluations}});
     }
   }
   progress_.stage("fit, standard deviations, possible bodies", 2);

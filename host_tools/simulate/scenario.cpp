@@ -175,6 +175,50 @@ double longest_delay(const IdentifiedModel& plant) {
   return longest;
 }
 
+/// The plant is what identify or diagnose made of a robot.
+void read_model_plant(const Value& name, const fs::path& directory, Scenario& scenario) {
+  IdentifiedModel& plant = scenario.plant;
+  plant = read_model(directory / name.string());
+  plant.filter.torque_lead_s = 0;
+  plant.session.reset();
+  for (const JointFit& joint : plant.joints)
+    scenario.bounds.push_back({joint.q_lower, joint.q_upper, joint.dq_limit, joint.ddq_limit});
+}
+
+void read_robot(Table& root, const fs::path& file, Scenario& scenario) {
+  IdentifiedModel& plant = scenario.plant;
+  Table table(root.need("robot", "add [robot] with urdf = \"...\" or model = \"...\""));
+  if (const auto model = table.find("model")) {
+    if (const auto urdf = table.find("urdf")) urdf->place().fail("model has the robot already: remove one of them");
+    read_model_plant(*model, file.parent_path(), scenario);
+    table.finish();
+    return;
+  }
+  const Value urdf = table.need("urdf", "a URDF with inertias");
+  plant.robot = read_urdf(file.parent_path() / urdf.string());
+  if (const auto gravity = table.find("gravity")) {
+    const auto g = gravity->numbers(3, "x, y, z");
+    plant.robot.gravity = {g[0], g[1], g[2]};
+  }
+  const std::size_t n = plant.robot.size();
+  const DhChain chain = to_dh(plant.robot);
+  plant.joints.resize(n);
+  const auto rated = table.need("rated_torque", "noise is a share of it").positives(n, "one a joint");
+  const auto acceleration = table.need("acceleration", "limit of the motion").positives(n, "one a joint");
+  for (std::size_t j = 0; j < n; ++j) {
+    const Joint& joint = plant.robot.joints[j];
+    if (!joint.inertial) urdf.place().fail(fmt::format("link {} has no <inertial>: a plant needs one", joint.link));
+    if (!joint.limits) urdf.place().fail(fmt::format("joint {} has no <limit>: the motion needs it", joint.name));
+    plant.inertia.push_back(to_link_inertia(*joint.inertial, chain.urdf_in_dh[j]));
+    plant.joints[j].rated_torque = rated[j];
+    const bool turns = joint.continuous || !(joint.limits->upper > joint.limits->lower);
+    scenario.bounds.push_back({turns ? -std::numbers::pi : joint.limits->lower,
+                               turns ? std::numbers::pi : joint.limits->upper, joint.limits->velocity,
+                               acceleration[j]});
+  }
+  table.finish();
+}
+
 }  // namespace
 
 double plant_step(const Scenario& scenario) {
@@ -196,33 +240,7 @@ Scenario read_scenario(const fs::path& file) {
   const toml::table root_table = toml_input::parse(file);
   Table root({file.string(), "", 1}, root_table);
   Scenario scenario;
-  IdentifiedModel& plant = scenario.plant;
-  {
-    Table table(root.need("robot", "add [robot] with urdf = \"...\""));
-    const Value urdf = table.need("urdf", "a URDF with inertias");
-    plant.robot = read_urdf(file.parent_path() / urdf.string());
-    if (const auto gravity = table.find("gravity")) {
-      const auto g = gravity->numbers(3, "x, y, z");
-      plant.robot.gravity = {g[0], g[1], g[2]};
-    }
-    const std::size_t n = plant.robot.size();
-    const DhChain chain = to_dh(plant.robot);
-    plant.joints.resize(n);
-    const auto rated = table.need("rated_torque", "noise is a share of it").positives(n, "one a joint");
-    const auto acceleration = table.need("acceleration", "limit of the motion").positives(n, "one a joint");
-    for (std::size_t j = 0; j < n; ++j) {
-      const Joint& joint = plant.robot.joints[j];
-      if (!joint.inertial) urdf.place().fail(fmt::format("link {} has no <inertial>: a plant needs one", joint.link));
-      if (!joint.limits) urdf.place().fail(fmt::format("joint {} has no <limit>: the motion needs it", joint.name));
-      plant.inertia.push_back(to_link_inertia(*joint.inertial, chain.urdf_in_dh[j]));
-      plant.joints[j].rated_torque = rated[j];
-      const bool turns = joint.continuous || !(joint.limits->upper > joint.limits->lower);
-      scenario.bounds.push_back({turns ? -std::numbers::pi : joint.limits->lower,
-                                 turns ? std::numbers::pi : joint.limits->upper, joint.limits->velocity,
-                                 acceleration[j]});
-    }
-    table.finish();
-  }
+  read_robot(root, file, scenario);
   scenario.seed = static_cast<std::uint64_t>(root.need("seed", "noise is drawn from it").integer(0));
   if (auto table = root.table("sensors")) {
     toml_input::set(scenario.sample_s, table->find("sample_s"), toml_input::as_positive);
@@ -238,6 +256,8 @@ Scenario read_scenario(const fs::path& file) {
   }
   if (const auto kind = root.find("plant")) {
     if (kind->name({"internal", "mujoco"}, "plant") == "mujoco") scenario.plant_kind = Scenario::Plant::mujoco;
+    if (scenario.plant_kind == Scenario::Plant::mujoco && !scenario.plant.base.empty())
+      kind->place().fail("MuJoCo needs the inertia of every body, a model has base parameters: use urdf");
   }
   if (const auto motion = root.find("motion")) {
     if (motion->name({"prescribed", "closed_loop"}, "motion") == "closed_loop")

@@ -1,114 +1,178 @@
 #include "host_tools/train/train.hpp"
 
-#include <cmath>
+#include <fmt/format.h>
 
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "host_tools/error.hpp"
+#include "host_tools/files.hpp"
 #include "host_tools/parallel.hpp"
-#include "host_tools/random.hpp"
-#include "model/broad_learning.hpp"
+#include "host_tools/train/swarm.hpp"
+#include "host_tools/train/tuning.hpp"
 
 namespace fxdyn {
 namespace {
 
+using nlohmann::json;
+
 constexpr double worth_keeping = 0.05;
 constexpr double nearly = 1.05;
-
-/// The nodes of fixed point are off by up to 4e-5 (model/dense.hpp), and by a tenth of that on the average:
-/// coefficients that add up to more than this many times the rated torque would show.
-constexpr double largest_sum = 20;
 
 struct Choice {
   JointFit design;
   Judgement judgement;
+  int evaluations = 0;
 };
 
-/// Weights lie on a grid that every format of theirs holds, so that fixed point does not change them.
-constexpr double weight_grid = 512;
-
-/// Random feature weights (paper Eqs. 23 and 25), drawn once: fewer nodes are the first rows of more.
-Eigen::MatrixXd random_weights(std::uint64_t seed, Eigen::Index nodes, double scale) {
-  Random random(seed);
-  const auto inputs = static_cast<Eigen::Index>(BroadLearningLayout::inputs);
-  Eigen::MatrixXd weights(nodes, inputs + 1);
-  for (Eigen::Index k = 0; k < nodes; ++k) {
-    for (Eigen::Index i = 0; i <= inputs; ++i) weights(k, i) = scale * random.uniform(-1, 1);
-    weights(k, 0) *= 1.5;  // half of what the velocity's curve spans
+/// Of one joint. Its design has no BLS where none is quiet enough.
+Choice by_grid(const Fitter& fitter, std::size_t j, const TrainSettings& settings, Progress& progress) {
+  std::vector<double> ridges{1e-5, 1e-4, 1e-3, 1e-2};
+  if (settings.ridge) ridges = {*settings.ridge};
+  std::vector<Eigen::Index> sizes{10, 20, 40};
+  if (settings.enhancement)
+    sizes = {*settings.enhancement};
+  else if (settings.nodes)
+    sizes = {*settings.nodes * settings.windows.value_or(1)};
+  const BlsDesigner design_of(fitter, j, settings.seed);
+  std::vector<Choice> tried;
+  std::optional<std::size_t> best;
+  std::vector<double> distance_of;
+  Choice out;
+  const auto attempt = [&](const BlsShape& shape) {
+    JointFit design = design_of(shape);
+    const std::vector<Judgement> judgements = fitter.held_out_with(j, design, ridges);
+    for (std::size_t i = 0; i < judgements.size(); ++i) {
+      ++out.evaluations;
+      if (!is_quiet(judgements[i], design.rated_torque)) continue;
+      design.bls->ridge = ridges[i];
+      tried.push_back({design, judgements[i]});
+      distance_of.push_back(shape.distance);
+      if (!best || judgements[i].rmse < tried[*best].judgement.rmse) best = tried.size() - 1;
+    }
+    progress.step();
+  };
+  // The presliding distance matters most: it is chosen with a middling network, the network with that distance.
+  for (const double share : {3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2})
+    attempt({.nodes = sizes[sizes.size() / 2], .distance = share});
+  if (!best) return out;
+  const double distance = distance_of[*best];
+  for (const double scale : {1.0, 3.0}) {
+    for (const Eigen::Index nodes : sizes) attempt({.nodes = nodes, .scale = scale, .distance = distance});
   }
-  return (weights * weight_grid).array().round() / weight_grid;
+  // Of those that are nearly as good, the one with the smallest coefficients: it leans least on its training data.
+  const int evaluations = out.evaluations;
+  for (const Choice& choice : tried) {
+    if (choice.judgement.rmse > nearly * tried[*best].judgement.rmse) continue;
+    if (!out.design.bls || choice.judgement.coefficient_sum < out.judgement.coefficient_sum) out = choice;
+  }
+  out.evaluations = evaluations;
+  return out;
 }
 
-double span(const Fitter& fitter, std::size_t joint) {
-  double low = 1e300, high = -1e300;
-  for (const ProcessedLog& log : fitter.logs()) {
-    low = std::min(low, log.q.col(static_cast<Eigen::Index>(joint)).minCoeff());
-    high = std::max(high, log.q.col(static_cast<Eigen::Index>(joint)).maxCoeff());
-  }
-  return high - low;
+void save(const ResumeFile& file, const std::vector<Swarm>& swarms) {
+  json state = {{"schema", "fxdyn.pso/1"}, {"identity", file.identity}, {"swarms", json::array()}};
+  for (const Swarm& swarm : swarms) state["swarms"].push_back(swarm.to_json());
+  write_file(file.path, state.dump() + "\n");
 }
 
-double top_speed(const Fitter& fitter, std::size_t joint) {
-  double top = 0;
-  for (const ProcessedLog& log : fitter.logs())
-    top = std::max(top, log.joint_motion(static_cast<Eigen::Index>(joint)).dq.cwiseAbs().maxCoeff());
-  return top;
+void load(const ResumeFile& file, std::vector<Swarm>& swarms) {
+  if (!std::filesystem::exists(file.path)) return;
+  const std::string refused = fmt::format(
+      "{}: the generations in it are of another project, other logs or other settings; remove it to start anew",
+      file.path.string());
+  try {
+    const json state = json::parse(read_file(file.path));
+    if (state.at("schema") != "fxdyn.pso/1" || state.at("identity") != file.identity) throw DataError(refused);
+    if (state.at("swarms").size() != swarms.size()) throw DataError(refused);
+    for (std::size_t j = 0; j < swarms.size(); ++j) swarms[j].from_json(state["swarms"][j]);
+  } catch (const json::exception&) {
+    throw DataError(
+        fmt::format("{}: not a generation of a search, or cut off; remove it to start anew", file.path.string()));
+  } catch (const InputError&) {
+    throw DataError(refused);
+  }
+}
+
+/// All joints, generation by generation: with few joints left the particles still fill all cores.
+std::vector<Choice> by_swarm(const Fitter& fitter, const TrainSettings& settings, Progress& progress,
+                             const std::optional<ResumeFile>& resume) {
+  const std::size_t n = fitter.joints();
+  const PsoSettings& pso = *settings.pso;
+  const BlsSpace space(pso);
+  std::vector<Swarm> swarms;
+  std::vector<BlsDesigner> designers;
+  for (std::size_t j = 0; j < n; ++j) {
+    SwarmSettings swarm;
+    swarm.particles = pso.particles;
+    swarm.iterations = pso.iterations;
+    swarm.stall = pso.stall;
+    swarm.seed = settings.seed * 1000 + j;
+    swarms.emplace_back(space.lower(), space.upper(), swarm);
+    designers.emplace_back(fitter, j, settings.seed);
+  }
+  if (resume) load(*resume, swarms);
+  const auto judge = [&](std::size_t j, const Eigen::VectorXd& x, JointFit& design) {
+    design = designers[j](space(x));
+    return fitter.held_out_with(j, design, {design.bls->ridge})[0];
+  };
+  const auto particles = static_cast<std::size_t>(pso.particles);
+  for (const Swarm& swarm : swarms) {
+    for (int k = 0; k < swarm.generation(); ++k) progress.step();
+  }
+  for (;;) {
+    std::vector<std::size_t> busy;
+    for (std::size_t j = 0; j < n; ++j) {
+      if (!swarms[j].finished()) busy.push_back(j);
+    }
+    if (busy.empty()) break;
+    std::vector<Eigen::VectorXd> values(n, Eigen::VectorXd(pso.particles));
+    parallel_for(busy.size() * particles, [&](std::size_t i) {
+      const std::size_t j = busy[i / particles];
+      const auto p = static_cast<Eigen::Index>(i % particles);
+      JointFit design;
+      const Judgement judgement = judge(j, swarms[j].positions().col(p), design);
+      // Sums that fixed point could not hold count as ten times as bad as they are.
+      const double value = fitness(judgement, design);
+      values[j][p] = is_quiet(judgement, design.rated_torque) ? value : 10 * value;
+    });
+    for (const std::size_t j : busy) {
+      swarms[j].tell(values[j]);
+      progress.step();
+    }
+    if (resume) save(*resume, swarms);
+  }
+  std::vector<Choice> chosen(n);
+  parallel_for(n, [&](std::size_t j) {
+    Choice& choice = chosen[j];
+    choice.judgement = judge(j, swarms[j].best(), choice.design);
+    choice.evaluations = swarms[j].generation() * pso.particles;
+    if (!is_quiet(choice.judgement, choice.design.rated_torque)) choice.design.bls.reset();
+  });
+  if (resume) std::filesystem::remove(resume->path);
+  return chosen;
 }
 
 }  // namespace
 
-std::vector<TrainOutcome> train(Fitter& fitter, const TrainSettings& settings, Progress& progress) {
+std::vector<TrainOutcome> train(Fitter& fitter, const TrainSettings& settings, Progress& progress,
+                                const std::optional<ResumeFile>& resume) {
   const std::size_t n = fitter.joints();
-  std::vector<double> ridges{1e-5, 1e-4, 1e-3, 1e-2};
-  if (settings.ridge) ridges = {*settings.ridge};
-  std::vector<Eigen::Index> sizes{10, 20, 40};
-  if (settings.nodes) sizes = {*settings.nodes * settings.windows.value_or(1)};
-  const std::vector<double> scales{1.0, 3.0};
-  const std::vector<double> distances{3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2};  // of the joint's range
-  const std::size_t candidates = distances.size() + scales.size() * sizes.size();
-
-  progress.stage("training the BLS", n * candidates);
+  constexpr std::size_t grid_steps = 12;
+  const std::size_t steps = settings.pso ? static_cast<std::size_t>(settings.pso->iterations) + 1 : grid_steps;
+  progress.stage(settings.pso ? "training the BLS, by particle swarm" : "training the BLS", n * steps);
   const std::vector<Judgement> without = fitter.held_out();
   std::vector<Choice> chosen(n);
-  parallel_for(n, [&](std::size_t j) {
-    std::vector<Choice> tried;
-    const Choice* best = nullptr;
-    tried.reserve(candidates * ridges.size());
-    const double range = span(fitter, j);
-    JointFit design = fitter.design(j);
-    BroadLearningFit bls;
-    // fixed point's asinh ends at 128
-    bls.reference_velocity = std::max(0.02 * top_speed(fitter, j), design.dq_limit / 120);
-    bls.span = std::asinh(std::max(top_speed(fitter, j), design.dq_limit) / bls.reference_velocity);
-    const auto attempt = [&](double distance, double scale, Eigen::Index nodes) {
-      bls.distances = {distance / 3, distance, distance * 3};
-      bls.weights = random_weights(settings.seed * 100 + j, nodes, scale);
-      design.bls = bls;
-      const std::vector<Judgement> judgements = fitter.held_out_with(j, design, ridges);
-      for (std::size_t i = 0; i < judgements.size(); ++i) {
-        if (judgements[i].coefficient_sum > largest_sum * design.rated_torque) continue;
-        tried.push_back({design, judgements[i]});
-        tried.back().design.bls->ridge = ridges[i];
-        if (best == nullptr || judgements[i].rmse < best->judgement.rmse) best = &tried.back();
-      }
-      progress.step();
-    };
-    // The presliding distance matters most: it is chosen with a middling network, the network with that distance.
-    for (const double share : distances) attempt(share * range, 1.0, sizes[sizes.size() / 2]);
-    if (best == nullptr) return;  // none whose coefficients are small enough
-    const double distance = best->design.bls->distances[1];
-    for (const double scale : scales) {
-      for (const Eigen::Index nodes : sizes) attempt(distance, scale, nodes);
-    }
-    // Of those that are nearly as good, the one with the smallest coefficients: it leans least on its training data.
-    for (const Choice& choice : tried) {
-      if (choice.judgement.rmse > nearly * best->judgement.rmse) continue;
-      if (!chosen[j].design.bls || choice.judgement.coefficient_sum < chosen[j].judgement.coefficient_sum)
-        chosen[j] = choice;
-    }
-  });
-
+  if (settings.pso) {
+    chosen = by_swarm(fitter, settings, progress, resume);
+  } else {
+    parallel_for(n, [&](std::size_t j) { chosen[j] = by_grid(fitter, j, settings, progress); });
+  }
   std::vector<TrainOutcome> outcomes(n);
   for (std::size_t j = 0; j < n; ++j) {
-    outcomes[j] = {without[j].rmse, chosen[j].judgement.rmse, chosen[j].judgement.beats(without[j], worth_keeping)};
-    if (outcomes[j].kept) fitter.set_design(j, chosen[j].design);
+    const bool kept = chosen[j].design.bls && chosen[j].judgement.beats(without[j], worth_keeping);
+    outcomes[j] = {without[j].rmse, chosen[j].judgement.rmse, kept, chosen[j].evaluations};
+    if (kept) fitter.set_design(j, chosen[j].design);
   }
   progress.done();
   return outcomes;

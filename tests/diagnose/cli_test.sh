@@ -147,6 +147,30 @@ project empty $now empty.csv baseline
 expect 2 "empty.csv" diagnose empty
 baseline short 'NR < 60 { print }'
 expect 1 "short.csv" diagnose short
+baseline back 'NR == 400 { $1 = 0 } { print }'
+expect 2 "back.csv:400" diagnose back
+baseline torqueless '{ print $1, $2, $3 }'
+expect 2 "no column 'tau1'" diagnose torqueless
+# shellcheck disable=SC2086
+project gone $now gone.csv baseline
+expect 2 "gone.csv" diagnose gone
+
+# judge NAME 'awk program': the validate log changed
+judge() {
+  awk -F, "BEGIN { OFS = \",\" } $2" b.csv >"$1.csv"
+  project "$1" a.csv train "$1.csv" validate c.csv test
+}
+judge joule 'NR > 1 { $4 *= 1000; $5 *= 1000 } { print }'
+expect 1 "joule.csv: its torques are" diagnose joule
+judge fewer '{ print $1, $2, $4 }'
+expect 2 "no column 'q2'" diagnose fewer
+
+# A diagnosed model is a plant.
+printf 'seed = 1\n[robot]\nmodel = "%s/run/model.json"\n[[log]]\nname = "played"\nduration_s = 4\nseed = 3\n' "$work" >played.toml
+"$fxdyn" simulate played.toml --out played >played.txt 2>&1 || fail "simulate a model: $(tail -1 played.txt)"
+"$fxdyn" predict --model run/model.json --log played/played.csv --out again >again.txt 2>&1 || fail "predict what was played"
+worst=$(grep -o '"relative": [0-9.e-]*' again/metrics.json | awk '{ if ($2 > w) w = $2 } END { print w }')
+awk -v w="$worst" 'BEGIN { exit !(w < 0.01) }' || fail "the played model's torque is not its prediction: $worst"
 
 [ $failures -eq 0 ] && echo "the chain holds, and bad input is refused as it should be"
 exit $failures

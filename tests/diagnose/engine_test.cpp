@@ -97,6 +97,20 @@ TEST(Diagnosis, LoadFrictionLeavesOutTheRotor) {
   EXPECT_GT(report.at("joints").at(0).at("closure"), 0.9);
 }
 
+TEST(Diagnosis, ALinkEncoderTellsTheRotorFromTheLink) {
+  if (test::sanitized) GTEST_SKIP() << "other cases run the same code";
+  // The gear carries the link alone; the base parameters of the shoulder have its rotor too.
+  const auto out = test::diagnose_sessions("shoulder_gear",
+                                           {.missing = effect("elasticity", 1, "compliance = 1e-4, relaxation = 0.002"),
+                                            .sensors = "link_encoders = \"all\"\nlink_encoder_bits = 19"});
+  const json report = json::parse(read_file(out / "diagnosis.json"));
+  EXPECT_NEAR(parameter(only(report, 0, "elasticity"), "compliance"), 1e-4, 3e-6);
+  const IdentifiedModel model = read_model(out / "model.json");
+  const EffectFit* rotor = model.joints[0].find("rotor_inertia");
+  ASSERT_NE(rotor, nullptr);
+  EXPECT_NEAR(rotor->linear[0], 0.2, 0.03);
+}
+
 TEST(Diagnosis, LoadFrictionOfTheHealthyRobotIsNoFinding) {
   if (test::sanitized) GTEST_SKIP() << "other cases run the same code";
   const json report = diagnosed("load_before", {.already = effect("load_friction", 1, "coefficient = 0.15")});

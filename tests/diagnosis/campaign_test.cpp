@@ -168,7 +168,11 @@ TEST(CampaignScore, PairsOutsideAndClean) {
   EXPECT_FALSE(scored({{{"effect", "stribeck"}, {"joint", 2}}, {{"effect", "ripple"}, {"joint", 1}}}).at("both"));
   const json flagged = scored({{{"effect", "jerk"}, {"joint", 3}, {"outside", true}}});
   EXPECT_TRUE(flagged.at("flagged"));
-  EXPECT_FALSE(flagged.at("accepted"));
+  EXPECT_TRUE(flagged.at("accepted"));  // at other joints
+  diagnosis["joints"][1]["effects"] = json::array();
+  diagnosis["robot_effects"] = json::array();
+  EXPECT_FALSE(scored({{{"effect", "jerk"}, {"joint", 3}, {"outside", true}}}).at("accepted"));
+  diagnosis = json::parse(diagnosis_text);
   const json accepted = scored({{{"effect", "jerk"}, {"joint", 2}, {"outside", true}}});
   EXPECT_FALSE(accepted.at("flagged"));
   EXPECT_TRUE(accepted.at("accepted"));

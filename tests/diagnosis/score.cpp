@@ -114,7 +114,8 @@ json score(const json& truth, const json& diagnosis, std::optional<double> closu
     const bool flagged = unexplained.contains(joint);
     const bool taken = any_of(named.begin(), named.end(), [&](const Named& one) { return one.joint == joint; });
     out["flagged"] = flagged;
-    out["accepted"] = !named.empty() && !flagged;
+    out["accepted"] = std::any_of(named.begin(), named.end(),
+                                  [&](const Named& one) { return !flagged || !unexplained.contains(one.joint); });
     out["named_beside"] = taken && flagged;
     out["right_joint"] = flagged || taken;
     out["passed"] = flagged;

@@ -12,7 +12,7 @@ struct Rate {
   double value() const { return of == 0 ? 0 : static_cast<double>(hit) / static_cast<double>(of); }
 };
 
-/// One figure of the issue beside its goal.
+/// One figure beside its goal.
 struct Figure {
   std::string what, goal;
   double value = 0;
