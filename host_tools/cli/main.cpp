@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "host_tools/compare/compare.hpp"
 #include "host_tools/error.hpp"
 #include "host_tools/excite/excite.hpp"
 #include "host_tools/model/effects.hpp"
@@ -92,6 +93,8 @@ int run(int argc, char** argv) {
   const CLI::App* export_verb =
       stage("export", "Choose fixed-point formats, write tables.hpp, tables.bin, export.json.");
   const CLI::App* report_verb = stage("report", "Draw report.html from what the other stages wrote.");
+  const CLI::App* compare_verb =
+      stage("compare", "Every method on the same logs, from plain least squares to named effects: compare.json.");
   CLI::App* replay_verb =
       stage("replay", "Stream the held-out logs to a firmware image in QEMU and compare bit for bit: replay.json.");
   replay_verb->add_option("--image", image, "firmware image (.elf) made by toolchains/build_image.sh")->required();
@@ -151,6 +154,8 @@ int run(int argc, char** argv) {
   } else if (*payload_verb) {
     identify_payload(model, log, out);
     fmt::print("load in {}/payload.json, model with it in {}/model.json\n", out, out);
+  } else if (*compare_verb) {
+    fmt::print("{}", compare_table(compare(project, out)));
   } else {
     Pipeline pipeline(project, out);
     if (*run_verb) pipeline.run();

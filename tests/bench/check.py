@@ -6,7 +6,8 @@ import json
 import subprocess
 import sys
 
-LIMITS = [("rnea_fxdyn", "rnea_kdl", 0.6), ("rnea_fxdyn", "rnea_mujoco", 0.4), ("regressor_fxdyn", "rnea_kdl", 1.15)]
+LIMITS = [("rnea_fxdyn", "rnea_kdl", 0.6), ("rnea_fxdyn", "rnea_mujoco", 0.4), ("regressor_fxdyn", "rnea_kdl", 1.15),
+          ("ridge_sweep_moments", "ridge_sweep_dense", 0.1)]
 
 run = subprocess.run([sys.argv[1], "--benchmark_format=json"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=True)
 times = {}

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "host_tools/log/log.hpp"
+#include "host_tools/log/truth.hpp"
 #include "host_tools/robot/robot.hpp"
 
 namespace fxdyn::campaign {
@@ -12,11 +13,6 @@ inline Log read_exact(const std::filesystem::path& file, const Robot& robot) {
   std::vector<bool> turns;
   for (const Joint& joint : robot.joints) turns.push_back(joint.type == JointType::revolute);
   return read_log(file, robot.size(), turns, {}, {}, {});
-}
-
-/// Noise-free torques, samples x joints. The file has no positions: the reader is told to take the torques for them.
-inline Eigen::MatrixXd read_truth(const std::filesystem::path& file, std::size_t joints) {
-  return read_log(file, joints, std::vector<bool>(joints, false), {{{"q", "tau"}}, {}}, {}, {}).tau;
 }
 
 }  // namespace fxdyn::campaign

@@ -1,0 +1,437 @@
+#include "host_tools/compare/compare.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "host_tools/compare/mlp.hpp"
+#include "host_tools/compare/state_bls.hpp"
+#include "host_tools/error.hpp"
+#include "host_tools/export/export.hpp"
+#include "host_tools/files.hpp"
+#include "host_tools/identify/identify.hpp"
+#include "host_tools/log/truth.hpp"
+#include "host_tools/model/effects.hpp"
+#include "host_tools/parallel.hpp"
+#include "host_tools/pipeline/pipeline.hpp"
+#include "host_tools/train/ridge.hpp"
+#include "host_tools/train/swarm.hpp"
+#include "host_tools/train/train.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+constexpr Index mlp_nodes = 32;
+/// Of one joint's share of the rigid body (852 for six joints, counted in the generated code).
+constexpr double rnea_multiplications = 142;
+
+/// A test log and what it is judged against.
+struct TestLog {
+  ProcessedLog log;
+  MatrixXd reference;             ///< full rate, unfiltered
+  std::optional<fs::path> truth;  ///< truth.json of its scenario
+};
+
+using Torque = std::function<MatrixXd(const ProcessedLog&)>;
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// What the state alone says, one row a sample: x = [q, dq, ddq] (paper Eq. 22).
+MatrixXd states(const ProcessedLog& log, std::size_t joint) {
+  const MotionRows m = log.joint_motion(static_cast<Index>(joint));
+  MatrixXd x(m.q.rows(), 3);
+  x << m.q, m.dq, m.ddq;
+  return x;
+}
+
+class Comparison {
+ public:
+  Comparison(const fs::path& project, const fs::path& directory)
+      : pipeline_(project, directory), project_(pipeline_.project()), data_(read_gate_data(project_, directory)) {
+    for (Log& log : read_logs(project_, Role::test, directory)) {
+      const fs::path file = log.file;
+      fs::path clean = file;
+      clean.replace_extension(".truth.csv");
+      TestLog test{process(std::move(log), data_.filter), {}, {}};
+      if (fs::exists(clean)) {
+        test.reference = read_truth(clean, project_.robot.size(), test.log.from_s, test.log.to_s);
+        if (test.reference.rows() != test.log.samples())
+          throw InputError(fmt::format("{}: {} samples, its log has {}: simulate again", clean.string(),
+                                       test.reference.rows(), test.log.samples()));
+        test.truth = file.parent_path() / "truth.json";
+      } else {
+        against_truth_ = false;
+        test.reference = test.log.tau;
+      }
+      tests_.push_back(std::move(test));
+    }
+    if (tests_.empty()) throw DataError("compare: no test log; add a [[log]] with role = \"test\"");
+    const auto judges = [](const ProcessedLog& log) { return log.role == Role::validate; };
+    if (std::none_of(data_.logs.begin(), data_.logs.end(), judges))
+      throw DataError("compare: no validate log; add a [[log]] with role = \"validate\", another trajectory");
+    if (!against_truth_) {
+      for (TestLog& test : tests_) test.reference = test.log.tau;
+    }
+  }
+
+  json run() {
+    structural("rigid_ls", {}, "ls");
+    const IdentifiedModel rigid = *last_;
+    structural("friction_ls", friction, "wls");
+    const IdentifiedModel with_friction = *last_;
+    structural("rls", friction, "rls");
+    mlp(with_friction);
+    state_bls("bls_default", rigid, false);
+    state_bls("bls_pso", rigid, true);
+    physical_bls();
+    std::vector<std::string> lugre = friction;
+    lugre.insert(lugre.end(), {"stribeck", "presliding"});
+    structural("lugre", lugre, "wls");
+    named_bls();
+    if (against_truth_) {
+      oracle();
+      noise_floor();
+    }
+    progress_.done();
+    return {
+        {"schema", "fxdyn.compare/1"}, {"against", against_truth_ ? "truth" : "measurement"}, {"methods", methods_}};
+  }
+
+ private:
+  double rated(std::size_t j) const { return last_->joints[j].rated_torque; }
+
+  void stage(const std::string& name) { progress_.stage("compare: " + name, 1); }
+
+  /// Judges a method. @param model where it is one that firmware could have
+  void add(const std::string& name, const Torque& torque, double multiplications, double train_s,
+           const IdentifiedModel* model) {
+    const auto n = static_cast<Index>(project_.robot.size());
+    VectorXd square = VectorXd::Zero(n), peak = VectorXd::Zero(n), rough = VectorXd::Zero(n), rough_ref = rough;
+    double count = 0, samples = 0, predict_s = 0;
+    for (const TestLog& test : tests_) {
+      const ProcessedLog& log = test.log;
+      const auto start = std::chrono::steady_clock::now();
+      const MatrixXd raw = torque(log);
+      predict_s += seconds_since(start);
+      samples += static_cast<double>(raw.rows());
+      const Index inside = log.last - log.first;
+      const MatrixXd ours = log.filter_columns(raw).middleRows(log.first, inside),
+                     theirs = log.filter_columns(test.reference).middleRows(log.first, inside), error = ours - theirs;
+      square += error.colwise().squaredNorm().transpose();
+      peak = peak.cwiseMax(error.cwiseAbs().colwise().maxCoeff().transpose());
+      rough += (ours.bottomRows(inside - 1) - ours.topRows(inside - 1)).colwise().squaredNorm().transpose();
+      rough_ref += (theirs.bottomRows(inside - 1) - theirs.topRows(inside - 1)).colwise().squaredNorm().transpose();
+      count += static_cast<double>(inside);
+    }
+    json rmse = json::array(), percent = json::array(), peaks = json::array();
+    double mean = 0, smoothness = 0;
+    for (Index j = 0; j < n; ++j) {
+      const double value = std::sqrt(square[j] / count), share = 100 * value / rated(static_cast<std::size_t>(j));
+      rmse.push_back(value);
+      percent.push_back(share);
+      peaks.push_back(peak[j]);
+      mean += share / static_cast<double>(n);
+      smoothness += std::sqrt(rough[j] / std::max(rough_ref[j], 1e-300)) / static_cast<double>(n);
+    }
+    methods_.push_back({{"name", name},
+                        {"rmse", rmse},
+                        {"percent_rated", percent},
+                        {"mean_percent_rated", mean},
+                        {"peak", peaks},
+                        {"smoothness", smoothness},
+                        {"macs_per_tick", multiplications},
+                        {"train_s", train_s},
+                        {"predict_us", 1e6 * predict_s / std::max(samples, 1.0)},
+                        {"fixed_error", model != nullptr ? fixed_error(*model) : json(nullptr)}});
+    progress_.step();
+  }
+
+  json fixed_error(const IdentifiedModel& model) const {
+    try {
+      const Formats formats = choose_formats(model);
+      std::vector<TickStates> states;
+      for (const TestLog& test : tests_) states.push_back(at_ticks(test.log, model.tick_s));
+      const QuantisationError error = quantisation_error(model, formats, states);
+      double worst = 0;
+      for (std::size_t j = 0; j < model.joints.size(); ++j)
+        worst = std::max(worst, error.largest[static_cast<Index>(j)] / model.joints[j].rated_torque);
+      return worst;
+    } catch (const DataError&) {
+      return nullptr;  // a model that fixed point can't hold is still a method
+    }
+  }
+
+  static double multiplications(const IdentifiedModel& model) {
+    double sum = rnea_multiplications * static_cast<double>(model.joints.size());
+    for (const JointFit& joint : model.joints) {
+      for (const EffectFit& fit : joint.effects) sum += static_cast<double>(fit.linear.size() + fit.shape.size());
+      if (joint.bls) sum += static_cast<double>(joint.bls->weights.size() + joint.bls->coefficients.size());
+    }
+    return sum;
+  }
+
+  void add_model(const std::string& name, double train_s) {
+    add(
+        name, [&](const ProcessedLog& log) { return predict(*last_, log); }, multiplications(*last_), train_s, &*last_);
+  }
+
+  Project project_with(const std::vector<std::string>& effects, const std::string& method) const {
+    Project project = project_;
+    project.identify.effects = effects;
+    project.identify.method = method;
+    project.identify.physical = false;
+    project.identify.essential = false;
+    return project;
+  }
+
+  void structural(const std::string& name, const std::vector<std::string>& effects, const std::string& method) {
+    const auto start = std::chrono::steady_clock::now();
+    const Project project = project_with(effects, method);
+    GateData data = data_;
+    const auto fitter = identify(project, data, progress_);
+    Estimate estimate = finish_model(*fitter, project, data);
+    last_ = std::move(estimate.model);
+    if (estimate.recursion)
+      last_ = [&] {
+        IdentifiedModel recursive = fitter->to_model(estimate.recursion->solution);
+        recursive.filter = last_->filter;
+        recursive.tick_s = last_->tick_s;
+        return recursive;
+      }();
+    const double spent = seconds_since(start);
+    stage(name);
+    add_model(name, spent);
+  }
+
+  /// What a structure leaves of a log, filtered and decimated.
+  static VectorXd left(const ProcessedLog& log, const MatrixXd& missing, std::size_t joint) {
+    return log.decimate(log.filter_columns(missing.col(static_cast<Index>(joint)))).col(0);
+  }
+
+  std::vector<MatrixXd> missing(const IdentifiedModel& structure) const {
+    std::vector<MatrixXd> out(data_.logs.size());
+    parallel_for(out.size(), [&](std::size_t l) { out[l] = data_.logs[l].tau - predict(structure, data_.logs[l]); });
+    return out;
+  }
+
+  void mlp(const IdentifiedModel& structure) {
+    stage("mlp");
+    const auto start = std::chrono::steady_clock::now();
+    const std::vector<MatrixXd> rest = missing(structure);
+    const std::size_t n = project_.robot.size();
+    std::vector<std::optional<Mlp>> nets(n);
+    parallel_for(n, [&](std::size_t j) {
+      Examples train, judge;
+      for (std::size_t l = 0; l < data_.logs.size(); ++l) {
+        const ProcessedLog& log = data_.logs[l];
+        Examples& to = log.role == Role::train ? train : judge;
+        const MatrixXd x = log.decimate(states(log, j));
+        const Index at = to.y.size();
+        to.x.conservativeResize(at + x.rows(), x.cols());
+        to.x.bottomRows(x.rows()) = x;
+        to.y.conservativeResize(at + x.rows());
+        to.y.tail(x.rows()) = left(log, rest[l], j);
+      }
+      nets[j].emplace(train, judge, mlp_nodes, project_.train.seed * 100 + j);
+    });
+    const double spent = seconds_since(start);
+    double macs = multiplications(structure);
+    for (const auto& net : nets) macs += static_cast<double>(net->multiplications());
+    last_ = structure;
+    add(
+        "mlp",
+        [&](const ProcessedLog& log) {
+          MatrixXd torque = predict(structure, log);
+          for (std::size_t j = 0; j < n; ++j) torque.col(static_cast<Index>(j)) += (*nets[j])(states(log, j));
+          return torque;
+        },
+        macs, spent, nullptr);
+  }
+
+  struct StateFit {
+    std::optional<StateBls> net;
+    VectorXd weights;
+    double judged = 1e300;
+  };
+
+  StateFit fit_state(const StateBlsShape& shape, std::size_t j, const std::vector<MatrixXd>& x,
+                     const std::vector<VectorXd>& y) const {
+    StateFit fit;
+    MatrixXd examples;
+    for (std::size_t l = 0; l < x.size(); ++l) {
+      if (data_.logs[l].role != Role::train) continue;
+      examples.conservativeResize(examples.rows() + x[l].rows(), 3);
+      examples.bottomRows(x[l].rows()) = x[l];
+    }
+    fit.net.emplace(shape, examples, project_.train.seed * 100 + j);
+    std::optional<Moments> train, judge;
+    for (std::size_t l = 0; l < x.size(); ++l) {
+      const ProcessedLog& log = data_.logs[l];
+      const MatrixXd rows = log.decimate(log.filter_columns(fit.net->columns(x[l])));
+      auto& to = log.role == Role::train ? train : judge;
+      if (!to) to.emplace(rows.cols());
+      to->add(rows, y[l]);
+    }
+    GrowingRidge ridge(*train, shape.ridge);
+    fit.weights = ridge.solve(train->gram.rows());
+    fit.judged = judge->mean_square(fit.weights);
+    return fit;
+  }
+
+  static StateBlsShape shape_at(const VectorXd& x) {
+    static const std::array<const char*, 4> activations{"tanh", "sigmoid", "relu", "sine"};
+    StateBlsShape shape;
+    shape.windows = std::lround(x[0]);
+    shape.nodes = std::lround(x[1]);
+    shape.enhancement = std::lround(x[2]);
+    shape.ridge = std::pow(10, x[3]);
+    shape.scale = std::pow(10, x[4]);
+    shape.activation = activations[static_cast<std::size_t>(std::clamp(std::floor(x[5]), 0.0, 3.0))];
+    return shape;
+  }
+
+  /// The paper's: what the rigid body leaves, as a function of the state.
+  void state_bls(const std::string& name, const IdentifiedModel& structure, bool search) {
+    const std::size_t n = project_.robot.size();
+    const auto start = std::chrono::steady_clock::now();
+    const std::vector<MatrixXd> rest = missing(structure);
+    PsoSettings pso;
+    pso.particles = 12;
+    pso.iterations = 15;
+    if (project_.train.pso) pso = *project_.train.pso;
+    progress_.stage("compare: " + name, n + 1);
+    std::vector<StateFit> fits(n);
+    parallel_for(n, [&](std::size_t j) {
+      std::vector<MatrixXd> x;
+      std::vector<VectorXd> y;
+      for (std::size_t l = 0; l < data_.logs.size(); ++l) {
+        x.push_back(states(data_.logs[l], j));
+        y.push_back(left(data_.logs[l], rest[l], j));
+      }
+      StateBlsShape shape;
+      if (search) {
+        VectorXd lower(6), upper(6);
+        lower << 1, 1, pso.nodes[0], std::log10(pso.ridge[0]), -1, 0;
+        upper << 8, 8, pso.nodes[1], std::log10(pso.ridge[1]), 1, 4;
+        SwarmSettings settings;
+        settings.particles = pso.particles;
+        settings.iterations = pso.iterations;
+        settings.stall = pso.stall;
+        settings.seed = project_.train.seed * 1000 + j;
+        Swarm swarm(lower, upper, settings);
+        while (!swarm.finished()) {
+          VectorXd values(pso.particles);
+          for (Index p = 0; p < values.size(); ++p)
+            values[p] = fit_state(shape_at(swarm.positions().col(p)), j, x, y).judged;
+          swarm.tell(values);
+        }
+        shape = shape_at(swarm.best());
+      }
+      fits[j] = fit_state(shape, j, x, y);
+      progress_.step();
+    });
+    const double spent = seconds_since(start);
+    double macs = multiplications(structure);
+    for (const StateFit& fit : fits) macs += static_cast<double>(fit.net->multiplications());
+    last_ = structure;
+    add(
+        name,
+        [&](const ProcessedLog& log) {
+          MatrixXd torque = predict(structure, log);
+          for (std::size_t j = 0; j < n; ++j)
+            torque.col(static_cast<Index>(j)) += fits[j].net->columns(states(log, j)) * fits[j].weights;
+          return torque;
+        },
+        macs, spent, nullptr);
+  }
+
+  void physical_bls() {
+    const auto start = std::chrono::steady_clock::now();
+    const Project project = project_with(friction, "wls");
+    GateData data = data_;
+    const auto fitter = identify(project, data, progress_);
+    TrainSettings settings = project_.train;
+    if (!settings.pso) settings.pso = PsoSettings{.particles = 12, .iterations = 15};
+    train(*fitter, settings, progress_);
+    last_ = finish_model(*fitter, project, data).model;
+    const double spent = seconds_since(start);
+    stage("bls_pso_physical");
+    add_model("bls_pso_physical", spent);
+  }
+
+  void named_bls() {
+    const auto start = std::chrono::steady_clock::now();
+    last_ = pipeline_.model();
+    const double spent = seconds_since(start);
+    stage("named_bls");
+    add_model("named_bls", spent);
+  }
+
+  void oracle() {
+    stage("oracle");
+    const IdentifiedModel structure = *last_;
+    const auto torque = [&](const ProcessedLog& log) {
+      const auto test = std::find_if(tests_.begin(), tests_.end(), [&](const TestLog& t) { return &t.log == &log; });
+      return predict(read_model(*test->truth), log);
+    };
+    add("oracle", torque, multiplications(read_model(*tests_.front().truth)), 0, nullptr);
+  }
+
+  /// The measurement itself against the truth.
+  void noise_floor() {
+    stage("noise_floor");
+    add(
+        "noise_floor", [](const ProcessedLog& log) { return log.tau; }, 0, 0, nullptr);
+  }
+
+  inline static const std::vector<std::string> friction{"viscous", "coulomb", "offset", "rotor_inertia"};
+
+  Pipeline pipeline_;
+  Project project_;
+  GateData data_;
+  std::vector<TestLog> tests_;
+  bool against_truth_ = true;
+  std::optional<IdentifiedModel> last_;
+  Progress progress_;
+  json methods_ = json::array();
+};
+
+}  // namespace
+
+json compare(const fs::path& project, const fs::path& directory) {
+  const json result = Comparison(project, directory).run();
+  write_file(directory / "compare.json", result.dump(1) + "\n");
+  return result;
+}
+
+std::string compare_table(const json& comparison) {
+  std::string out = fmt::format("errors against the {}, test logs, % of rated torque per joint\n",
+                                comparison.at("against").get<std::string>());
+  out += fmt::format("{:<17} {:>7}  {:<48} {:>6} {:>7} {:>8} {:>8} {:>9}\n", "method", "mean %", "joints %", "smooth",
+                     "MAC", "train s", "us", "fixed");
+  for (const json& method : comparison.at("methods")) {
+    std::string joints;
+    for (const json& share : method.at("percent_rated")) joints += fmt::format("{:.3g} ", share.get<double>());
+    const json& fixed = method.at("fixed_error");
+    out += fmt::format("{:<17} {:>7.3f}  {:<48} {:>6.3f} {:>7.0f} {:>8.2f} {:>8.2f} {:>9}\n",
+                       method.at("name").get<std::string>(), method.at("mean_percent_rated").get<double>(), joints,
+                       method.at("smoothness").get<double>(), method.at("macs_per_tick").get<double>(),
+                       method.at("train_s").get<double>(), method.at("predict_us").get<double>(),
+                       fixed.is_null() ? "-" : fmt::format("{:.2g}", fixed.get<double>()));
+  }
+  return out;
+}
+
+}  // namespace fxdyn

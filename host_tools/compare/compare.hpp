@@ -1,0 +1,25 @@
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+
+namespace fxdyn {
+
+/// `fxdyn compare`: every method on the same train and validate logs, judged on the test logs; returns compare.json.
+///
+/// Errors are against the noise-free torque where the logs come from a scenario (<log>.truth.csv beside them), else
+/// against the measurement; both filtered as the model's rows are. Per method:
+///   rmse, peak           per joint [N*m | N], over all test logs
+///   percent_rated        rmse, % of rated torque
+///   smoothness           RMS of d(torque)/dt over that of the reference's, mean over the joints: 1 is as smooth
+///   macs_per_tick        multiplications of one tick, all joints
+///   fixed_error          largest |fixed - double| on the test logs, share of rated; null: not for firmware
+/// Methods: rigid_ls friction_ls rls mlp bls_default bls_pso bls_pso_physical lugre named_bls oracle noise_floor; the
+/// last two only where the truth is known.
+/// @throws DataError: no test log, no validate log
+nlohmann::json compare(const std::filesystem::path& project, const std::filesystem::path& directory);
+
+/// For the terminal.
+std::string compare_table(const nlohmann::json& comparison);
+
+}  // namespace fxdyn

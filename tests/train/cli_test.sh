@@ -1,0 +1,83 @@
+#!/usr/bin/env bash
+# cli_test.sh FXDYN: a search by swarm that was killed goes on where it was and gives the same model, whatever the number
+# of threads; generations of another search are refused; every method is compared.
+set -u
+fxdyn=$1
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+failures=0
+fail() {
+  echo "FAILED: $*"
+  failures=$((failures + 1))
+}
+
+cat >arm.urdf <<'URDF'
+<robot name="arm"><link name="base"/>
+<link name="upper"><inertial><origin xyz="0.2 0.01 0"/><mass value="5"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.08" iyz="0" izz="0.08"/></inertial></link>
+<link name="fore"><inertial><origin xyz="0.15 0 0.02"/><mass value="3"/><inertia ixx="0.006" ixy="0" ixz="0" iyy="0.05" iyz="0" izz="0.05"/></inertial></link>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 0.3"/><axis xyz="0 1 0"/><limit lower="-2" upper="2" velocity="2" effort="60"/></joint>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="0.4 0 0"/><axis xyz="0 1 0"/><limit lower="-2" upper="2" velocity="2" effort="60"/></joint>
+</robot>
+URDF
+{
+  printf 'seed = 4\n[sensors]\nencoder_bits = 20\ntorque_noise = 0.005\n[robot]\nurdf = "arm.urdf"\nrated_torque = [60, 20]\nacceleration = [8, 8]\n'
+  for joint in 1 2; do
+    for effect in 'viscous/coefficient = 1.0' 'coulomb/amplitude = 1.5, width = 0.004' 'presliding/distance = 0.004, amplitude = 1.5' \
+      'stribeck/velocity = 0.1, amplitude = 0.6'; do
+      printf '[[effect]]\nname = "%s"\njoint = %s\nparameters = { %s }\n' "${effect%%/*}" $joint "${effect#*/}"
+    done
+  done
+  seed=1
+  for log in a b c; do
+    printf '[[log]]\nname = "%s"\nduration_s = 10\nspeed = 0.4\nseed = %s\n' $log $((seed++))
+  done
+} >arm.toml
+# project FILE SEED
+project() {
+  printf '[robot]\nurdf = "arm.urdf"\nrated_torque = [60, 20]\n' >"$1"
+  for role in a/train b/validate c/test; do
+    printf '[[log]]\nscenario = "arm.toml"\nlog = "%s"\nrole = "%s"\n' "${role%/*}" "${role#*/}" >>"$1"
+  done
+  printf '[identify]\neffects = ["viscous", "coulomb"]\n[diagnose]\nmax_effects = 0\n[train]\nseed = %s\n[train.pso]\nparticles = 6\niterations = 5\nbounds = { nodes = [4, 12] }\n' "$2" >>"$1"
+}
+project arm.project 1
+"$fxdyn" diagnose arm.project --out whole >whole.txt 2>&1 || fail "diagnose: $(tail -1 whole.txt)"
+cp -r whole killed
+FXDYN_THREADS=1 "$fxdyn" train arm.project --out whole >whole.txt 2>&1 || fail "train: $(tail -1 whole.txt)"
+grep -q '"kept": true' whole/metrics.json || fail "no joint kept its BLS"
+[ -e whole/train.pso.json ] && fail "a search that is done leaves its generations"
+
+"$fxdyn" train arm.project --out killed >killed.txt 2>&1 &
+for _ in $(seq 2000); do
+  [ -e killed/train.pso.json ] && break
+  sleep 0.01
+done
+kill -9 $! 2>/dev/null
+wait $! 2>/dev/null
+[ -e killed/train.pso.json ] || fail "nothing to go on from"
+cp killed/train.pso.json generation.json
+"$fxdyn" train arm.project --out killed >killed.txt 2>&1 || fail "going on: $(tail -1 killed.txt)"
+cmp -s whole/model.json killed/model.json || fail "a killed run ends elsewhere"
+
+project other.project 2
+"$fxdyn" diagnose other.project --out other >other.txt 2>&1 || fail "diagnose other"
+# refused FILE EXPECTED
+refused() {
+  cp "$1" other/train.pso.json
+  "$fxdyn" train other.project --out other >refused.txt 2>&1
+  [ $? -eq 1 ] || fail "$1: exit code"
+  tail -1 refused.txt | grep -q "$2" || fail "$1: $(tail -1 refused.txt)"
+}
+refused generation.json 'another project'
+head -c 300 generation.json >half.json
+refused half.json 'cut off'
+
+"$fxdyn" compare arm.project --out compared >compared.txt 2>&1 || fail "compare: $(tail -1 compared.txt)"
+for method in rigid_ls friction_ls rls mlp bls_default bls_pso bls_pso_physical lugre named_bls oracle noise_floor; do
+  grep -q "\"name\": \"$method\"" compared/compare.json || fail "compare: no $method"
+done
+grep -q '"against": "truth"' compared/compare.json || fail "compare: not against the truth"
+
+[ $failures -eq 0 ] && echo "searches go on, and every method is there"
+exit $failures
