@@ -6,15 +6,20 @@
 #include "hal/mps2/systick.hpp"
 #include "hal/mps2/uart.hpp"
 
+// The slot for updated tables, from the linker script.
+extern "C" const std::uint32_t fxdyn_update_begin[];  // NOLINT
+
 namespace {
 constinit fxdyn::hal::mps2::Uart uart;
 
 /// The page as the flash holds it: hides from the compiler that it knows the values, since tables can be reflashed
 /// alone.
 const auto& tables_in_flash() {
-  const auto* page = &fxdyn::tables::page;
-  asm volatile("" : "+r"(page));
-  return *page;
+  const auto* built_in = &fxdyn::tables::page;
+  const auto* update =
+      reinterpret_cast<decltype(built_in)>(fxdyn_update_begin);  // NOLINT: whatever the flash has there
+  asm volatile("" : "+r"(built_in), "+r"(update));
+  return fxdyn::newest_valid_page(*update, *built_in);
 }
 }  // namespace
 

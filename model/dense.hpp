@@ -171,4 +171,21 @@ constexpr std::int32_t tanh_line(std::int32_t x) {
   return sum.value();
 }
 
+/// The ramp max(x, 0) needs no table: with the argument's +-8 in int16 the raw x is the int16 of x / 8.
+inline constexpr int ramp_argument_bits = 12;
+inline constexpr int ramp_argument_width = 16;
+/// Largest error of ramp() as x / 8: the largest int16 stands for 8.
+inline constexpr double ramp_error = 3.1e-5;
+
+constexpr std::int32_t ramp(std::int32_t x) { return x & ~(x >> 31); }
+
+/// sum_k c_k max(x_k, 0): coefficients two a word, `nodes` even, x with ramp_argument_bits in ramp_argument_width bits.
+[[gnu::always_inline]] constexpr std::int64_t weighted_ramp(std::size_t nodes, const std::int32_t* coefficients,
+                                                            const std::int32_t* x) {
+  DualSum sum;
+#pragma GCC unroll 2
+  for (std::size_t k = 0; k < nodes; k += 2) sum.add(*coefficients++, pack(ramp(x[k]), ramp(x[k + 1])));
+  return sum.value();
+}
+
 }  // namespace fxdyn::raw

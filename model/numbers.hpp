@@ -60,7 +60,10 @@ struct Real {
   static constexpr TorqueSum no_torque() { return 0; }
   static constexpr DeflectionSum no_deflection() { return 0; }
   static constexpr double feature(double x) { return x < -1 ? -1 : (x > 1 ? 1 : x); }
-  static double activation(double x) { return std::tanh(x); }
+  template <class Activation>
+  static double activation(double x) {
+    return Activation::of(x);
+  }
   static constexpr double node_coefficient(double word, int) { return word; }
   static constexpr double one() { return 1; }
   template <class T>

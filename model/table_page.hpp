@@ -71,4 +71,11 @@ bool page_is_valid(const TablePage<Model>& page) {
   return crc.value() == page.header.crc32;
 }
 
+/// The page to compute with: the one in the flash's slot for updates where it is valid, else the one that the image was
+/// built with. The slot may hold anything: an erased flash, half a page, one for another model.
+template <class Model>
+const TablePage<Model>& newest_valid_page(const TablePage<Model>& update, const TablePage<Model>& built_in) {
+  return page_is_valid(update) ? update : built_in;
+}
+
 }  // namespace fxdyn

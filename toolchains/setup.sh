@@ -13,7 +13,7 @@ packages=(
   # target
   gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm
   # tests
-  libgtest-dev librapidcheck-dev libbenchmark-dev liborocos-kdl-dev libmujoco-dev python3 llvm-14
+  libgtest-dev librapidcheck-dev libbenchmark-dev liborocos-kdl-dev libmujoco-dev libpagmo-dev python3 llvm-14
 )
 
 missing=()

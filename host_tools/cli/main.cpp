@@ -4,13 +4,16 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/compare/compare.hpp"
+#include "host_tools/compare/efficiency.hpp"
 #include "host_tools/error.hpp"
 #include "host_tools/excite/excite.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
 #include "host_tools/report/report.hpp"
 #include "host_tools/simulate/simulate.hpp"
+#include "host_tools/update/update.hpp"
 #include "host_tools/version.hpp"
+#include "host_tools/vibration/vibration.hpp"
 
 namespace {
 
@@ -78,7 +81,9 @@ int run(int argc, char** argv) {
   const auto stage = [&](const char* name, const char* what) {
     CLI::App* verb =
         app.add_subcommand(name, fmt::format("{}\nExample: fxdyn {} robot.toml --out out/robot{}", what, name,
-                                             std::string_view(name) == "replay" ? " --image drive.elf" : ""));
+                                             std::string_view(name) == "replay"   ? " --image drive.elf"
+                                             : std::string_view(name) == "update" ? " --log new.csv"
+                                                                                  : ""));
     verb->add_option("PROJECT", project, "project file (TOML)")->required();
     verb->add_option("--out", out, "directory for the results")->required();
     return verb;
@@ -95,10 +100,22 @@ int run(int argc, char** argv) {
   const CLI::App* report_verb = stage("report", "Draw report.html from what the other stages wrote.");
   const CLI::App* compare_verb =
       stage("compare", "Every method on the same logs, from plain least squares to named effects: compare.json.");
+  const CLI::App* efficiency_verb =
+      stage("efficiency", "Test error against the seconds of train data, per method: efficiency.json.");
+  const CLI::App* vibration_verb = stage(
+      "vibration", "The model as feedforward of the scenario's robot with gears that bend: vibration.json.");
   CLI::App* replay_verb =
       stage("replay", "Stream the held-out logs to a firmware image in QEMU and compare bit for bit: replay.json.");
   replay_verb->add_option("--image", image, "firmware image (.elf) made by toolchains/build_image.sh")->required();
   replay_verb->add_option("--ticks", ticks, "at most this many ticks of each log")->capture_default_str();
+
+  UpdateSettings new_session;
+  CLI::App* update_verb = stage(
+      "update", "Refit the coefficients with a new log, keep them where they are better: tables.bin, update.json.");
+  update_verb->add_option("--log", new_session.log, "log (CSV) of a new session")->required();
+  update_verb->add_option("--forgetting", new_session.forgetting,
+                          "what was known a second ago counts, 1: all (default: the project's identify.forgetting)");
+  update_verb->add_flag("--rebuild", new_session.rebuild, "choose formats anew: the firmware needs a rebuild");
 
   CLI::App* excite_verb = app.add_subcommand(
       "excite",
@@ -156,9 +173,25 @@ int run(int argc, char** argv) {
     fmt::print("load in {}/payload.json, model with it in {}/model.json\n", out, out);
   } else if (*compare_verb) {
     fmt::print("{}", compare_table(compare(project, out)));
+  } else if (*efficiency_verb) {
+    fmt::print("{}", efficiency_table(efficiency(project, out)));
+  } else if (*vibration_verb) {
+    fmt::print("{}", vibration_table(vibration(project, out)));
+  } else if (*update_verb) {
+    Pipeline pipeline(project, out);
+    const Update done = update(pipeline, new_session);
+    fmt::print("{}", done.table);
+    if (!done.accepted) throw DataError("the new coefficients are worse on the log's last third: nothing was replaced");
+    fmt::print("updated: {0}/tables.bin, the page before is {0}/tables.previous.bin\n", out);
   } else {
     Pipeline pipeline(project, out);
-    if (*run_verb) pipeline.run();
+    if (*run_verb) {
+      pipeline.run();
+      if (pipeline.project().compare.enabled) {
+        fmt::print("{}", compare_table(compare(project, out)));
+        pipeline.report();
+      }
+    }
     if (*identify_verb) pipeline.identify();
     if (*diagnose_verb) pipeline.diagnose();
     if (*train_verb) pipeline.train();

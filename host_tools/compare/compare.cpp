@@ -5,15 +5,17 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "host_tools/compare/figures.hpp"
 #include "host_tools/compare/mlp.hpp"
 #include "host_tools/compare/state_bls.hpp"
 #include "host_tools/error.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/files.hpp"
-#include "host_tools/identify/identify.hpp"
+#include "host_tools/identify/structure.hpp"
 #include "host_tools/log/truth.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/parallel.hpp"
@@ -58,8 +60,9 @@ MatrixXd states(const ProcessedLog& log, std::size_t joint) {
 
 class Comparison {
  public:
-  Comparison(const fs::path& project, const fs::path& directory)
-      : pipeline_(project, directory), project_(pipeline_.project()), data_(read_gate_data(project_, directory)) {
+  Comparison(const Project& project, const fs::path& directory)
+      : project_(project), directory_(directory), data_(read_gate_data(project_, directory)) {
+    for (const JointFit& joint : initial_joints(project_, data_)) rated_.push_back(joint.rated_torque);
     for (Log& log : read_logs(project_, Role::test, directory)) {
       const fs::path file = log.file;
       fs::path clean = file;
@@ -86,32 +89,60 @@ class Comparison {
     }
   }
 
-  json run() {
-    structural("rigid_ls", {}, "ls");
-    const IdentifiedModel rigid = *last_;
-    structural("friction_ls", friction, "wls");
-    const IdentifiedModel with_friction = *last_;
-    structural("rls", friction, "rls");
-    mlp(with_friction);
-    state_bls("bls_default", rigid, false);
-    state_bls("bls_pso", rigid, true);
-    physical_bls();
-    std::vector<std::string> lugre = friction;
-    lugre.insert(lugre.end(), {"stribeck", "presliding"});
-    structural("lugre", lugre, "wls");
-    named_bls();
-    if (against_truth_) {
-      oracle();
-      noise_floor();
+  json run(const std::vector<std::string>& methods) {
+    const auto wanted = [&](const char* name) { return std::find(methods.begin(), methods.end(), name) != methods.end(); };
+    if (wanted("rigid_ls")) structural("rigid_ls", {}, "ls");
+    if (wanted("friction_ls")) structural("friction_ls", coulomb_and_viscous, "wls");
+    if (wanted("rls")) structural("rls", coulomb_and_viscous, "rls");
+    if (wanted("mlp")) mlp(identify_structure(project_, data_, coulomb_and_viscous, "wls", progress_));
+    if (wanted("bls_default") || wanted("bls_pso")) {
+      const IdentifiedModel rigid = identify_structure(project_, data_, {}, "ls", progress_);
+      if (wanted("bls_default")) state_bls("bls_default", rigid, false);
+      if (wanted("bls_pso")) state_bls("bls_pso", rigid, true);
     }
+    if (wanted("bls_physical")) physical_bls("bls_physical", false);
+    if (wanted("bls_pso_physical")) physical_bls("bls_pso_physical", true);
+    if (wanted("lugre")) structural("lugre", lugre_friction, "wls");
+    if (wanted("named_bls")) named_bls();
+    if (against_truth_ && wanted("oracle")) oracle();
+    if (against_truth_ && wanted("noise_floor")) noise_floor();
     progress_.done();
-    return {
-        {"schema", "fxdyn.compare/1"}, {"against", against_truth_ ? "truth" : "measurement"}, {"methods", methods_}};
+    return {{"schema", "fxdyn.compare/1"},
+            {"against", against_truth_ ? "truth" : "measurement"},
+            {"project_hash", project_hash(project_)},
+            {"paper", project_.compare.paper},
+            {"methods", methods_}};
+  }
+
+  /// What the first test log shows of the methods that were run.
+  ComparedLog shown() const {
+    const TestLog& test = tests_.front();
+    const ProcessedLog& log = test.log;
+    const Index inside = log.last - log.first;
+    const auto filtered = [&](const MatrixXd& torque) {
+      return MatrixXd(log.filter_columns(torque).middleRows(log.first, inside));
+    };
+    ComparedLog out;
+    out.log = log.name;
+    out.robot = &project_.robot;
+    out.t = log.t.segment(log.first, inside);
+    out.measured = log.tau.middleRows(log.first, inside);
+    out.reference = filtered(test.reference);
+    out.torque = torque_;
+    out.rated = rated_;
+    const auto train = std::find_if(data_.logs.begin(), data_.logs.end(),
+                                    [](const ProcessedLog& l) { return l.role == Role::train; });
+    out.train_t = train->t;
+    out.train_q = train->q;
+    if (test.truth && learned_) {
+      const IdentifiedModel truth = read_model(*test.truth);
+      out.rigid = filtered(predict(rigid_part(truth), log));
+      out.learned_friction = filtered(predict(*learned_, log) - predict(rigid_part(*learned_), log));
+    }
+    return out;
   }
 
  private:
-  double rated(std::size_t j) const { return last_->joints[j].rated_torque; }
-
   void stage(const std::string& name) { progress_.stage("compare: " + name, 1); }
 
   /// Judges a method. @param model where it is one that firmware could have
@@ -129,6 +160,7 @@ class Comparison {
       const Index inside = log.last - log.first;
       const MatrixXd ours = log.filter_columns(raw).middleRows(log.first, inside),
                      theirs = log.filter_columns(test.reference).middleRows(log.first, inside), error = ours - theirs;
+      if (&test == &tests_.front()) torque_[name] = ours;
       square += error.colwise().squaredNorm().transpose();
       peak = peak.cwiseMax(error.cwiseAbs().colwise().maxCoeff().transpose());
       rough += (ours.bottomRows(inside - 1) - ours.topRows(inside - 1)).colwise().squaredNorm().transpose();
@@ -138,7 +170,7 @@ class Comparison {
     json rmse = json::array(), percent = json::array(), peaks = json::array();
     double mean = 0, smoothness = 0;
     for (Index j = 0; j < n; ++j) {
-      const double value = std::sqrt(square[j] / count), share = 100 * value / rated(static_cast<std::size_t>(j));
+      const double value = std::sqrt(square[j] / count), share = 100 * value / rated_[static_cast<std::size_t>(j)];
       rmse.push_back(value);
       percent.push_back(share);
       peaks.push_back(peak[j]);
@@ -166,7 +198,7 @@ class Comparison {
       const QuantisationError error = quantisation_error(model, formats, states);
       double worst = 0;
       for (std::size_t j = 0; j < model.joints.size(); ++j)
-        worst = std::max(worst, error.largest[static_cast<Index>(j)] / model.joints[j].rated_torque);
+        worst = std::max(worst, error.largest[static_cast<Index>(j)] / rated_[j]);
       return worst;
     } catch (const DataError&) {
       return nullptr;  // a model that fixed point can't hold is still a method
@@ -187,29 +219,9 @@ class Comparison {
         name, [&](const ProcessedLog& log) { return predict(*last_, log); }, multiplications(*last_), train_s, &*last_);
   }
 
-  Project project_with(const std::vector<std::string>& effects, const std::string& method) const {
-    Project project = project_;
-    project.identify.effects = effects;
-    project.identify.method = method;
-    project.identify.physical = false;
-    project.identify.essential = false;
-    return project;
-  }
-
   void structural(const std::string& name, const std::vector<std::string>& effects, const std::string& method) {
     const auto start = std::chrono::steady_clock::now();
-    const Project project = project_with(effects, method);
-    GateData data = data_;
-    const auto fitter = identify(project, data, progress_);
-    Estimate estimate = finish_model(*fitter, project, data);
-    last_ = std::move(estimate.model);
-    if (estimate.recursion)
-      last_ = [&] {
-        IdentifiedModel recursive = fitter->to_model(estimate.recursion->solution);
-        recursive.filter = last_->filter;
-        recursive.tick_s = last_->tick_s;
-        return recursive;
-      }();
+    last_ = identify_structure(project_, data_, effects, method, progress_);
     const double spent = seconds_since(start);
     stage(name);
     add_model(name, spent);
@@ -357,23 +369,25 @@ class Comparison {
         macs, spent, nullptr);
   }
 
-  void physical_bls() {
+  void physical_bls(const std::string& name, bool search) {
     const auto start = std::chrono::steady_clock::now();
-    const Project project = project_with(friction, "wls");
+    const Project project = with_structure(project_, coulomb_and_viscous, "wls");
     GateData data = data_;
     const auto fitter = identify(project, data, progress_);
     TrainSettings settings = project_.train;
-    if (!settings.pso) settings.pso = PsoSettings{.particles = 12, .iterations = 15};
+    settings.inputs = PhysicalInputs::name;
+    if (!search) settings.pso.reset();
+    if (search && !settings.pso) settings.pso = PsoSettings{.particles = 12, .iterations = 15};
     train(*fitter, settings, progress_);
-    last_ = finish_model(*fitter, project, data).model;
+    last_ = learned_ = finish_model(*fitter, project, data).model;
     const double spent = seconds_since(start);
-    stage("bls_pso_physical");
-    add_model("bls_pso_physical", spent);
+    stage(name);
+    add_model(name, spent);
   }
 
   void named_bls() {
     const auto start = std::chrono::steady_clock::now();
-    last_ = pipeline_.model();
+    last_ = Pipeline(project_.file, directory_).model();
     const double spent = seconds_since(start);
     stage("named_bls");
     add_model("named_bls", spent);
@@ -381,7 +395,6 @@ class Comparison {
 
   void oracle() {
     stage("oracle");
-    const IdentifiedModel structure = *last_;
     const auto torque = [&](const ProcessedLog& log) {
       const auto test = std::find_if(tests_.begin(), tests_.end(), [&](const TestLog& t) { return &t.log == &log; });
       return predict(read_model(*test->truth), log);
@@ -396,22 +409,30 @@ class Comparison {
         "noise_floor", [](const ProcessedLog& log) { return log.tau; }, 0, 0, nullptr);
   }
 
-  inline static const std::vector<std::string> friction{"viscous", "coulomb", "offset", "rotor_inertia"};
-
-  Pipeline pipeline_;
   Project project_;
+  fs::path directory_;
   GateData data_;
+  std::vector<double> rated_;  ///< [N*m | N]
   std::vector<TestLog> tests_;
   bool against_truth_ = true;
-  std::optional<IdentifiedModel> last_;
+  std::optional<IdentifiedModel> last_, learned_;
+  std::map<std::string, MatrixXd> torque_;  ///< of the first test log, filtered
   Progress progress_;
   json methods_ = json::array();
 };
 
 }  // namespace
 
+json compare_methods(const Project& project, const fs::path& directory, const std::vector<std::string>& methods) {
+  return Comparison(project, directory).run(methods);
+}
+
 json compare(const fs::path& project, const fs::path& directory) {
-  const json result = Comparison(project, directory).run();
+  Comparison comparison(read_project(project), directory);
+  const json result =
+      comparison.run({"rigid_ls", "friction_ls", "rls", "mlp", "bls_default", "bls_pso", "bls_pso_physical", "lugre",
+                      "named_bls", "oracle", "noise_floor"});
+  write_comparison_plots(comparison.shown(), directory);
   write_file(directory / "compare.json", result.dump(1) + "\n");
   return result;
 }

@@ -2,6 +2,10 @@
 
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "host_tools/log/project.hpp"
 
 namespace fxdyn {
 
@@ -16,8 +20,14 @@ namespace fxdyn {
 ///   fixed_error          largest |fixed - double| on the test logs, share of rated; null: not for firmware
 /// Methods: rigid_ls friction_ls rls mlp bls_default bls_pso bls_pso_physical lugre named_bls oracle noise_floor; the
 /// last two only where the truth is known.
+/// Beside compare.json it draws DIR/plots/compare_*.svg, what the paper's Figs. 5 to 11 show.
 /// @throws DataError: no test log, no validate log
 nlohmann::json compare(const std::filesystem::path& project, const std::filesystem::path& directory);
+
+/// Some of these methods, and bls_physical: bls_pso_physical with a small grid in place of the swarm. Writes nothing.
+/// @param from of which project file the logs are (named_bls continues from DIR/model.json)
+nlohmann::json compare_methods(const Project& project, const std::filesystem::path& directory,
+                               const std::vector<std::string>& methods);
 
 /// For the terminal.
 std::string compare_table(const nlohmann::json& comparison);

@@ -127,7 +127,8 @@ class Work {
     }
     settings_.max_effects = static_cast<std::size_t>(project_.diagnose.max_effects);
     // Few things change at once; a robot of which nothing is known may lack more.
-    settings_.most = models_.has_baseline ? 4 + joints() : 2 + 2 * joints();
+    // A change beside a baseline is something or other; without one every joint may lack all that it is asked for.
+    settings_.most = 4 + joints() * (models_.has_baseline ? 1 : settings_.max_effects);
     logs_ = sessions(data_.logs, baseline_, session_);
     for (std::size_t j = 0; j < joints(); ++j) {
       if (!still_[j]) continue;

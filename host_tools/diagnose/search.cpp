@@ -377,9 +377,11 @@ std::size_t Search::refine(const Choice& state, std::size_t g) {
   return best > first ? at_.add(fine, best_columns) : g;
 }
 
-void Search::find_ripples(const Choice& state) {
+void Search::find_ripples(const Choice& state, std::optional<std::size_t> joint) {
   std::vector<std::vector<Group>> found(at_.joints());
-  parallel_for(at_.joints(), [&](std::size_t j) { found[j] = ripples(at_, j, at_.residual(j, state.fit), 3); });
+  parallel_for(at_.joints(), [&](std::size_t j) {
+    if (!joint || j == *joint) found[j] = ripples(at_, j, at_.residual(j, state.fit), 3);
+  });
   std::vector<Group> fresh;
   for (const auto& joint : found) {
     for (const Group& group : joint) {
@@ -397,7 +399,12 @@ Choice Search::run(std::vector<std::size_t> start, Progress& progress) {
   std::vector<Choice> beam{evaluate(start)};
   Choice best = beam.front();
   for (int level = 0; level < 64; ++level) {
-    if (level < 2) find_ripples(beam.front());
+    // A ripple may show only once what was larger on its joint is gone.
+    if (level < 2) {
+      find_ripples(beam.front(), {});
+    } else if (const Group last = at_.groups()[best.groups.back()]; !last.on_body) {
+      find_ripples(best, last.candidate.joint);
+    }
     std::vector<Choice> next;
     std::set<std::vector<std::size_t>> seen;
     const std::size_t width = level < 3 ? beam.size() : 1;

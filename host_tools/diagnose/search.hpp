@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <optional>
 #include <vector>
 
 #include "host_tools/diagnose/linearised.hpp"
@@ -71,7 +72,7 @@ class Search {
   double threshold(std::size_t group) const;
   bool allowed(const Choice& state, std::size_t group) const;
   std::vector<Eigen::Index> columns(const std::vector<std::size_t>& groups) const;
-  void find_ripples(const Choice& state);
+  void find_ripples(const Choice& state, std::optional<std::size_t> joint);
   double samples() const;
 
   Linearised& at_;

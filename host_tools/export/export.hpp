@@ -64,6 +64,16 @@ class FixedModel {
 /// @throws DataError where the joints' parameters are too far apart in size for common sums.
 Formats choose_formats(const IdentifiedModel& model);
 
+/// Whether these formats hold every number of the model, by the same rules.
+bool formats_hold(const IdentifiedModel& model, const Formats& formats);
+
+/// The layout of the model's tables: its own where it has one, else as the values say.
+TableLayout layout_of(const IdentifiedModel& model, const Formats& formats);
+
+/// Why the model's values do not fit tables of these formats and the model's layout; empty: firmware that was built for
+/// them takes these values.
+std::string why_not_in_layout(const IdentifiedModel& model, const Formats& formats);
+
 /// |fixed - double| of each joint over the states [N*m | N], both fed with the same quantised states.
 struct QuantisationError {
   Eigen::VectorXd largest, rms;

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <limits>
 
 #include "host_tools/error.hpp"
 #include "host_tools/export/export.hpp"
@@ -19,18 +20,22 @@ int fitting_bits(double range, int width) {
   return width - static_cast<int>(std::ceil(std::log2(std::max(range, 1e-9))));
 }
 
-/// Formats that hold these ranges.
-Formats formats_for(const IdentifiedModel& model, const Ranges& ranges) {
-  using Q = Quantity;
-  Formats formats;
-  for (std::size_t i = 0; i < quantity_count; ++i) {
-    const auto quantity = static_cast<Quantity>(i);
-    const int common = common_bits(quantity);
-    // A reserve of 1/64 holds what roundings add; the error bound is checked against the format later.
-    formats.quantity[i] = common > 0 ? common : std::min(30, fitting_bits(ranges[quantity] * 65 / 64, 31));
+/// The ranges of a model whose coefficients are `room` times as large. (Not of what deflects positions: an update does
+/// not touch that.)
+Ranges with_room(Ranges ranges, double room) {
+  for (const Kind::Group group : {Kind::coefficient, Kind::mass, Kind::first_moment, Kind::second_moment}) {
+    for (std::size_t i = 0; i < quantity_count; ++i) ranges.at({group, static_cast<Quantity>(i)}) *= room;
   }
+  for (const Quantity quantity : {Quantity::force, Quantity::torque}) ranges.at({Kind::number, quantity}) *= room;
+  return ranges;
+}
+
+/// Lowers the formats until products are at least as fine as what they are added to and 64-bit sums hold all of their
+/// terms, in these ranges and with coefficients `room` times as large. Formats that it leaves as they are hold the
+/// model (but for what leaves a format of 32 bits).
+Formats lowered(Formats formats, const IdentifiedModel& model, const Ranges& ranges, double room) {
+  using Q = Quantity;
   const auto bits = [&](Q quantity) -> int& { return formats[quantity]; };
-  bits(Q::weight) = std::clamp(fitting_bits(ranges[Q::weight] * 32768 / 32767, 15), 3, 15);
   // A product must be at least as fine as what it is added to, and the sum of its terms must fit 62 bits and a sign
   // (model/rigid_body.hpp: align() and proven_narrow()). Bounds are sums of magnitudes, so no partial sum exceeds them.
   const auto at_most = [&](Q quantity, int most) { bits(quantity) = std::min(bits(quantity), most); };
@@ -53,8 +58,8 @@ Formats formats_for(const IdentifiedModel& model, const Ranges& ranges) {
   const double mass = ranges[Kind{Kind::mass}], first = ranges[Kind{Kind::first_moment}],
                second = ranges[Kind{Kind::second_moment}];
   formats.force_sum =
-      std::min({fitting_bits(mass, 31) + fa, fitting_bits(first, 31) + fw, fitting_bits(second, 31) + 2 * fw - fa,
-                fitting_bits(2 * (mass * a + 3 * w * first), 62),
+      std::min({formats.force_sum, fitting_bits(mass, 31) + fa, fitting_bits(first, 31) + fw,
+                fitting_bits(second, 31) + 2 * fw - fa, fitting_bits(2 * (mass * a + 3 * w * first), 62),
                 fitting_bits(2 * (2 * first * a + 6 * w * second), 62) + fw - fa});
   at_most(Q::force, formats.force_sum);
   at_most(Q::torque, std::min(formats.force_sum - fw + fa, bits(Q::length) + bits(Q::force)));
@@ -67,14 +72,14 @@ Formats formats_for(const IdentifiedModel& model, const Ranges& ranges) {
       const EffectInfo& info = *find_effect(fit.effect);
       double& sum = info.acts_on == ActsOn::position ? deflection : torque;
       for (std::size_t i = 0; i < fit.linear.size(); ++i)
-        sum += std::fabs(fit.linear[i]) * std::ldexp(1.0, 31 - formats[info.linear[i].quantity]);
+        sum += room * std::fabs(fit.linear[i]) * std::ldexp(1.0, 31 - formats[info.linear[i].quantity]);
     }
-    if (joint.bls) torque += joint.bls->coefficients.cwiseAbs().sum();
+    if (joint.bls) torque += room * joint.bls->coefficients.cwiseAbs().sum();
     torque_sum = std::max(torque_sum, torque);
     deflection_sum = std::max(deflection_sum, deflection);
   }
-  formats.torque_sum = fitting_bits(torque_sum, 62);
-  formats.deflection_sum = fitting_bits(deflection_sum, 62);
+  formats.torque_sum = std::min(formats.torque_sum, fitting_bits(torque_sum, 62));
+  formats.deflection_sum = std::min(formats.deflection_sum, fitting_bits(deflection_sum, 62));
   for (std::size_t i = 0; i < quantity_count; ++i) {
     const auto quantity = static_cast<Quantity>(i);
     const auto hold = [&](Kind::Group group, int& sum) {
@@ -84,9 +89,29 @@ Formats formats_for(const IdentifiedModel& model, const Ranges& ranges) {
     hold(Kind::coefficient, formats.torque_sum);
     hold(Kind::deflection_coefficient, formats.deflection_sum);
   }
+  return formats;
+}
+
+/// Formats that hold these ranges.
+Formats formats_for(const IdentifiedModel& model, const Ranges& ranges) {
+  using Q = Quantity;
+  Formats formats;
+  for (std::size_t i = 0; i < quantity_count; ++i) {
+    const auto quantity = static_cast<Quantity>(i);
+    const int common = common_bits(quantity);
+    // A reserve of 1/64 holds what roundings add; the error bound is checked against the format later.
+    formats.quantity[i] = common > 0 ? common : std::min(30, fitting_bits(ranges[quantity] * 65 / 64, 31));
+  }
+  // A bias has the format of weight times input in 32 bits: where it is much larger than all weights, it decides.
+  const double bias = ranges[Kind{Kind::bias, Q::weight}];
+  formats[Q::weight] = std::clamp(
+      std::min(fitting_bits(ranges[Q::weight] * 32768 / 32767, 15), fitting_bits(bias * 65 / 64, 31) - small_bits), 3,
+      15);
+  formats.force_sum = formats.torque_sum = formats.deflection_sum = std::numeric_limits<int>::max();
+  formats = lowered(formats, model, ranges, room_for_updates);
   int least = formats[Q::torque];
-  for (const JointFit& joint : model.joints) {
-    if (joint.bls) least = std::max(least, node_coefficient_bits(*joint.bls) + small_bits);
+  for (std::size_t j = 0; j < model.joints.size(); ++j) {
+    if (model.joints[j].bls) least = std::max(least, node_bits(model, j) + small_bits);
   }
   if (formats.torque_sum < least || formats.deflection_sum < formats[Q::position]) {
     throw DataError(
@@ -98,7 +123,7 @@ Formats formats_for(const IdentifiedModel& model, const Ranges& ranges) {
 }  // namespace
 
 Formats choose_formats(const IdentifiedModel& model) {
-  Ranges ranges = prove(model, nullptr).ranges;
+  Ranges ranges = with_room(prove(model, nullptr).ranges, room_for_updates);
   // Roundings widen the ranges, mostly within the reserve. Where not, the widened ranges choose again.
   constexpr int rounds = 12;
   for (int round = 0; round < rounds; ++round) {
@@ -110,6 +135,11 @@ Formats choose_formats(const IdentifiedModel& model) {
   throw DataError(
       "no fixed-point formats can be proven for this model: its effects on the position are too strong for its limits; "
       "check the project's limits and those effects' parameters");
+}
+
+bool formats_hold(const IdentifiedModel& model, const Formats& formats) {
+  return prove(model, &formats).too_large.empty() &&
+         lowered(formats, model, prove(model, nullptr).ranges, 1) == formats;
 }
 
 TickStates at_ticks(const ProcessedLog& log, double tick_s, bool whole) {

@@ -5,6 +5,7 @@
 
 #include "host_tools/export/export.hpp"
 #include "host_tools/files.hpp"
+#include "host_tools/model/broad_learning_types.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/version.hpp"
 #include "model/catalogue.hpp"
@@ -53,9 +54,11 @@ struct LinkShape {
   }
 };
 
-/// Read from the words themselves: what is zero or a right angle there is not computed. 17 words a link.
-std::vector<LinkShape> link_shapes(const std::vector<std::int32_t>& words, std::size_t joints) {
+/// Read from the words themselves: what is zero or a right angle there is not computed (which parameters are, a layout
+/// may have said before). 17 words a link.
+std::vector<LinkShape> link_shapes(const IdentifiedModel& model, const std::vector<std::int32_t>& words) {
   constexpr std::int32_t one = 1 << unit_bits;
+  const std::size_t joints = model.joints.size();
   std::vector<LinkShape> shapes;
   for (std::size_t i = 0; i < joints; ++i) {
     const std::int32_t* geometry = words.data() + 4 + 7 * i;
@@ -68,6 +71,7 @@ std::vector<LinkShape> link_shapes(const std::vector<std::int32_t>& words, std::
     if (cosine == 0 && sine == -one) shape.twist = Twist::minus_quarter;
     for (unsigned k = 0; k < 3; ++k) shape.offsets |= static_cast<unsigned>(geometry[3 + k] != 0) << k;
     for (unsigned k = 0; k < 10; ++k) shape.parameters |= static_cast<unsigned>(inertia[k] != 0) << k;
+    if (model.layout) shape.parameters = model.layout->parameters[i];
     shapes.push_back(shape);
   }
   return shapes;
@@ -87,15 +91,34 @@ bool has_effects(const IdentifiedModel& model, std::size_t joint, std::uint32_t 
   return (outputs >> joint & 1U) != 0 || deflects(model);
 }
 
-std::string joint_type(const JointFit& joint, const LinkShape& shape, bool effects) {
+std::string bls_type(const BroadLearningFit& fit, int bits) {
+  std::string list = fmt::format("{}, {}", stored_nodes(fit), bits);
+  // Only what differs from the template's defaults.
+  const bool relu = fit.activation == RampNodes::name;
+  if (fit.inputs != PhysicalInputs::name || relu) list += fmt::format(", {}Inputs", type_name(fit.inputs));
+  if (relu) list += ", RampNodes";
+  return "BroadLearning<" + list + ">";
+}
+
+std::string joint_type(const IdentifiedModel& model, std::size_t index, const LinkShape& shape, bool effects) {
+  const JointFit& joint = model.joints[index];
   std::string list = shape.text();
   if (effects) {
     for (const EffectFit* fit : in_order(joint)) list += ", " + type_name(fit->effect);
-    if (joint.bls)
-      list += fmt::format(", BroadLearning<{}, {}>", stored_nodes(*joint.bls), node_coefficient_bits(*joint.bls));
+    if (joint.bls) list += ", " + bls_type(*joint.bls, node_bits(model, index));
     for (const EffectFit* fit : in_order(joint, true)) list += ", " + type_name(fit->effect);
   }
   return "JointModel<" + list + ">";
+}
+
+/// The words in front of a BLS's rows: what Inputs::stored() gives.
+std::string scales_text(std::string_view inputs) {
+  constexpr std::string_view physical = "1 / reference velocity, 1 / span, tick / distances";
+  if (inputs == ExtendedInputs::name)
+    return fmt::format("{}, 1 / torque, turns per unit of position, 1 / acceleration", physical);
+  if (inputs == StateInputs::name)
+    return "middle position, 1 / half range, 1 / velocity, 1 / acceleration, 1 / reference velocity, 1 / span";
+  return std::string(physical);
 }
 
 /// Emits the words in order, with a comment for each group.
@@ -181,11 +204,12 @@ std::string parameters_text(const IdentifiedModel& model, const std::vector<std:
     for (const EffectFit* fit : in_order(model.joints[i])) print(*fit);
     if (const auto& bls = model.joints[i].bls) {
       const std::size_t nodes = stored_nodes(*bls);
-      printer.block(
-          BroadLearningLayout::words(nodes, true),
-          fmt::format("{}: BLS, {} nodes: 1 / reference velocity, 1 / span, tick / distances; a row of bias and "
-                      "weights a node; coefficients of inputs and nodes",
-                      joint.name, nodes));
+      std::size_t count = 0;
+      with_bls_types(*bls, [&]<class Inputs, class>() { count = BroadLearningLayout<Inputs>::words(nodes, true); });
+      printer.block(count, fmt::format("{}: BLS, {} nodes{}: {}; a row of bias and weights a node; coefficients of "
+                                       "inputs and nodes",
+                                       joint.name, nodes, bls->activation == RampNodes::name ? " (ramps)" : "",
+                                       scales_text(bls->inputs)));
     }
     for (const EffectFit* fit : in_order(model.joints[i], true)) print(*fit);
   }
@@ -235,7 +259,7 @@ std::uint32_t FixedModel::layout_hash() const {
   hash.add(formats_.deflection_sum);
   hash.add(static_cast<std::int32_t>(model_.joints.size()));
   hash.add(static_cast<std::int32_t>(outputs_));
-  const std::vector<LinkShape> shapes = link_shapes(words(), model_.joints.size());
+  const std::vector<LinkShape> shapes = link_shapes(model_, words());
   for (std::size_t i = 0; i < model_.joints.size(); ++i) {
     const JointFit& joint = model_.joints[i];
     hash.add(shapes[i].code());
@@ -250,13 +274,38 @@ std::uint32_t FixedModel::layout_hash() const {
     };
     for (const EffectFit* fit : in_order(joint)) add(*fit);
     if (joint.bls) {
-      hash.add(BroadLearning<2, 0>::name);
-      hash.add(static_cast<std::int32_t>(stored_nodes(*joint.bls)));
-      hash.add(node_coefficient_bits(*joint.bls));
+      with_bls_types(*joint.bls, [&]<class Inputs, class Activation>() {
+        BroadLearning<2, 0, Inputs, Activation>::hash_layout(hash, stored_nodes(*joint.bls),
+                                                             node_bits(model_, i));
+      });
     }
     for (const EffectFit* fit : in_order(joint, true)) add(*fit);
   }
   return hash.value();
+}
+
+TableLayout layout_of(const IdentifiedModel& model, const Formats& formats) {
+  TableLayout layout;
+  for (const LinkShape& shape : link_shapes(model, FixedModel(model, formats).words()))
+    layout.parameters.push_back(shape.parameters);
+  for (std::size_t j = 0; j < model.joints.size(); ++j) layout.node_bits.push_back(node_bits(model, j));
+  return layout;
+}
+
+std::string why_not_in_layout(const IdentifiedModel& model, const Formats& formats) {
+  if (!formats_hold(model, formats)) return "its numbers leave the formats";
+  const std::vector<std::int32_t> words = FixedModel(model, formats).words();
+  IdentifiedModel free = model;
+  free.layout.reset();
+  const std::vector<LinkShape> computed = link_shapes(model, words), needed = link_shapes(free, words);
+  for (std::size_t j = 0; j < model.joints.size(); ++j) {
+    const std::string& joint = model.robot.joints[j].name;
+    if (most_node_bits(model.joints[j]) < node_bits(model, j))
+      return fmt::format("output weights of {}'s BLS leave their format", joint);
+    if ((needed[j].parameters & ~computed[j].parameters) != 0)
+      return fmt::format("an inertial parameter of the link behind {} is not zero any more", joint);
+  }
+  return {};
 }
 
 QuantisationError quantisation_error(const IdentifiedModel& model, const Formats& formats,
@@ -312,7 +361,7 @@ std::uint32_t write_tables(const IdentifiedModel& model, const Formats& formats,
                            const std::filesystem::path& directory) {
   const FixedModel fixed(model, formats, outputs);
   const std::vector<std::int32_t> words = fixed.words();
-  const std::vector<LinkShape> shapes = link_shapes(words, model.joints.size());
+  const std::vector<LinkShape> shapes = link_shapes(model, words);
   const PageHeader header{table_magic, fixed.layout_hash(), static_cast<std::uint32_t>(words.size()), fixed.crc()};
 
   std::string format_lines, model_lines, error_lines, log_lines;
@@ -329,15 +378,17 @@ std::uint32_t write_tables(const IdentifiedModel& model, const Formats& formats,
   for (std::size_t j = 0; j < model.joints.size(); ++j) {
     if (outputs != all_joints(model) && (outputs >> j & 1U) != 0)
       driven += (driven.empty() ? "" : ", ") + model.robot.joints[j].name;
-    model_lines += fmt::format(",\n                         {}",
-                               joint_type(model.joints[j], shapes[j], has_effects(model, j, outputs)));
+    model_lines +=
+        fmt::format(",\n                         {}", joint_type(model, j, shapes[j], has_effects(model, j, outputs)));
     const auto k = static_cast<Eigen::Index>(j);
     error_lines += fmt::format("//   {}: proven <= {:.3g}, observed {:.3g} {} ({:.2g} of rated)\n",
                                model.robot.joints[j].name, proven[k], error.largest[k],
                                model.robot.joints[j].torque_unit(), error.largest[k] / model.joints[j].rated_torque);
   }
-  for (const LogReference& log : model.logs)
-    log_lines += fmt::format("//   {} {} [{}, {}) s, hash {}\n", log.role, log.file, log.from_s, log.to_s, log.hash);
+  for (const auto* logs : {&model.logs, &model.updates}) {
+    for (const LogReference& log : *logs)
+      log_lines += fmt::format("//   {} {} [{}, {}) s, hash {}\n", log.role, log.file, log.from_s, log.to_s, log.hash);
+  }
 
   const std::string text = fmt::format(
       R"(// Generated by fxdyn {} export from project {} (hash {}). Do not edit: make it anew.

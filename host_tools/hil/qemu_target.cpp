@@ -20,6 +20,8 @@
 #include <utility>
 
 #include "host_tools/error.hpp"
+#include "host_tools/files.hpp"
+#include "host_tools/hil/elf.hpp"
 
 namespace fxdyn {
 namespace {
@@ -39,6 +41,19 @@ void become(char* const* arguments, int line, int messages, pid_t parent) {
   ::dup2(messages, STDOUT_FILENO);
   ::dup2(messages, STDERR_FILENO);
   ::execvp(arguments[0], arguments);
+}
+
+/// What loads the page into the image's slot for updates.
+std::vector<std::string> page_arguments(const std::filesystem::path& image, const std::filesystem::path& page) {
+  if (page.empty()) return {};
+  const auto begin = symbol_of(image, "fxdyn_update_begin"), end = symbol_of(image, "fxdyn_update_end");
+  if (!begin || !end)
+    throw InputError(fmt::format("{}: has no slot for updated tables: build it anew", image.string()));
+  const std::size_t bytes = read_file(page).size(), slot = *end - *begin;
+  if (bytes > slot) throw InputError(fmt::format("{}: {} bytes, the slot has {}", page.string(), bytes, slot));
+  std::string file = page.string();  // a comma ends an option of the emulator, two are one of the name
+  for (std::size_t at = file.find(','); at != std::string::npos; at = file.find(',', at + 2)) file.insert(at, 1, ',');
+  return {"-device", fmt::format("loader,file={},addr={:#x},force-raw=on", file, *begin)};
 }
 
 }  // namespace
@@ -65,6 +80,7 @@ QemuTarget::QemuTarget(const std::filesystem::path& image, Options options) : op
 QemuTarget::~QemuTarget() { stop(); }
 
 void QemuTarget::start(const std::filesystem::path& image) {
+  const std::vector<std::string> page = page_arguments(image, options_.update_page);
   std::array<int, 2> line{-1, -1}, failure{-1, -1};
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, line.data()) != 0) {
     throw InputError(fmt::format("socketpair: {}", std::strerror(errno)));
@@ -84,6 +100,7 @@ void QemuTarget::start(const std::filesystem::path& image) {
                                  "-chardev",        fmt::format("socket,id=uart0,fd={}", line[1]),
                                  "-serial",         "chardev:uart0",
                                  "-kernel",         image.string()};
+  texts.insert(texts.end(), page.begin(), page.end());
   std::vector<char*> arguments;
   for (std::string& text : texts) arguments.push_back(text.data());
   arguments.push_back(nullptr);

@@ -30,6 +30,7 @@ class QemuTarget {
     std::string emulator = "qemu-system-arm";
     std::string machine = "mps2-an386";
     std::chrono::milliseconds timeout{10'000};  ///< for each reply; generous for loaded machines
+    std::filesystem::path update_page;          ///< tables.bin to load into the image's slot for updates; empty: none
   };
 
   explicit QemuTarget(const std::filesystem::path& image) : QemuTarget(image, Options{}) {}

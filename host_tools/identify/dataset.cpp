@@ -11,6 +11,7 @@
 #include "host_tools/log/spectrum.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/model/evaluator.hpp"
+#include "host_tools/parallel.hpp"
 #include "model/catalogue.hpp"
 
 namespace fxdyn {
@@ -141,6 +142,10 @@ MotionRows ProcessedLog::link_motion(Index from, Index count) const {
 MotionRows ProcessedLog::joint_motion(Index joint) const {
   const auto column = [&](const MatrixXd& m) { return m.size() > 0 ? MatrixXd(m.col(joint)) : MatrixXd(); };
   return slice(column(q), column(measured_dq), column(measured_ddq), 0, samples(), step_s);
+}
+
+VectorXd ProcessedLog::joint_velocity(Index joint) const {
+  return measured_dq.size() > 0 ? VectorXd(measured_dq.col(joint)) : VectorXd(differentiate(q.col(joint), step_s));
 }
 
 bool ProcessedLog::is_saturated(Index joint, Index row) const {
@@ -382,6 +387,19 @@ MatrixXd predict(const IdentifiedModel& model, const ProcessedLog& log) {
     if (columns->size() > 0) *columns = filter.apply(*columns);
   }
   return predict_by_blocks(*stiff, log) + predict_by_blocks(model, slow) - predict_by_blocks(*stiff, slow);
+}
+
+std::vector<MatrixXd> structural_torque(const IdentifiedModel& model, const std::vector<ProcessedLog>& logs) {
+  IdentifiedModel rigid = model;
+  rigid.filter.torque_lead_s = 0;
+  for (JointFit& joint : rigid.joints) {
+    std::erase_if(joint.effects,
+                  [](const EffectFit& fit) { return find_effect(fit.effect)->acts_on != ActsOn::position; });
+    joint.bls.reset();
+  }
+  std::vector<MatrixXd> out(logs.size());
+  parallel_for(logs.size(), [&](std::size_t l) { out[l] = predict(rigid, logs[l]); });
+  return out;
 }
 
 }  // namespace fxdyn

@@ -50,6 +50,7 @@ struct ProcessedLog {
   MotionRows link_motion(Eigen::Index from, Eigen::Index count) const;
   /// One joint's motion, all samples.
   MotionRows joint_motion(Eigen::Index joint) const;
+  Eigen::VectorXd joint_velocity(Eigen::Index joint) const;
   bool is_left_out(Eigen::Index joint) const { return !left_out.empty() && left_out[static_cast<std::size_t>(joint)]; }
   /// Whether decimated row `row` of the joint is next to a saturated sample.
   bool is_saturated(Eigen::Index joint, Eigen::Index row) const;
@@ -114,5 +115,9 @@ std::optional<IdentifiedModel> stiffened(const IdentifiedModel& model);
 /// (age_of()), and at the times at which the log's torque column shows them (torque_lead_s of the model's filter):
 /// samples x joints [N*m | N]. What gears bend by follows the motion below bending_hz(), the rest all of it.
 Eigen::MatrixXd predict(const IdentifiedModel& model, const ProcessedLog& log);
+
+/// Rigid-body torque of the model over each log as the effects of a tick see it: after deflections, with the log's
+/// known load, at the motion's own times.
+std::vector<Eigen::MatrixXd> structural_torque(const IdentifiedModel& model, const std::vector<ProcessedLog>& logs);
 
 }  // namespace fxdyn

@@ -3,36 +3,46 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <optional>
 
 #include "host_tools/error.hpp"
+#include "host_tools/identify/bls_rows.hpp"
 #include "host_tools/identify/solver.hpp"
+#include "host_tools/model/broad_learning_types.hpp"
 #include "host_tools/parallel.hpp"
-#include "model/broad_learning.hpp"
 
 namespace fxdyn {
 namespace {
 
 constexpr int blocks_of_one_log = 5;
+/// Rows of columns that are multiplied while they are in the processor's cache.
+constexpr Eigen::Index cached_rows = 1024;
 
+/// The inputs, then the nodes, at full rate.
 Eigen::MatrixXd bls_columns(const BroadLearningFit& bls, double sign_width, const JointSeries& series) {
-  std::vector<double> words{1 / bls.reference_velocity, 1 / bls.span};
-  for (const double distance : bls.distances) words.push_back(series.step_s / distance);
-  for (Eigen::Index k = 0; k < bls.weights.rows(); ++k) {
-    words.push_back(bls.weights(k, bls.weights.cols() - 1));
-    for (Eigen::Index i = 0; i + 1 < bls.weights.cols(); ++i) words.push_back(bls.weights(k, i));
-  }
-  const auto nodes = static_cast<std::size_t>(bls.nodes());
-  Eigen::MatrixXd columns(series.q.size(),
-                          static_cast<Eigen::Index>(BroadLearningLayout::coefficient_words(nodes, false)));
-  std::vector<double> scratch(nodes);
-  BroadLearningState<Real> state;
-  Saturations none;
-  for (Eigen::Index k = 0; k < series.q.size(); ++k) {
-    const JointInput<Real> u{series.q[k], series.dq[k], series.ddq[k], tanh_of(series.dq[k] / sign_width), 0.0};
-    broad_learning_basis<Real>(
-        nodes, u, Words<Real>{words.data()}, state, none, scratch,
-        [&](auto, std::size_t i, double phi) { columns(k, static_cast<Eigen::Index>(i)) = phi; });
-  }
+  Eigen::MatrixXd columns(series.q.size(), bls.coefficient_count());
+  with_bls_types(bls, [&]<class Inputs, class Activation>() {
+    if (Inputs::needs_structural && series.structural.size() == 0)
+      throw InputError(
+          fmt::format("BLS inputs \"{}\" need the rigid-body torque, which is not known here", bls.inputs));
+    const auto stored = Inputs::stored(bls, series.step_s);
+    std::vector<double> words(stored.begin(), stored.end());
+    for (Eigen::Index k = 0; k < bls.nodes(); ++k) {
+      words.push_back(bls.weights(k, bls.input_count()));
+      for (Eigen::Index i = 0; i < bls.input_count(); ++i) words.push_back(bls.weights(k, i));
+    }
+    const auto nodes = static_cast<std::size_t>(bls.nodes());
+    std::vector<double> scratch(nodes);
+    typename Inputs::template State<Real> state;
+    Saturations none;
+    for (Eigen::Index k = 0; k < series.q.size(); ++k) {
+      const JointInput<Real> u{series.q[k], series.dq[k], series.ddq[k], tanh_of(series.dq[k] / sign_width),
+                               Inputs::needs_structural ? series.structural[k] : 0.0};
+      broad_learning_basis<Inputs, Activation, Real>(
+          nodes, u, Words<Real>{words.data()}, state, none, scratch,
+          [&](auto, std::size_t i, double phi) { columns(k, static_cast<Eigen::Index>(i)) = phi; });
+    }
+  });
   return columns;
 }
 
@@ -40,7 +50,7 @@ Eigen::Index own_count(const JointFit& design) {
   Eigen::Index count = 0;
   for (const EffectFit& fit : design.effects)
     count += static_cast<Eigen::Index>(find_effect(fit.effect)->linear.size());
-  if (design.bls) count += design.bls->nodes() + static_cast<Eigen::Index>(BroadLearningLayout::inputs);
+  if (design.bls) count += design.bls->coefficient_count();
   return count;
 }
 
@@ -242,6 +252,35 @@ void Fitter::project_torque(std::size_t joint) {
   }
 }
 
+JointSeries Fitter::joint_series(std::size_t joint, std::size_t l) const {
+  const auto j = static_cast<Eigen::Index>(joint);
+  MotionRows motion = logs()[l].joint_motion(j);
+  JointSeries series{std::move(motion.q), std::move(motion.dq), std::move(motion.ddq), {}, logs()[l].step_s};
+  if (structural_) series.structural = (*structural_)[l].col(j);
+  return series;
+}
+
+void Fitter::set_structural(std::vector<Eigen::MatrixXd> torque) {
+  structural_ = std::make_shared<const std::vector<Eigen::MatrixXd>>(std::move(torque));
+  bool any = false;
+  for (const JointFit& joint : design_) any |= joint.bls.has_value();
+  if (any) set_designs(design_);
+}
+
+Eigen::MatrixXd Fitter::bls_inputs(std::size_t joint, const BroadLearningFit& bls) const {
+  BroadLearningFit without = bls;
+  without.weights.resize(0, fxdyn::bls_inputs(bls) + 1);
+  Eigen::MatrixXd out(0, without.input_count());
+  for (std::size_t l = 0; l < logs().size(); ++l) {
+    const ProcessedLog& log = logs()[l];
+    if (log.role != Role::train) continue;
+    const Eigen::MatrixXd u = log.decimate(bls_columns(without, design_[joint].sign_width, joint_series(joint, l)));
+    out.conservativeResize(out.rows() + u.rows(), Eigen::NoChange);
+    out.bottomRows(u.rows()) = u;
+  }
+  return out;
+}
+
 Eigen::MatrixXd Fitter::own_rows(std::size_t joint, const std::vector<JointFit>& designs) const {
   const JointFit& design = designs[joint];
   // Columns of effects that are as in the current design need not be made again.
@@ -263,8 +302,7 @@ Eigen::MatrixXd Fitter::own_rows(std::size_t joint, const std::vector<JointFit>&
   Eigen::MatrixXd out(data_->load_rows[joint].size(), own_count(design));
   for (std::size_t l = 0; l < logs().size(); ++l) {
     const ProcessedLog& log = logs()[l];
-    MotionRows motion = log.joint_motion(static_cast<Eigen::Index>(joint));
-    const JointSeries series{std::move(motion.q), std::move(motion.dq), std::move(motion.ddq), {}, log.step_s};
+    std::optional<JointSeries> series;  // made where a column is
     Eigen::Index at = 0;
     const auto fill = [&](Eigen::Index count, auto&& rows) {
       out.block(data_->first_row[l], at, log.rows(), count) = rows();
@@ -278,14 +316,17 @@ Eigen::MatrixXd Fitter::own_rows(std::size_t joint, const std::vector<JointFit>&
       } else {
         fill(count, [&] {
           if (find_effect(fit.effect)->needs_peers) return rows_with_peers(log, joint, fit, designs);
-          return log.decimate(log.filter_columns(effect_columns(fit.effect, fit.shape, design.sign_width, series)));
+          if (!series) series = joint_series(joint, l);
+          return log.decimate(log.filter_columns(effect_columns(fit.effect, fit.shape, design.sign_width, *series)));
         });
       }
     }
-    if (design.bls) {
-      fill(out.cols() - at,
-           [&] { return log.decimate(log.filter_columns(bls_columns(*design.bls, design.sign_width, series))); });
-    }
+    if (!design.bls) continue;
+    fill(out.cols() - at, [&] {
+      if (has_fast_rows(*design.bls)) return bls_rows(*design.bls, log, static_cast<Eigen::Index>(joint));
+      if (!series) series = joint_series(joint, l);
+      return log.decimate(log.filter_columns(bls_columns(*design.bls, design.sign_width, *series)));
+    });
   }
   return out;
 }
@@ -308,12 +349,20 @@ void Fitter::make_base_moments(std::size_t joint) {
 
 Fitter::Own Fitter::own_moments(std::size_t joint, const Eigen::MatrixXd& own) const {
   Own out;
+  const Eigen::MatrixXd& base_rows = data_->base_rows[joint];
   for (const Block& block : data_->blocks) {
-    const Eigen::Index count = block.to - block.from;
-    const auto x = own.middleRows(block.from, count);
-    const Eigen::MatrixXd wx = row_weights_[joint].segment(block.from, count).asDiagonal() * x;
-    out.push_back({data_->base_rows[joint].middleRows(block.from, count).transpose() * wx, wx.transpose() * x,
-                   wx.transpose() * torque_rows_[joint].segment(block.from, count)});
+    OwnMoments m{Eigen::MatrixXd::Zero(base_rows.cols(), own.cols()), Eigen::MatrixXd::Zero(own.cols(), own.cols()),
+                 Eigen::VectorXd::Zero(own.cols())};
+    for (Eigen::Index from = block.from; from < block.to; from += cached_rows) {
+      const Eigen::Index count = std::min(cached_rows, block.to - from);
+      const auto x = own.middleRows(from, count);
+      const Eigen::MatrixXd wx = row_weights_[joint].segment(from, count).asDiagonal() * x;
+      m.cross.noalias() += base_rows.middleRows(from, count).transpose() * wx;
+      m.gram.triangularView<Eigen::Lower>() += wx.transpose() * x;
+      m.projection.noalias() += wx.transpose() * torque_rows_[joint].segment(from, count);
+    }
+    m.gram.triangularView<Eigen::StrictlyUpper>() = m.gram.transpose();
+    out.push_back(std::move(m));
   }
   return out;
 }
@@ -380,8 +429,7 @@ void Fitter::set_designs(std::vector<JointFit> designs) {
 
 Eigen::VectorXd Fitter::ridge_of(const JointFit& design, double ridge, Eigen::Index count) {
   Eigen::VectorXd out = Eigen::VectorXd::Zero(count);
-  if (design.bls)
-    out.tail(design.bls->nodes() + static_cast<Eigen::Index>(BroadLearningLayout::inputs)).setConstant(ridge);
+  if (design.bls) out.tail(design.bls->coefficient_count()).setConstant(ridge);
   return out;
 }
 
@@ -451,12 +499,17 @@ NormalEquations Fitter::assemble(const std::vector<std::size_t>& blocks, const s
 
 Solution Fitter::solve(const NormalEquations& equations) const {
   const SymmetricSolver solver(equations.information);
-  return split(equations, solver.solve(equations.projection));
+  return split(equations.offset, solver.solve(equations.projection));
 }
 
-Solution Fitter::split(const NormalEquations& equations, const Eigen::VectorXd& x) const {
+std::vector<Eigen::Index> Fitter::offsets() const {
+  std::vector<Eigen::Index> offset{static_cast<Eigen::Index>(base().columns.size())};
+  for (std::size_t j = 0; j < joints(); ++j) offset.push_back(offset.back() + own_rows_[j].cols());
+  return offset;
+}
+
+Solution Fitter::split(const std::vector<Eigen::Index>& offset, const Eigen::VectorXd& x) const {
   Solution solution;
-  const auto& offset = equations.offset;
   solution.beta = x.head(offset[0]);
   for (std::size_t j = 0; j < joints(); ++j)
     solution.theta.emplace_back(x.segment(offset[j], offset[j + 1] - offset[j]));
@@ -475,32 +528,38 @@ bool Judgement::beats(const Judgement& other, double worth) const {
   return blocks_of_one_log ? better == blocks.size() : 4 * better >= 3 * blocks.size();
 }
 
+void Fitter::Tally::add(std::size_t i, const Fitter& fitter, std::size_t joint, std::size_t fold, const Own& own,
+                        const JointFit& design, const Solution& solution) {
+  Judgement& judgement = judgements[i];
+  for (const std::size_t b : fitter.data_->split.judge[fold]) {
+    const double error = fitter.square_error(joint, b, own[b], solution), rows = fitter.base_moments_[joint][b].count;
+    judgement.blocks.push_back(std::sqrt(error / std::max(rows, 1.0)));
+    square[i] += error;
+    count[i] += rows;
+  }
+  const Eigen::VectorXd& theta = solution.theta[joint];
+  judgement.physical &= last_is_physical(design, theta);
+  if (design.bls)
+    judgement.coefficient_sum =
+        std::max(judgement.coefficient_sum, theta.tail(design.bls->coefficient_count()).cwiseAbs().sum());
+}
+
+std::vector<Judgement> Fitter::Tally::done(bool one_log) {
+  for (std::size_t i = 0; i < judgements.size(); ++i) {
+    judgements[i].rmse = std::sqrt(square[i] / std::max(count[i], 1.0));
+    judgements[i].blocks_of_one_log = one_log;
+  }
+  return std::move(judgements);
+}
+
 std::vector<Judgement> Fitter::judged(std::size_t first, std::size_t last, const std::vector<const Own*>& all,
                                       const std::vector<const JointFit*>& design) const {
-  std::vector<Judgement> out(last - first);
-  std::vector<double> sum(out.size(), 0), count(out.size(), 0);
+  Tally tally(last - first);
   for (std::size_t fold = 0; fold < data_->split.fit.size(); ++fold) {
     const Solution solution = solve(assemble(data_->split.fit[fold], all, design));
-    for (std::size_t j = first; j < last; ++j) {
-      Judgement& judgement = out[j - first];
-      for (const std::size_t b : data_->split.judge[fold]) {
-        const double square = square_error(j, b, (*all[j])[b], solution), rows = base_moments_[j][b].count;
-        judgement.blocks.push_back(std::sqrt(square / std::max(rows, 1.0)));
-        sum[j - first] += square;
-        count[j - first] += rows;
-      }
-      judgement.physical &= last_is_physical(*design[j], solution.theta[j]);
-      if (design[j]->bls) {
-        const Eigen::Index own = design[j]->bls->nodes() + static_cast<Eigen::Index>(BroadLearningLayout::inputs);
-        judgement.coefficient_sum = std::max(judgement.coefficient_sum, solution.theta[j].tail(own).cwiseAbs().sum());
-      }
-    }
+    for (std::size_t j = first; j < last; ++j) tally.add(j - first, *this, j, fold, *all[j], *design[j], solution);
   }
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    out[i].rmse = std::sqrt(sum[i] / std::max(count[i], 1.0));
-    out[i].blocks_of_one_log = logs().size() == 1;
-  }
-  return out;
+  return tally.done(logs().size() == 1);
 }
 
 std::vector<const Fitter::Own*> Fitter::current() const {
@@ -531,6 +590,68 @@ std::vector<Judgement> Fitter::held_out_with(std::size_t joint, const JointFit& 
   for (const double ridge : ridges) {
     if (design.bls) design.bls->ridge = ridge;
     out.push_back(judged(joint, joint + 1, all, used)[0]);
+  }
+  return out;
+}
+
+std::vector<std::vector<Judgement>> Fitter::held_out_with(std::size_t joint, const JointFit& candidate,
+                                                          const std::vector<Eigen::Index>& sizes,
+                                                          const std::vector<double>& ridges) const {
+  std::vector<JointFit> designs_with = design_;
+  designs_with[joint] = candidate;
+  const Own own = own_moments(joint, own_rows(joint, designs_with));
+  JointFit whole = candidate;
+  whole.bls->ridge = 0;  // comes last
+  std::vector<const Own*> all = current();
+  std::vector<const JointFit*> used = designs();
+  all[joint] = &own;
+  used[joint] = &whole;
+  const Eigen::Index coefficients = candidate.bls->coefficient_count(), inputs = candidate.bls->input_count();
+  const Eigen::Index theta = own_count(candidate), effects = theta - coefficients;
+
+  // Of each size: its design, and the leading part of the moments.
+  std::vector<JointFit> design(sizes.size(), candidate);
+  std::vector<Own> part(sizes.size(), own);
+  std::vector<std::vector<Tally>> tallies(sizes.size(), std::vector<Tally>(ridges.size(), Tally(1)));
+  for (std::size_t s = 0; s < sizes.size(); ++s) {
+    design[s].bls->weights = candidate.bls->weights.topRows(sizes[s]);
+    const Eigen::Index count = effects + inputs + sizes[s];
+    for (OwnMoments& m : part[s]) {
+      m.cross = m.cross.leftCols(count).eval();
+      m.gram = m.gram.topLeftCorner(count, count).eval();
+      m.projection = m.projection.head(count).eval();
+    }
+  }
+  for (std::size_t fold = 0; fold < data_->split.fit.size(); ++fold) {
+    const NormalEquations equations = assemble(data_->split.fit[fold], all, used);
+    // The BLS's unknowns behind all others: they grow.
+    const Eigen::Index p = equations.offset.back(), fixed = p - coefficients;
+    const Eigen::Index at = equations.offset[joint] + effects;
+    Eigen::VectorXi order(p);
+    for (Eigen::Index i = 0; i < p; ++i)
+      order[i] = static_cast<int>(i < at ? i : (i < fixed ? i + coefficients : at + i - fixed));
+    const Eigen::MatrixXd a = equations.information(order, order);
+    const Eigen::VectorXd b = equations.projection(order);
+    double rows = 0;
+    for (const std::size_t block : data_->split.fit[fold]) rows += base_moments_[joint][block].count;
+    GrowingSolver structure(a, b);
+    structure.grow(fixed);
+    for (std::size_t r = 0; r < ridges.size(); ++r) {
+      GrowingSolver grown = structure;
+      grown.set_ridge(weights_[static_cast<Eigen::Index>(joint)] * rows * ridges[r]);
+      for (std::size_t s = 0; s < sizes.size(); ++s) {
+        const Eigen::Index known = fixed + inputs + sizes[s];
+        Eigen::VectorXd x = Eigen::VectorXd::Zero(p);
+        x(order.head(known)) = grown.solve(known);
+        Solution solution = split(equations.offset, x);
+        solution.theta[joint].conservativeResize(effects + inputs + sizes[s]);
+        tallies[s][r].add(0, *this, joint, fold, part[s], design[s], solution);
+      }
+    }
+  }
+  std::vector<std::vector<Judgement>> out(sizes.size());
+  for (std::size_t s = 0; s < sizes.size(); ++s) {
+    for (Tally& tally : tallies[s]) out[s].push_back(tally.done(logs().size() == 1)[0]);
   }
   return out;
 }
@@ -598,6 +719,22 @@ std::string expression(const BaseSet& base, Eigen::Index row) {
 }
 
 }  // namespace
+
+std::vector<std::string> Fitter::unknowns() const {
+  std::vector<std::string> names;
+  for (const Eigen::Index column : base().columns) names.push_back(parameter_name(column));
+  for (std::size_t j = 0; j < joints(); ++j) {
+    const std::string& joint = data_->robot.joints[j].name;
+    const std::size_t before = names.size();
+    for (const EffectFit& fit : design_[j].effects) {
+      for (const ParameterInfo& parameter : find_effect(fit.effect)->linear)
+        names.push_back(fmt::format("{}: {}, {}", joint, fit.effect, parameter.name));
+    }
+    while (names.size() < before + static_cast<std::size_t>(own_rows_[j].cols()))
+      names.push_back(fmt::format("{}: bls", joint));
+  }
+  return names;
+}
 
 IdentifiedModel Fitter::to_model(const Solution& solution) const {
   IdentifiedModel model;

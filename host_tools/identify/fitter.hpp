@@ -6,6 +6,7 @@
 
 #include "host_tools/identify/dataset.hpp"
 #include "host_tools/identify/regressor.hpp"
+#include "host_tools/identify/square_root.hpp"
 #include "host_tools/model/effects.hpp"
 
 namespace fxdyn {
@@ -101,6 +102,7 @@ class Fitter {
   std::vector<Dependent> dependent_effects() const;
   /// Weights are one over the residual's variance of each joint (1 for ordinary least squares).
   void set_weights(const Eigen::VectorXd& weights) { weights_ = weights; }
+  const Eigen::VectorXd& weights() const { return weights_; }
   /// Two rounds of reweighting from the residuals of the train logs.
   void reweight();
   /// Iteratively reweighted least squares (Huber's weights, 95 % efficient on normal noise; scale from the median of
@@ -112,6 +114,17 @@ class Fitter {
   /// One joint with another design in place of the current one, for each ridge value of its BLS.
   std::vector<Judgement> held_out_with(std::size_t joint, const JointFit& design,
                                        const std::vector<double>& ridges) const;
+  /// The same for the first `sizes[s]` nodes of the design's BLS each (paper's incremental learning): one set of
+  /// moments and one Cholesky factor that grows, see GrowingSolver. [s][r]: size s, ridge r.
+  std::vector<std::vector<Judgement>> held_out_with(std::size_t joint, const JointFit& design,
+                                                    const std::vector<Eigen::Index>& sizes,
+                                                    const std::vector<double>& ridges) const;
+
+  /// Rigid-body torque in the logs [samples x joints], for inputs of a BLS that need it. Of a model that was identified
+  /// before: where the fit ends elsewhere, once more with that.
+  void set_structural(std::vector<Eigen::MatrixXd> torque);
+  /// Inputs of a BLS (its weights do not matter) in the rows of the train logs.
+  Eigen::MatrixXd bls_inputs(std::size_t joint, const BroadLearningFit& bls) const;
 
   /// Rows of the train logs count `forgetting` per second of their age, as recursive() forgets them.
   void forget(double forgetting);
@@ -124,15 +137,25 @@ class Fitter {
   Solution fit() const;
   /// The same values, nothing else.
   Solution estimate() const { return solve(normal_equations()); }
-  /// The same without standard deviations by recursive least squares (square-root information form: every row is
-  /// rotated into [R | z], R x = z) over the train rows in their order. What was known a second ago counts `forgetting`
-  /// (1: nothing is forgotten, and the last estimate is fit()'s). `trace`: x at `points` moments.
+  /// The same without standard deviations by recursive least squares (square-root information form) over the train rows
+  /// in their order. What was known a second ago counts `forgetting` (1: nothing is forgotten, and the last estimate is
+  /// fit()'s). `start`: what other logs told, with the same unknowns; empty: nothing is known. `trace`: x at `points`
+  /// moments.
   struct Recursion {
     Solution solution;
     Eigen::VectorXd t;      ///< seconds of training data taken in
     Eigen::MatrixXd trace;  ///< moments x unknowns
+    SquareRootInformation information;
   };
-  Recursion recursive(double forgetting, Eigen::Index points) const;
+  Recursion recursive(double forgetting, Eigen::Index points,
+                      const SquareRootInformation& start = SquareRootInformation()) const;
+  /// What the train rows tell with the current weights, a BLS's ridge included: what a recursion over later logs starts
+  /// from.
+  SquareRootInformation information() const;
+  /// x as beta and theta.
+  Solution split(const Eigen::VectorXd& x) const { return split(offsets(), x); }
+  /// Names of the unknowns: of base parameters, then "joint: effect, parameter".
+  std::vector<std::string> unknowns() const;
   /// Of the train rows with the current weights.
   NormalEquations normal_equations() const;
   /// Sum over the train rows of the weighted squared residual.
@@ -165,24 +188,40 @@ class Fitter {
   };
   using Own = std::vector<OwnMoments>;  ///< by block
 
+  JointSeries joint_series(std::size_t joint, std::size_t log) const;
   Eigen::MatrixXd own_rows(std::size_t joint, const std::vector<JointFit>& designs) const;
   /// But for what the torque enters.
   void make_base_moments(std::size_t joint);
   void project_torque(std::size_t joint);
   Own own_moments(std::size_t joint, const Eigen::MatrixXd& own) const;
   Eigen::VectorXd residual(std::size_t joint, const Solution& solution) const;
+  /// Where x has its parts: NormalEquations::offset.
+  std::vector<Eigen::Index> offsets() const;
+  /// Adds rows [from, from + count) with these weights (of all rows), and their share of the ridge.
+  void take_in(Eigen::Index from, Eigen::Index count, const std::vector<Eigen::VectorXd>& row_weights,
+               SquareRootInformation& information) const;
   static Eigen::VectorXd ridge_of(const JointFit& design, double ridge, Eigen::Index count);
   double square_error(std::size_t joint, std::size_t block, const OwnMoments& own, const Solution& solution) const;
   NormalEquations assemble(const std::vector<std::size_t>& blocks, const std::vector<const Own*>& own,
                            const std::vector<const JointFit*>& design) const;
   Solution solve(const NormalEquations& equations) const;
-  /// x as beta and theta.
-  Solution split(const NormalEquations& equations, const Eigen::VectorXd& x) const;
+  Solution split(const std::vector<Eigen::Index>& offset, const Eigen::VectorXd& x) const;
   /// d(torque) / d(log shape) of the joint's sign width and of its effects' widths and distances, rows x shapes.
   Eigen::MatrixXd shape_rows(std::size_t joint, const Eigen::VectorXd& theta) const;
   /// The normal equations of coefficients and shapes together at a solution; projection is X^T W residual.
   NormalEquations with_shapes(const Solution& solution, std::vector<Eigen::MatrixXd>& shape_rows) const;
   void add_standard_deviations(Solution& solution) const;
+  /// Judgements of some joints, added up fold by fold.
+  struct Tally {
+    std::vector<Judgement> judgements;
+    std::vector<double> square, count;
+
+    explicit Tally(std::size_t joints) : judgements(joints), square(joints, 0), count(joints, 0) {}
+    /// One more fold of joint number `i` of these.
+    void add(std::size_t i, const Fitter& fitter, std::size_t joint, std::size_t fold, const Own& own,
+             const JointFit& design, const Solution& solution);
+    std::vector<Judgement> done(bool one_log);
+  };
   /// Joints `first` .. `last` - 1.
   std::vector<Judgement> judged(std::size_t first, std::size_t last, const std::vector<const Own*>& own,
                                 const std::vector<const JointFit*>& design) const;
@@ -192,6 +231,7 @@ class Fitter {
 
   std::shared_ptr<const Data> data_;
   std::vector<JointFit> design_;
+  std::shared_ptr<const std::vector<Eigen::MatrixXd>> structural_;  ///< set_structural(); none: not known
   double torque_lead_s_ = 0;
   bool robust_ = false;                                 ///< row weights are Huber's
   std::vector<Eigen::VectorXd> torque_rows_;            ///< per joint, without known loads

@@ -193,6 +193,12 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
         "limits not in the project: 1.2 times the largest in the logs (URDF limits where they are within a factor of "
         "ten)");
   }
+  if (logs.size() == 1) {
+    data.notes.push_back(
+        "one trajectory fits and judges: five blocks of it are judged by fits of the others, and they resemble each other, "
+        "so that errors come out too small and effects that do not carry over can stay; record another trajectory with role "
+        "= \"validate\"");
+  }
   if (project.rated_torque.empty())
     data.notes.push_back("robot.rated_torque not in the project: the largest measured torque stands for it");
   ProcessSettings settings;
@@ -210,11 +216,7 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
       data.notes.push_back(
           fmt::format("{}: irregular time stamps, resampled to {:.6g} s", log.file.filename().string(), log.step_s));
     }
-    for (Eigen::Index j = 0; j < log.tau.cols(); ++j) {
-      if (log.tau.col(j).maxCoeff() > log.tau.col(j).minCoeff()) continue;
-      throw DataError(fmt::format("{}: torque of joint {} ({}) never changes: check the column and its gain",
-                                  log.file.string(), j + 1, project.robot.joints[static_cast<std::size_t>(j)].name));
-    }
+    check_torque(log, project.robot);
     data.references.push_back(
         {log.file.filename().string(), to_string(log.role), hash_of_file(log.file), log.from_s, log.to_s});
     data.logs.push_back(process(std::move(log), data.filter, settings));
@@ -240,6 +242,14 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
     }
   }
   return data;
+}
+
+void check_torque(const Log& log, const Robot& robot) {
+  for (Eigen::Index j = 0; j < log.tau.cols(); ++j) {
+    if (log.tau.col(j).maxCoeff() > log.tau.col(j).minCoeff()) continue;
+    throw DataError(fmt::format("{}: torque of joint {} ({}) never changes: check the column and its gain",
+                                log.file.string(), j + 1, robot.joints[static_cast<std::size_t>(j)].name));
+  }
 }
 
 std::vector<JointFit> initial_joints(const Project& project, const GateData& data) {
@@ -447,7 +457,7 @@ Estimate finish_model(const Fitter& fitter, const Project& project, const GateDa
   Solution solution = fitter.fit();
   const NormalEquations equations = fitter.normal_equations();
   out.condition = condition_number(equations.information);
-  // A BLS's ridge has no place in the recursion.
+  // With a BLS beside it the recursion ends where the fit does too, after many times the work.
   bool trained = false;
   for (std::size_t j = 0; j < fitter.joints(); ++j) trained |= fitter.design(j).bls.has_value();
   if (settings.method == "rls" && !trained) {

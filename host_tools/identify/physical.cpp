@@ -10,7 +10,6 @@
 #include "host_tools/identify/solver.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/model/identified_model.hpp"
-#include "model/broad_learning.hpp"
 
 namespace fxdyn {
 namespace {
@@ -476,9 +475,14 @@ PhysicalFit fit_physical(const PhysicalProblem& problem) {
 }
 
 PhysicalFit fit_physical(const Fitter& fitter, const Robot& robot, double variance) {
-  const DhChain chain = to_dh(robot);
   NormalEquations equations = fitter.normal_equations();
-  const Index m = equations.information.rows() - static_cast<Index>(fitter.base().columns.size());
+  return fit_physical(fitter, robot, std::move(equations.information), std::move(equations.projection), variance);
+}
+
+PhysicalFit fit_physical(const Fitter& fitter, const Robot& robot, MatrixXd information, VectorXd projection,
+                         double variance) {
+  const DhChain chain = to_dh(robot);
+  const Index m = information.rows() - static_cast<Index>(fitter.base().columns.size());
   VectorXd lower = VectorXd::Constant(m, -unbounded), upper = -lower;
   Index at = 0;
   for (std::size_t j = 0; j < fitter.joints(); ++j) {
@@ -489,10 +493,10 @@ PhysicalFit fit_physical(const Fitter& fitter, const Robot& robot, double varian
         upper[at++] = parameter.upper;
       }
     }
-    if (design.bls) at += design.bls->nodes() + static_cast<Index>(BroadLearningLayout::inputs);
+    if (design.bls) at += design.bls->coefficient_count();
   }
-  return fit_physical({robot, chain, fitter.base(), std::move(equations.information), std::move(equations.projection),
-                       lower, upper, variance});
+  return fit_physical(
+      {robot, chain, fitter.base(), std::move(information), std::move(projection), lower, upper, variance});
 }
 
 Solution physical_solution(Solution solution, const PhysicalFit& fit) {

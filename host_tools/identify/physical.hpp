@@ -83,6 +83,9 @@ PhysicalFit fit_physical(const PhysicalProblem& problem);
 /// The same of a fitter whose weights are one over the residuals' variance; coefficients keep the bounds of the
 /// catalogue (those of a BLS have none).
 PhysicalFit fit_physical(const Fitter& fitter, const Robot& robot, double variance = 1);
+/// The same with the information of other logs in place of the fitter's own (X^T W X and X^T W tau of its unknowns).
+PhysicalFit fit_physical(const Fitter& fitter, const Robot& robot, Eigen::MatrixXd information,
+                         Eigen::VectorXd projection, double variance);
 /// A fitter's solution with beta and theta of the physical fit in place of its own.
 Solution physical_solution(Solution solution, const PhysicalFit& fit);
 

@@ -358,68 +358,80 @@ void Fitter::forget(double forgetting) {
   }
 }
 
-Fitter::Recursion Fitter::recursive(double forgetting, Index points) const {
-  const NormalEquations shape = normal_equations();
-  const Index p = shape.offset.back(), nb = shape.offset.front();
-  // [R | z]: R x = z, R upper triangular; each row is rotated in (Givens). Columns scaled to like sizes.
-  VectorXd scale = shape.information.diagonal().cwiseSqrt();
-  for (double& s : scale) s = s > 0 ? 1 / s : 0;
-  RowMajor r = RowMajor::Zero(p, p + 1);
-  const auto estimate = [&] {
-    // directions not seen yet stay zero
-    MatrixXd upper = r.leftCols(p);
-    VectorXd z = r.col(p);
-    VectorXd x = VectorXd::Zero(p);
-    for (Index i = p; i-- > 0;) {
-      if (std::fabs(upper(i, i)) < 1e-9 * std::max(1e-300, upper.cwiseAbs().maxCoeff())) continue;
-      x[i] = (z[i] - upper.row(i).tail(p - i - 1).dot(x.tail(p - i - 1))) / upper(i, i);
+void Fitter::take_in(Index from, Index count, const std::vector<VectorXd>& row_weights,
+                     SquareRootInformation& information) const {
+  const std::vector<Index> offset = offsets();
+  const Index nb = offset.front();
+  for (std::size_t j = 0; j < joints(); ++j) {
+    const Index first = data_->first_base[j], acting = nb - first, own = own_rows_[j].cols();
+    const auto weight = row_weights[j].segment(from, count);
+    const double rows = weight.sum();
+    if (rows == 0) continue;
+    std::vector<Index> columns;
+    for (Index c = first; c < nb; ++c) columns.push_back(c);
+    for (Index c = 0; c < own; ++c) columns.push_back(offset[j] + c);
+    // Paper Eq. 30: mean square error + ridge |W|^2
+    const VectorXd ridge = rows * ridge_of(design_[j], design_[j].bls ? design_[j].bls->ridge : 0, own);
+    const Index penalties = (ridge.array() > 0).count();
+    MatrixXd all = MatrixXd::Zero(count + penalties, acting + own + 1);
+    all.topRows(count) << data_->base_rows[j].middleRows(from, count), own_rows_[j].middleRows(from, count),
+        torque_rows_[j].segment(from, count);
+    all.topRows(count) = weight.cwiseSqrt().asDiagonal() * all.topRows(count);
+    for (Index c = 0, at = count; c < own; ++c) {
+      if (ridge[c] > 0) all(at++, acting + c) = std::sqrt(ridge[c]);
     }
-    return VectorXd(scale.cwiseProduct(x));
-  };
+    information.take_in(std::sqrt(weights_[static_cast<Index>(j)]) * all, columns, rows);
+  }
+}
+
+SquareRootInformation Fitter::information() const {
+  SquareRootInformation out(offsets().back());
+  for (const std::size_t b : train_blocks()) {
+    const Block& block = data_->blocks[b];
+    take_in(block.from, block.to - block.from, row_weights_, out);
+  }
+  return out;
+}
+
+Fitter::Recursion Fitter::recursive(double forgetting, Index points, const SquareRootInformation& start) const {
+  constexpr Index most_rows = 2048;  // at once
+  const std::vector<Index> offset = offsets();
   Index total = 0;
   for (const ProcessedLog& log : logs()) total += log.role == Role::train ? log.rows() : 0;
   Recursion out;
+  out.information = start.unknowns() > 0 ? start : SquareRootInformation(offset.back());
   points = std::min(points, total);
   out.t.resize(points);
-  out.trace.resize(points, p);
+  out.trace.resize(points, offset.back());
+  std::vector<VectorXd> row_weights = data_->usable;
   double seconds = 0;
   Index done = 0, point = 0;
-  VectorXd row(p + 1);
   for (std::size_t l = 0; l < logs().size(); ++l) {
     const ProcessedLog& log = logs()[l];
     if (log.role != Role::train) continue;
     const double interval = log.step_s * static_cast<double>(log.decimation);
-    const double keep = std::sqrt(std::pow(forgetting, interval));
-    for (Index k = data_->first_row[l]; k < data_->first_row[l] + log.rows(); ++k) {
-      if (forgetting < 1) r *= keep;
-      for (std::size_t j = 0; j < joints(); ++j) {
-        const double w = std::sqrt(weights_[static_cast<Index>(j)] * data_->usable[j][k]);
-        if (w == 0) continue;
-        const Index first = data_->first_base[j], own = shape.offset[j], count = own_rows_[j].cols();
-        row.setZero();
-        row.segment(first, nb - first) = data_->base_rows[j].row(k);
-        row.segment(own, count) = own_rows_[j].row(k);
-        row.head(p) = w * row.head(p).cwiseProduct(scale);
-        row[p] = w * torque_rows_[j][k];
-        for (Index i = first; i < p; ++i) {
-          if (row[i] == 0) continue;
-          const double length = std::hypot(r(i, i), row[i]), c = r(i, i) / length, s = row[i] / length;
-          for (Index m = i; m <= p; ++m) {
-            const double upper = r(i, m);
-            r(i, m) = c * upper + s * row[m];
-            row[m] = c * row[m] - s * upper;
-          }
+    const Index end = data_->first_row[l] + log.rows();
+    for (Index from = data_->first_row[l], count = 0; from < end; from += count) {
+      // Rows up to the next moment of the trace together: first all forgets, then each by its age.
+      count = std::min(most_rows, end - from);
+      if (point < points) count = std::min(count, ((point + 1) * total + points - 1) / points - done);
+      out.information.forget(std::pow(forgetting, interval * static_cast<double>(count)));
+      if (forgetting < 1) {
+        for (VectorXd& weight : row_weights) {
+          for (Index k = 0; k < count; ++k)
+            weight[from + k] *= std::pow(forgetting, interval * static_cast<double>(count - 1 - k));
         }
       }
-      seconds += interval;
-      ++done;
+      take_in(from, count, row_weights, out.information);
+      seconds += interval * static_cast<double>(count);
+      done += count;
       if (point < points && done * points >= (point + 1) * total) {
         out.t[point] = seconds;
-        out.trace.row(point++) = estimate().transpose();
+        out.trace.row(point++) = out.information.solve().transpose();
       }
     }
   }
-  out.solution = split(shape, estimate());
+  out.solution = split(offset, out.information.solve());
   return out;
 }
 

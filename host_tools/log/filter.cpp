@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "host_tools/log/log.hpp"
+#include "host_tools/vectors.hpp"
 
 namespace fxdyn {
 namespace {
@@ -93,63 +94,148 @@ ZeroPhaseFilter::ZeroPhaseFilter(double cutoff_hz, double step_s, int order) : c
   }
 }
 
-/// `lanes` columns side by side from column `from`: each step waits for the one before it, and columns fill the wait.
-template <Index lanes>
-void ZeroPhaseFilter::apply_to(const Eigen::Ref<const MatrixXd>& columns, Index from, MatrixXd& result) const {
-  using Lanes = Eigen::Array<double, 1, lanes>;
-  const Index n = columns.rows();
+namespace {
+
+/// `sections` second-order sections one after another over the columns side by side, in place and sample by sample:
+/// each step waits for the one before it, and the other columns and sections fill the wait. `step`: from sample to
+/// sample, negative backwards. `state`: sections x 2 x columns.
+template <class V, int columns, int sections, class Section>
+[[gnu::always_inline]] inline void pass(const Section* section, double* x, Index samples, Index step, double* state) {
+  constexpr int parts = columns / V::size;
+  typename V::Double z1[sections][parts], z2[sections][parts];
+#pragma GCC unroll 4
+  for (int s = 0; s < sections; ++s) {
+#pragma GCC unroll 4
+    for (int p = 0; p < parts; ++p) {
+      z1[s][p] = V::at(state + (2 * s) * columns + p * V::size);
+      z2[s][p] = V::at(state + (2 * s + 1) * columns + p * V::size);
+    }
+  }
+  for (Index k = 0; k < samples; ++k, x += step) {
+#pragma GCC unroll 4
+    for (int p = 0; p < parts; ++p) {
+      typename V::Double value = V::at(x + p * V::size);
+#pragma GCC unroll 4
+      for (int s = 0; s < sections; ++s) {
+        const typename V::Double y = section[s].b0 * value + z1[s][p];
+        z1[s][p] = section[s].b1 * value - section[s].a1 * y + z2[s][p];
+        z2[s][p] = section[s].b2 * value - section[s].a2 * y;
+        value = y;
+      }
+      V::at(x + p * V::size) = value;
+    }
+  }
+#pragma GCC unroll 4
+  for (int s = 0; s < sections; ++s) {
+#pragma GCC unroll 4
+    for (int p = 0; p < parts; ++p) {
+      V::at(state + (2 * s) * columns + p * V::size) = z1[s][p];
+      V::at(state + (2 * s + 1) * columns + p * V::size) = z2[s][p];
+    }
+  }
+}
+
+template <int columns, int sections, class Section>
+void pass_two(const Section* section, double* x, Index samples, Index step, double* state) {
+  pass<Vector<2>, columns, sections>(section, x, samples, step, state);
+}
+template <int columns, int sections, class Section>
+FXDYN_FOUR_AT_ONCE void pass_four(const Section* section, double* x, Index samples, Index step, double* state) {
+  pass<Vector<std::min(columns, 4)>, columns, sections>(section, x, samples, step, state);
+}
+
+/// Samples side by side from `x` on; `step` as in pass().
+struct Run {
+  double* x;
+  Index samples, step;
+};
+
+/// Over the runs one after another, from the state at rest on their first value.
+template <int columns, int sections, class Section>
+void pass_over(const Section* section, std::initializer_list<Run> runs) {
+  std::array<double, 2 * sections * columns> state;
+  for (int c = 0; c < columns; ++c) {
+    double value = runs.begin()->x[c];
+    for (int s = 0; s < sections; ++s) {
+      const double z2 = (section[s].b2 - section[s].a2) * value;
+      const double z1 = (section[s].b1 - section[s].a1) * value + z2;
+      state[static_cast<std::size_t>(2 * s * columns + c)] = z1;
+      state[static_cast<std::size_t>((2 * s + 1) * columns + c)] = z2;
+      value = section[s].b0 * value + z1;
+    }
+  }
+  const bool four = four_at_once;
+  for (const Run& run : runs)
+    (four ? pass_four<columns, sections, Section> : pass_two<columns, sections, Section>)(section, run.x, run.samples,
+                                                                                          run.step, state.data());
+}
+
+}  // namespace
+
+template <int columns>
+void ZeroPhaseFilter::apply_to(double* side_by_side, Index samples) const {
+  const Index n = samples;
+  const auto at = [&](Index i) { return Eigen::Map<Eigen::Array<double, columns, 1>>(side_by_side + i * columns); };
   // Far enough for the start to be forgotten to 1e-9: 4.5 times the 1 % of edge_samples().
   const Index pad = std::min(n - 1, edge_samples() * 9 / 2 + 1);
-  std::vector<Lanes> work(static_cast<std::size_t>(n + 2 * pad));
-  // In place, from state at rest on the first value.
-  const auto pass = [this](auto begin, auto end) {
-    for (const Section& s : sections_) {
-      const Lanes first = *begin;
-      Lanes z2 = (s.b2 - s.a2) * first;
-      Lanes z1 = (s.b1 - s.a1) * first + z2;
-      for (auto it = begin; it != end; ++it) {
-        const Lanes x = *it;
-        const Lanes y = s.b0 * x + z1;
-        z1 = s.b1 * x - s.a1 * y + z2;
-        z2 = s.b2 * x - s.a2 * y;
-        *it = y;
-      }
-    }
-  };
-  const auto at = [&](Index i) -> Lanes& { return work[static_cast<std::size_t>(pad + i)]; };
   // A zero-phase filter leaves straight lines alone: the one through the ends is taken out, so that the reflection is
   // about zero and ramps pass exactly.
-  Lanes start, slope;
-  for (Index c = 0; c < lanes; ++c) {
-    start[c] = columns(0, from + c);
-    slope[c] = (columns(n - 1, from + c) - start[c]) / static_cast<double>(n - 1);
-  }
-  for (Index c = 0; c < lanes; ++c) {
-    for (Index i = 0; i < n; ++i) at(i)[c] = columns(i, from + c) - (start[c] + slope[c] * static_cast<double>(i));
-  }
+  const Eigen::Array<double, columns, 1> start = at(0), slope = (at(n - 1) - start) / static_cast<double>(n - 1);
+  for (Index i = 0; i < n; ++i) at(i) -= start + slope * static_cast<double>(i);
   at(n - 1).setZero();
+  Eigen::Array<double, columns, Eigen::Dynamic> before(columns, pad), after(columns, pad);
   for (Index i = 1; i <= pad; ++i) {
-    at(-i) = -at(i);
-    at(n - 1 + i) = -at(n - 1 - i);
+    before.col(pad - i) = -at(i);
+    after.col(i - 1) = -at(n - 1 - i);
   }
-  pass(work.begin(), work.end());
-  pass(work.rbegin(), work.rend());
-  for (Index c = 0; c < lanes; ++c) {
-    for (Index i = 0; i < n; ++i) result(i, from + c) = at(i)[c] + (start[c] + slope[c] * static_cast<double>(i));
-  }
+  const auto forward = [&]<int sections>(const Section* section) {
+    pass_over<columns, sections>(
+        section, {{before.data(), pad, columns}, {side_by_side, n, columns}, {after.data(), pad, columns}});
+  };
+  const auto backward = [&]<int sections>(const Section* section) {
+    pass_over<columns, sections>(section, {{after.data() + (pad - 1) * columns, pad, -columns},
+                                           {side_by_side + (n - 1) * columns, n, -columns},
+                                           {before.data() + (pad - 1) * columns, pad, -columns}});
+  };
+  const auto all = [&](const auto& over) {
+    std::size_t s = 0;
+    for (; s + 2 <= sections_.size(); s += 2) over.template operator()<2>(&sections_[s]);
+    if (s < sections_.size()) over.template operator()<1>(&sections_[s]);
+  };
+  all(forward);
+  all(backward);
+  for (Index i = 0; i < n; ++i) at(i) += start + slope * static_cast<double>(i);
+}
+
+void ZeroPhaseFilter::apply_in_place(MatrixXd& side_by_side) const {
+  if (sections_.empty() || side_by_side.cols() < 3) return;
+  apply_to<lanes>(side_by_side.data(), side_by_side.cols());
 }
 
 MatrixXd ZeroPhaseFilter::apply(const Eigen::Ref<const MatrixXd>& columns) const {
   if (sections_.empty() || columns.rows() < 3) return columns;
   MatrixXd result(columns.rows(), columns.cols());
-  Index from = 0;
-  const auto take = [&]<Index lanes>() {
-    for (; from + lanes <= columns.cols(); from += lanes) apply_to<lanes>(columns, from, result);
+  const Index n = columns.rows();
+  std::vector<double> work;
+  const auto take = [&]<int wide>(Index from, Index count) {
+    work.assign(static_cast<std::size_t>(n * wide), 0.0);
+    for (Index c = 0; c < count; ++c) {
+      for (Index i = 0; i < n; ++i) work[static_cast<std::size_t>(i * wide + c)] = columns(i, from + c);
+    }
+    apply_to<wide>(work.data(), n);
+    for (Index c = 0; c < count; ++c) {
+      for (Index i = 0; i < n; ++i) result(i, from + c) = work[static_cast<std::size_t>(i * wide + c)];
+    }
   };
-  take.operator()<8>();
-  take.operator()<4>();
-  take.operator()<2>();
-  take.operator()<1>();
+  for (Index from = 0; from < columns.cols(); from += lanes) {
+    const Index count = std::min(lanes, columns.cols() - from);
+    if (count > 4)
+      take.operator()<8>(from, count);
+    else if (count > 2)
+      take.operator()<4>(from, count);
+    else
+      take.operator()<2>(from, count);
+  }
   return result;
 }
 

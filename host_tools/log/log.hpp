@@ -69,6 +69,9 @@ class ZeroPhaseFilter {
   /// A cut-off at or above 0.95 of the Nyquist frequency, or <= 0, makes it the identity.
   ZeroPhaseFilter(double cutoff_hz, double step_s, int order = 4);
   Eigen::MatrixXd apply(const Eigen::Ref<const Eigen::MatrixXd>& columns) const;
+  /// The same of `lanes` columns that stand side by side: lanes x samples.
+  static constexpr Eigen::Index lanes = 8;
+  void apply_in_place(Eigen::MatrixXd& side_by_side) const;
   /// Samples at either end that the transient of the filter can reach.
   Eigen::Index edge_samples() const;
   double cutoff_hz() const { return cutoff_hz_; }
@@ -77,8 +80,8 @@ class ZeroPhaseFilter {
   struct Section {
     double b0, b1, b2, a1, a2;
   };
-  template <Eigen::Index lanes>
-  void apply_to(const Eigen::Ref<const Eigen::MatrixXd>& columns, Eigen::Index from, Eigen::MatrixXd& result) const;
+  template <int columns>
+  void apply_to(double* side_by_side, Eigen::Index samples) const;
 
   double cutoff_hz_;
   double step_s_;

@@ -41,7 +41,8 @@ Names known_effects() {
 const Names signal_names{"t", "q", "dq", "ddq", "tau", "qlink", "temp"};
 const Names role_names{"baseline", "train", "validate", "test"};
 const Names method_names{"ls", "wls", "irls", "rls"};
-const Names input_names{"physical", "state"};
+const Names input_names{"physical", "extended", "state"}, feature_names{"random", "sparse"};
+const Names activation_names{"tanh", "sigmoid", "relu"};
 const Names board_names{"host",      "mps2-an385", "mps2-an386",    "mps2-an500", "mps2-an505",
                         "zynqmp_r5", "microbit",   "netduinoplus2", "stm32g474"};
 
@@ -69,6 +70,11 @@ class ProjectReader {
     if (auto table = root.table("train")) read_train(*table);
     if (auto table = root.table("excite")) read_excite(*table);
     if (auto table = root.table("target")) read_target(*table);
+    if (auto table = root.table("compare")) {
+      set(project_.compare.enabled, table->find("enabled"), as_boolean);
+      set(project_.compare.paper, table->find("paper"), as_boolean);
+      table->finish();
+    }
     const auto logs = root.find("log");
     root.finish();
     if (logs) {
@@ -215,7 +221,10 @@ class ProjectReader {
     set(train.windows, table.find("windows"), between(1, 100));
     set(train.nodes, table.find("nodes"), between(1, 300));
     set(train.enhancement, table.find("enhancement"), as_count);
-    set(train.activation, table.find("activation"), as_string);
+    set(train.activation, table.find("activation"),
+        [](const Value& v) { return v.name(activation_names, "activation"); });
+    set(train.features, table.find("features"), [](const Value& v) { return v.name(feature_names, "features"); });
+    set(train.wavenumber, table.find("wavenumber"), as_positive);
     set(train.ridge, table.find("ridge"), as_positive);
     if (auto pso = table.table("pso")) train.pso = read_pso(*pso);
     table.finish();
@@ -226,6 +235,10 @@ class ProjectReader {
     set(pso.particles, table.find("particles"), between(2, 1000));
     set(pso.iterations, table.find("iterations"), between(1, 10000));
     set(pso.stall, table.find("stall"), between(1, 10000));
+    if (const auto list = table.find("activations")) {
+      for (const Value& item : list->items()) pso.activations.push_back(item.name(activation_names, "activation"));
+      if (pso.activations.empty()) list->place().fail("expected one activation at least");
+    }
     if (auto bounds = table.table("bounds")) {
       const auto read = [&](std::array<double, 2>& to, const char* key, double least, double most) {
         const auto value = bounds->find(key);
@@ -334,6 +347,14 @@ class ProjectReader {
     project_.logs.push_back(entry);
   }
 
+  /// Another name for the same data would let it judge what it has fitted.
+  static bool is_copy(const LogEntry& a, const LogEntry& b) {
+    if (a.scenario || b.scenario || a.file == b.file) return false;
+    std::error_code missing;  // complained of where the log is read
+    const auto size = fs::file_size(a.file, missing);
+    return !missing && size == fs::file_size(b.file, missing) && !missing && read_file(a.file) == read_file(b.file);
+  }
+
   void check_logs() const {
     const auto source = [](const LogEntry& e) {
       return e.scenario ? e.scenario->string() + "/" + e.scenario_log : fs::weakly_canonical(e.file).string();
@@ -342,13 +363,13 @@ class ProjectReader {
     for (std::size_t i = 0; i < project_.logs.size(); ++i) {
       for (std::size_t j = 0; j < i; ++j) {
         const LogEntry &a = project_.logs[j], &b = project_.logs[i];
-        if (source(a) != source(b)) continue;
+        const bool copy = is_copy(a, b);
+        if (source(a) != source(b) && !copy) continue;
         const double from = std::max(a.from_s.value_or(-infinity), b.from_s.value_or(-infinity));
         const double to = std::min(a.to_s.value_or(infinity), b.to_s.value_or(infinity));
         if (from < to) {
-          throw InputError(
-              fmt::format("{}:{}: overlaps the log in line {} (same file); separate them by from_s and to_s", file_,
-                          b.line, a.line));
+          throw InputError(fmt::format("{}:{}: overlaps the log in line {} ({}); separate them by from_s and to_s", file_,
+                                       b.line, a.line, copy ? "the same content under another name" : "same file"));
         }
       }
     }

@@ -45,6 +45,7 @@ struct DiagnoseSettings {
 /// Search of the BLS's hyperparameters by a particle swarm (host_tools/train/swarm.hpp).
 struct PsoSettings {
   int particles = 30, iterations = 40, stall = 10;
+  std::vector<std::string> activations{};  ///< to choose from; empty: that of [train]
   /// Lowest and highest; nodes: of all windows.
   std::array<double, 2> windows{1, 4}, nodes{4, 40}, ridge{1e-4, 1e-1};
 };
@@ -52,11 +53,19 @@ struct PsoSettings {
 struct TrainSettings {
   bool enabled = true;
   std::uint64_t seed = 1;
-  std::string inputs = "physical";  ///< physical | state
+  std::string inputs = "physical";  ///< physical | extended | state
+  std::string features = "random";  ///< random | sparse
   std::optional<int> windows, nodes, enhancement;
-  std::string activation = "tanh";
+  std::string activation = "tanh";   ///< tanh | sigmoid | relu
+  std::optional<double> wavenumber;  ///< of sin(n q), cos(n q) [rad^-1 | m^-1]
   std::optional<double> ridge;
   std::optional<PsoSettings> pso;  ///< none: a small grid
+};
+
+/// What `fxdyn run` does beside the model.
+struct CompareSettings {
+  bool enabled = false;  ///< compare every method, too
+  bool paper = false;    ///< the report sets the paper's Table 2 beside ours
 };
 
 struct TargetSettings {
@@ -96,6 +105,7 @@ struct Project {
   DiagnoseSettings diagnose;
   TrainSettings train;
   ExciteSettings excite;
+  CompareSettings compare;
   TargetSettings target;
   bool has_role(Role role) const;
 };

@@ -1,6 +1,7 @@
 #include "host_tools/model/evaluator.hpp"
 
 #include "host_tools/error.hpp"
+#include "host_tools/model/broad_learning_types.hpp"
 #include "host_tools/model/effects.hpp"
 
 #include <fmt/format.h>
@@ -15,6 +16,10 @@ template <class N, class T>
 T number(Kind kind, double value) {
   return N::template load<T>(FromSi<N>::word(kind, value));
 }
+
+/// What a node's raw coefficient is multiplied by, as the activation's one need not be 2^15.
+template <class Activation>
+inline constexpr double coefficient_scale = 32768.0 / Activation::one;
 
 }  // namespace
 
@@ -45,11 +50,23 @@ std::vector<const EffectFit*> in_order(const JointFit& joint, bool of_total) {
   return order;
 }
 
-int node_coefficient_bits(const BroadLearningFit& fit) {
-  const double most = fit.coefficients.tail(fit.nodes()).cwiseAbs().maxCoeff() * 32768 / raw::activation_one;
+namespace {
+
+int node_bits_for(const JointFit& joint, double room) {
+  if (!joint.bls) return 0;
+  double most = room * joint.bls->coefficients.tail(joint.bls->nodes()).cwiseAbs().maxCoeff();
+  with_bls_types(*joint.bls, [&]<class, class Activation>() { most *= coefficient_scale<Activation>; });
   int bits = 24;  // enough for coefficients that are next to nothing
   while (std::ldexp(most, bits) > 32767) --bits;
   return bits;
+}
+
+}  // namespace
+
+int most_node_bits(const JointFit& joint) { return node_bits_for(joint, 1); }
+
+int node_bits(const IdentifiedModel& model, std::size_t joint) {
+  return model.layout ? model.layout->node_bits[joint] : node_bits_for(model.joints[joint], room_for_updates);
 }
 
 std::size_t stored_nodes(const BroadLearningFit& fit) { return static_cast<std::size_t>(fit.nodes() + 1) / 2 * 2; }
@@ -110,7 +127,10 @@ Evaluator<N>::Evaluator(const IdentifiedModel& model, double tick_s) {
   steps_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     for (const EffectFit* fit : in_order(model.joints[i])) add_effect(i, *fit, tick_s);
-    if (model.joints[i].bls) add_bls(i, *model.joints[i].bls, tick_s);
+    if (const auto& bls = model.joints[i].bls)
+      with_bls_types(*bls, [&]<class Inputs, class Activation>() {
+        add_bls<Inputs, Activation>(i, *bls, node_bits(model, i), tick_s);
+      ; });
     for (const EffectFit* fit : in_order(model.joints[i], true)) add_effect(i, *fit, tick_s);
   }
   limited_.resize(n);
@@ -162,17 +182,17 @@ void Evaluator<N>::add_effect(std::size_t joint, const EffectFit& fit, double ti
 }
 
 template <class N>
-void Evaluator<N>::add_bls(std::size_t joint, const BroadLearningFit& fit, double tick_s) {
-  constexpr auto inputs = static_cast<Eigen::Index>(BroadLearningLayout::inputs);
-  auto step = std::make_unique<BroadLearningStep>();
+template <class Inputs, class Activation>
+void Evaluator<N>::add_bls(std::size_t joint, const BroadLearningFit& fit, int bits, double tick_s) {
+  constexpr auto inputs = static_cast<Eigen::Index>(Inputs::size);
+  constexpr double scale = coefficient_scale<Activation>;
+  auto step = std::make_unique<BroadLearningStep<Inputs, Activation>>();
   step->nodes = stored_nodes(fit);
-  step->bits = node_coefficient_bits(fit);
+  step->bits = bits;
   step->scratch.resize(step->nodes);
   auto& words = step->words;
-  words.push_back(word(Kind::number, Quantity::inverse_velocity, 1 / fit.reference_velocity));
-  words.push_back(word(Kind::number, Quantity::unit, 1 / fit.span));
-  for (const double distance : fit.distances)
-    words.push_back(word(Kind::number, Quantity::inverse_path, tick_s / distance));
+  const auto stored = Inputs::stored(fit, tick_s);
+  for (std::size_t i = 0; i < stored.size(); ++i) words.push_back(word(Kind::number, Inputs::shape[i], stored[i]));
   const auto weight = [&](Eigen::Index k, Eigen::Index i) {
     return word(Kind::number, Quantity::weight, k < fit.nodes() ? fit.weights(k, i) : 0);
   };
@@ -182,7 +202,7 @@ void Evaluator<N>::add_bls(std::size_t joint, const BroadLearningFit& fit, doubl
     auto bias = word(Kind::bias, Quantity::weight, k < fit.nodes() ? fit.weights(k, inputs) : 0);
     if constexpr (N::packed) {
       // dense() rounds down: half a unit of its result makes that the nearest
-      bias += 1 << (N::weight_bits() + small_bits - raw::tanh_argument_bits - 1);
+      bias += 1 << (N::weight_bits() + small_bits - Activation::argument_bits - 1);
       words.push_back(bias);
       for (Eigen::Index i = 0; i < inputs; i += 2) words.push_back(raw::pack(weight(k, i), weight(k, i + 1)));
     } else {
@@ -193,10 +213,10 @@ void Evaluator<N>::add_bls(std::size_t joint, const BroadLearningFit& fit, doubl
   for (Eigen::Index i = 0; i < inputs; ++i)
     words.push_back(word(Kind::coefficient, Quantity::feature, fit.coefficients[i]));
   if constexpr (N::packed) {
-    const auto raw_output = [&](Eigen::Index k) { return to_raw(output(k) * 32768 / raw::activation_one, step->bits); };
+    const auto raw_output = [&](Eigen::Index k) { return to_raw(output(k) * scale, step->bits); };
     for (Eigen::Index k = 0; k < nodes; k += 2) words.push_back(raw::pack(raw_output(k), raw_output(k + 1)));
   } else {
-    for (Eigen::Index k = 0; k < nodes; ++k) words.push_back(FromSi<N>::node_coefficient(output(k), step->bits));
+    for (Eigen::Index k = 0; k < nodes; ++k) words.push_back(FromSi<N>::node_coefficient(output(k), step->bits, scale));
   }
   steps_[joint].push_back(std::move(step));
 }

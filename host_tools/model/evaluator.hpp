@@ -17,7 +17,7 @@ struct FromSi;
 template <>
 struct FromSi<Real> {
   static double word(Kind, double value) { return value; }
-  static double node_coefficient(double value, int) { return value; }
+  static double node_coefficient(double value, int, double) { return value; }
 };
 template <>
 struct FromSi<BoundedNumbers> {
@@ -29,9 +29,8 @@ struct FromSi<BoundedNumbers> {
     if (current_bounding.formats == nullptr) return {value, value, 0};
     return with_error(value, bits_of(*current_bounding.formats, kind));
   }
-  static Bound node_coefficient(double value, int bits) {
+  static Bound node_coefficient(double value, int bits, double scale) {
     if (current_bounding.formats == nullptr) return {value, value, 0};
-    const double scale = 32768.0 / raw::activation_one;
     return {value, value, std::fabs(from_raw(to_raw(value * scale, bits), bits) / scale - value)};
   }
 };
@@ -40,9 +39,13 @@ struct FromSi<RunTimeNumbers> {
   static std::int32_t word(Kind kind, double value) { return to_raw(value, bits_of(*current_formats, kind)); }
 };
 
-/// Fractional bits of a joint's int16 node coefficients (those of BroadLearning<nodes, bits>): the largest that hold
-/// them all.
-int node_coefficient_bits(const BroadLearningFit& fit);
+/// An update may make coefficients this many times as large before they leave their formats.
+inline constexpr double room_for_updates = 2;
+
+/// Fractional bits of a joint's int16 node coefficients (those of BroadLearning<nodes, bits>): the most that hold them
+/// all, and those of the tables: of the model's layout where it has one, else with room for updates. 0: no BLS.
+int most_node_bits(const JointFit& joint);
+int node_bits(const IdentifiedModel& model, std::size_t joint);
 /// Nodes in the tables: an even number.
 std::size_t stored_nodes(const BroadLearningFit& fit);
 
@@ -133,13 +136,15 @@ class Evaluator {
     void mark() override { kept = state; }
     void rewind() override { state = kept; }
   };
+  template <class Inputs, class Activation>
   struct BroadLearningStep final : Step {
     std::size_t nodes = 0;
     int bits = 0;
-    BroadLearningState<N> state{}, kept{};
+    typename Inputs::template State<N> state{}, kept{};
     std::vector<typename N::NodeArgument> scratch;
     typename N::TorqueSum torque(JointInput<N>& u, typename N::TorqueSum, Saturations& saturations) override {
-      return broad_learning_sum<N>(nodes, bits, u, Words<N>{this->words.data()}, state, saturations, scratch);
+      return broad_learning_sum<Inputs, Activation, N>(nodes, bits, u, Words<N>{this->words.data()}, state, saturations,
+                                                       scratch);
     }
     void reset() override { state = {}; }
     void mark() override { kept = state; }
@@ -151,7 +156,8 @@ class Evaluator {
   }
   bool is_output(std::size_t i) const { return (outputs_ >> i & 1U) != 0; }
   void add_effect(std::size_t joint, const EffectFit& fit, double tick_s);
-  void add_bls(std::size_t joint, const BroadLearningFit& fit, double tick_s);
+  template <class Inputs, class Activation>
+  void add_bls(std::size_t joint, const BroadLearningFit& fit, int bits, double tick_s);
 
   Vector3<LinearAcceleration<N>> up_;
   Count<N> ticks_per_second_{};

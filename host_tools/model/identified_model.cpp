@@ -6,9 +6,9 @@
 
 #include "host_tools/error.hpp"
 #include "host_tools/files.hpp"
+#include "host_tools/model/broad_learning_types.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/version.hpp"
-#include "model/broad_learning.hpp"
 
 namespace fxdyn {
 namespace {
@@ -127,8 +127,65 @@ Formats to_formats(const json& j) {
   return formats;
 }
 
+json logs_json(const std::vector<LogReference>& logs) {
+  json out = json::array();
+  for (const LogReference& log : logs) {
+    out.push_back(
+        {{"file", log.file}, {"role", log.role}, {"from_s", log.from_s}, {"to_s", log.to_s}, {"hash", log.hash}});
+  }
+  return out;
+}
+
+std::vector<LogReference> to_logs(const json& list) {
+  std::vector<LogReference> out;
+  for (const json& log : list)
+    out.push_back({log.at("file"), log.at("role"), log.at("hash"), log.at("from_s"), log.at("to_s")});
+  return out;
+}
+
 json quantity_json(double value, double std, std::string_view unit) {
   return {{"value", value}, {"std", std}, {"unit", unit}};
+}
+
+/// Calls visit(name, value) for the scales that the fit's inputs read.
+template <class Fit, class Visit>
+void for_each_scale(Fit& fit, Visit&& visit) {
+  const bool state = fit.inputs == StateInputs::name, extended = fit.inputs == ExtendedInputs::name;
+  visit("reference_velocity", fit.reference_velocity);
+  visit("span", fit.span);
+  if (!state) visit("distances", fit.distances);
+  if (extended) {
+    visit("torque", fit.torque);
+    visit("wavenumber", fit.wavenumber);
+  }
+  if (state) {
+    visit("velocity", fit.velocity);
+    visit("middle", fit.middle);
+    visit("half_range", fit.half_range);
+  }
+  if (state || extended) visit("acceleration", fit.acceleration);
+}
+
+BroadLearningFit to_bls(const json& j) {
+  BroadLearningFit fit;
+  // Before there was a choice the files did not say.
+  fit.inputs = j.value("inputs", fit.inputs);
+  fit.activation = j.value("activation", fit.activation);
+  const Eigen::Index inputs = bls_inputs(fit);
+  for_each_scale(fit, [&](const char* name, auto& value) { j.at(name).get_to(value); });
+  fit.ridge = j.at("ridge");
+  fit.weights.resize(static_cast<Eigen::Index>(j.at("weights").size()), inputs + 1);
+  for (Eigen::Index k = 0; k < fit.weights.rows(); ++k) {
+    const Eigen::VectorXd row = to_vector(j.at("weights").at(static_cast<std::size_t>(k)));
+    if (row.size() != inputs + 1)
+      throw InputError(fmt::format("a BLS with {} weights a node, expected {}", row.size(), inputs + 1));
+    fit.weights.row(k) = row.transpose();
+  }
+  fit.coefficients = to_vector(j.at("coefficients"));
+  if (fit.coefficients.size() != fit.coefficient_count())
+    throw InputError(
+        fmt::format("a BLS with {} coefficients, expected {}", fit.coefficients.size(), fit.coefficient_count()));
+  return fit;
 }
 
 json joint_json(const Robot& robot, std::size_t index, const JointFit& fit) {
@@ -150,14 +207,14 @@ json joint_json(const Robot& robot, std::size_t index, const JointFit& fit) {
               {"effects", effects}};
   if (fit.flexible) out["flexible"] = flexible_json(*fit.flexible, robot);
   if (fit.bls) {
-    out["bls"] = {{"inputs", "physical"},
-                  {"nodes", fit.bls->nodes()},
-                  {"reference_velocity", fit.bls->reference_velocity},
-                  {"span", fit.bls->span},
-                  {"distances", fit.bls->distances},
-                  {"ridge", fit.bls->ridge},
-                  {"weights", matrix_json(fit.bls->weights)},
-                  {"coefficients", vector_json(fit.bls->coefficients)}};
+    json bls = {{"inputs", fit.bls->inputs},
+                {"activation", fit.bls->activation},
+                {"nodes", fit.bls->nodes()},
+                {"ridge", fit.bls->ridge},
+                {"weights", matrix_json(fit.bls->weights)},
+                {"coefficients", vector_json(fit.bls->coefficients)}};
+    for_each_scale(*fit.bls, [&](const char* name, const auto& value) { bls[name] = value; });
+    out["bls"] = bls;
   }
   return out;
 }
@@ -193,20 +250,7 @@ JointFit to_joint(const json& j) {
   fit.tau_limit = limits.at("torque");
   for (const json& effect : j.at("effects")) fit.effects.push_back(to_effect(effect));
   if (j.contains("flexible")) fit.flexible = to_flexible(j.at("flexible"));
-  if (j.contains("bls")) {
-    const json& b = j.at("bls");
-    BroadLearningFit bls;
-    bls.reference_velocity = b.at("reference_velocity");
-    bls.span = b.at("span");
-    bls.distances = b.at("distances").get<std::array<double, 3>>();
-    bls.ridge = b.at("ridge");
-    bls.weights.resize(static_cast<Eigen::Index>(b.at("weights").size()), BroadLearningLayout::inputs + 1);
-    for (Eigen::Index k = 0; k < bls.weights.rows(); ++k) {
-      bls.weights.row(k) = to_vector(b.at("weights").at(static_cast<std::size_t>(k))).transpose();
-    }
-    bls.coefficients = to_vector(b.at("coefficients"));
-    fit.bls = bls;
-  }
+  if (j.contains("bls")) fit.bls = to_bls(j.at("bls"));
   return fit;
 }
 
@@ -263,11 +307,6 @@ json to_json(const IdentifiedModel& model) {
   for (std::size_t i = 0; i < model.joints.size(); ++i) joints.push_back(joint_json(model.robot, i, model.joints[i]));
   json body = json::array();
   for (const EffectFit& fit : model.body) body.push_back(effect_json(fit, {}, false));
-  json logs = json::array();
-  for (const LogReference& log : model.logs) {
-    logs.push_back(
-        {{"file", log.file}, {"role", log.role}, {"from_s", log.from_s}, {"to_s", log.to_s}, {"hash", log.hash}});
-  }
   json log_formats = json::object();
   for (const auto& [file, format] : model.log_formats) {
     log_formats[file] = {{"columns", format.columns}, {"torque_gain", format.torque_gain}};
@@ -294,13 +333,15 @@ json to_json(const IdentifiedModel& model) {
                 {"encoder_step", model.filter.encoder_step},
                 {"position_noise", model.filter.position_noise}}},
               {"log_formats", log_formats},
-              {"logs", logs},
+              {"logs", logs_json(model.logs)},
               {"notes", model.notes}};
   if (model.session) out["session"] = {{"start_s", model.session->start_s}, {"end_s", model.session->end_s}};
   if (model.formats) {
     out["formats"] = formats_json(*model.formats);
     out["tables_crc"] = model.tables_crc;
   }
+  if (model.layout) out["layout"] = {{"parameters", model.layout->parameters}, {"node_bits", model.layout->node_bits}};
+  if (!model.updates.empty()) out["updates"] = logs_json(model.updates);
   return out;
 }
 
@@ -348,9 +389,14 @@ IdentifiedModel read_model(const std::filesystem::path& file) {
       model.formats = to_formats(j.at("formats"));
       model.tables_crc = j.at("tables_crc");
     }
-    for (const json& log : j.at("logs")) {
-      model.logs.push_back({log.at("file"), log.at("role"), log.at("hash"), log.at("from_s"), log.at("to_s")});
+    if (j.contains("layout")) {
+      model.layout = {j.at("layout").at("parameters").get<std::vector<unsigned>>(),
+                      j.at("layout").at("node_bits").get<std::vector<int>>()};
+      if (model.layout->parameters.size() != model.robot.size() || model.layout->node_bits.size() != model.robot.size())
+        throw InputError("robot and layout differ in length");
     }
+    model.logs = to_logs(j.at("logs"));
+    if (j.contains("updates")) model.updates = to_logs(j.at("updates"));
     return model;
   } catch (const json::exception& error) {
     throw InputError(

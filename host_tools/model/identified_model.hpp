@@ -11,6 +11,7 @@
 #include "host_tools/log/log.hpp"
 #include "host_tools/numbers/formats.hpp"
 #include "host_tools/robot/robot.hpp"
+#include "model/broad_learning_inputs.hpp"
 
 namespace fxdyn {
 
@@ -23,14 +24,15 @@ struct EffectFit {
 };
 
 /// The BLS of one joint (model/broad_learning.hpp).
-struct BroadLearningFit {
-  double reference_velocity = 1;                      ///< input 1: asinh(dq / reference) / span [rad/s | m/s]
-  double span = 6;                                    ///< asinh at the largest velocity, at least 1 [-]
-  std::array<double, 3> distances{1e-3, 3e-3, 9e-3};  ///< Dahl widths [rad | m]
-  Eigen::MatrixXd weights;                            ///< nodes x 5: input weights, bias [-]
-  Eigen::VectorXd coefficients;                       ///< 4 inputs, then nodes [N*m | N]
+struct BroadLearningFit : BroadLearningScales {
+  std::string inputs = "physical";  ///< names of types there: physical, extended, state
+  std::string activation = "tanh";  ///< tanh, relu
+  Eigen::MatrixXd weights;          ///< nodes x (inputs + 1): input weights, bias [-]
+  Eigen::VectorXd coefficients;     ///< of inputs, then nodes [N*m | N]
   double ridge = 0;
   Eigen::Index nodes() const { return weights.rows(); }
+  Eigen::Index input_count() const { return weights.cols() - 1; }
+  Eigen::Index coefficient_count() const { return input_count() + nodes(); }
 };
 
 /// One joint's gear, by a second encoder on its link (host_tools/identify/flexible.hpp). Prismatic joints: N/m, N*s/m,
@@ -82,6 +84,13 @@ struct LogReference {
   double from_s = 0, to_s = 0;
 };
 
+/// What the layout of exported tables takes from the values in them, beside the formats: it stays when an update
+/// replaces the values, so that firmware that is built for the layout takes the new ones.
+struct TableLayout {
+  std::vector<unsigned> parameters;  ///< per link, bit k: inertial parameter k is computed, else it is zero
+  std::vector<int> node_bits;        ///< per joint: fractional bits of the BLS's node coefficients; 0 without one
+};
+
 /// When the robot ran, by the logs' own time stamps: what drifts has done so since the start.
 struct Session {
   double start_s = 0, end_s = 0;
@@ -101,12 +110,20 @@ struct IdentifiedModel {
   std::uint64_t seed = 1;
   std::string project, project_hash;
   std::vector<LogReference> logs;
-  std::vector<std::string> notes;    ///< what a reader should know of data and fit
-  std::string stage = "identified";  ///< or "diagnosed", "trained"
-  std::optional<Session> session;    ///< of the diagnosed logs, where their windows do not overlap
+  std::vector<std::string> notes;     ///< what a reader should know of data and fit
+  std::string stage = "identified";   ///< or "diagnosed", "trained"
+  std::optional<Session> session;     ///< of the diagnosed logs, where their windows do not overlap
+  std::vector<LogReference> updates;  ///< logs that `fxdyn update` has refitted the coefficients with, in their order
   /// Of the exported tables; a stage that changes the model drops them.
   std::optional<Formats> formats;
+  std::optional<TableLayout> layout;
   std::uint32_t tables_crc = 0;
+
+  void drop_tables() {
+    formats.reset();
+    layout.reset();
+    tables_crc = 0;
+  }
 };
 
 nlohmann::json to_json(const IdentifiedModel& model);

@@ -6,6 +6,7 @@
 
 #include "host_tools/numbers/formats.hpp"
 #include "host_tools/numbers/run_time_fixed.hpp"
+#include "model/broad_learning.hpp"
 #include "model/math.hpp"
 #include "model/numbers.hpp"
 
@@ -192,12 +193,13 @@ struct BoundedNumbers {
     if (current_bounding.formats != nullptr) value.error += std::ldexp(1.0, -small_bits);  // rounding and +1 itself
     return {value.cut(-1, 1)};
   }
+  template <class Activation>
   static Of<Quantity::activation> activation(BoundedWide x) {
-    Bound out{std::tanh(x.value.low), std::tanh(x.value.high), 0};
+    Bound out{Activation::of(x.value.low), Activation::of(x.value.high), 0};  // activations never fall
     if (current_bounding.formats != nullptr) {
-      // half a unit of the table's argument, the stated error of tanh_line()
-      out.error =
-          steepest_tanh(x.value) * (x.value.error + std::ldexp(0.5, -raw::tanh_argument_bits)) + raw::tanh_line_error;
+      // half a unit of the kernel's argument, the kernel's stated error
+      out.error = steepest<Activation>(x.value) * (x.value.error + std::ldexp(0.5, -Activation::argument_bits)) +
+                  Activation::kernel_error;
     }
     return {out};
   }
@@ -248,10 +250,11 @@ struct BoundedNumbers {
     if (!forgets && current_bounding.creeps) out.error = std::fmax(kept, from_target) + own * creeping_ticks;
     return {out};
   }
-  static double steepest_tanh(Bound x) {
+  /// Largest slope of a curve that is steepest at zero.
+  template <class Curve>
+  static double steepest(Bound x) {
     const double nearest = x.low <= 0 && x.high >= 0 ? 0 : std::fmin(std::fabs(x.low), std::fabs(x.high));
-    const double t = std::tanh(std::fmax(0.0, nearest - x.error));
-    return 1 - t * t;
+    return Curve::steepest(std::fmax(0.0, nearest - x.error));
   }
 
  private:
@@ -312,7 +315,7 @@ inline SineCosine<BoundedNumbers::Of<Quantity::unit>> sin_cos_turns(BoundedWide 
 }
 inline BoundedNumbers::Of<Quantity::unit> tanh_of(BoundedNumbers::Of<Quantity::argument> x) {
   Bound out{std::tanh(x.value.low), std::tanh(x.value.high), 0};
-  if (detail::rounding()) out.error = BoundedNumbers::steepest_tanh(x.value) * x.value.error + 1.5e-6;
+  if (detail::rounding()) out.error = BoundedNumbers::steepest<TanhNodes>(x.value) * x.value.error + 1.5e-6;
   return {out};
 }
 inline BoundedNumbers::Of<Quantity::unit> exp_negative(BoundedNumbers::Of<Quantity::argument> x) {

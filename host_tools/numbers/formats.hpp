@@ -15,6 +15,7 @@ struct Formats {
 
   int operator[](Quantity q) const { return quantity[static_cast<std::size_t>(q)]; }
   int& operator[](Quantity q) { return quantity[static_cast<std::size_t>(q)]; }
+  friend bool operator==(const Formats&, const Formats&) = default;
 };
 
 /// What a stored number is: a quantity, a coefficient that multiplies one, an inertial parameter, a number of the BLS.

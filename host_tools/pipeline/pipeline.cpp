@@ -16,6 +16,7 @@
 #include "host_tools/report/report.hpp"
 #include "host_tools/robot/write_urdf.hpp"
 #include "host_tools/train/kept_effects.hpp"
+#include "host_tools/train/stored_information.hpp"
 #include "host_tools/train/train.hpp"
 
 namespace fxdyn {
@@ -32,15 +33,6 @@ constexpr double tight_enough = 2;
 /// ... or this many boxes were looked at.
 constexpr int proof_boxes = 40'000;
 constexpr Eigen::Index random_states = 20'000;
-
-const LogFormat& format_of(const IdentifiedModel& model, const fs::path& log) {
-  for (const std::string& name : {log.filename().string(), std::string()}) {
-    if (const auto found = model.log_formats.find(name); found != model.log_formats.end()) return found->second;
-  }
-  throw InputError(fmt::format(
-      "{}: the project's logs have different columns or gains, and this one is none of them; name it like one",
-      log.string()));
-}
 
 std::string weak_note(const std::vector<WeakParameter>& weak, const Robot& robot) {
   if (weak.empty()) return {};
@@ -250,13 +242,9 @@ void Pipeline::diagnose() {
 
 void Pipeline::train() {
   const TrainSettings& settings = project_.train;
-  if (settings.enabled && (settings.inputs != "physical" || settings.activation != "tanh")) {
-    throw InputError(
-        fmt::format("{}: train.inputs = \"{}\" with activation \"{}\" is not built yet; use \"physical\" and \"tanh\"",
-                    project_.file.string(), settings.inputs, settings.activation));
-  }
   check_motion();
-  if (!written({"diagnosed", "trained"})) diagnose();
+  // An updated model is not what diagnosis left.
+  if (const auto before = written({"diagnosed", "trained"}); !before || !before->updates.empty()) diagnose();
   // Always from the files: `fxdyn run` gives the same bytes as the verbs one by one.
   const IdentifiedModel diagnosed = read_model(directory_ / "model.json");
   json stages = json::array();
@@ -275,8 +263,10 @@ void Pipeline::train() {
   weigh(fitter, project_.identify);
   progress_.step();
   const json rigid = rigid_metrics(fitter);
-  // The kept effects follow the rigid body that is fitted beside them.
+  // The kept effects, and the load that a BLS sees, follow the rigid body that is fitted beside them.
   const auto follow = [&](const IdentifiedModel& model) {
+    if (settings.enabled && settings.inputs == ExtendedInputs::name)
+      fitter.set_structural(structural_torque(model, data().logs));
     fitter.set_torque_lead(diagnosed.filter.torque_lead_s, kept.torque(model, data().logs));
     weigh(fitter, project_.identify);
   };
@@ -307,6 +297,7 @@ void Pipeline::train() {
   progress_.step();
   progress_.stage("errors on all logs", 2);
   json trained = stage_metrics(model, "bls");
+  StoredInformation stored = stored_information(fitter);
   progress_.step();
   // A baseline taught the diagnosed model what the train logs alone may not: where validation says so, it stays.
   IdentifiedModel before = diagnosed;
@@ -317,9 +308,13 @@ void Pipeline::train() {
     if (std::find(before.notes.begin(), before.notes.end(), note) == before.notes.end()) before.notes.push_back(note);
     data().notes = before.notes;
     model = std::move(before);
-    model.formats.reset();  // the tables are another model's now
-    model.tables_crc = 0;
+    model.drop_tables();  // they are another model's now
     trained = std::move(unchanged);
+    // What the train logs tell holds around what this model has from a baseline too.
+    fitter.set_designs(kept.design());
+    follow(model);
+    stored = stored_information(fitter);
+    stored.information.recentre(coefficients_of(model, kept.design()));
     for (json& joint : training) joint["kept"] = false;
   }
   model.stage = "trained";
@@ -331,6 +326,7 @@ void Pipeline::train() {
   metrics["training"] = training;
   write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
   write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
+  write_information(stored, read_model(directory_ / "model.json"), directory_);
 }
 
 IdentifiedModel Pipeline::model() {
@@ -341,8 +337,16 @@ IdentifiedModel Pipeline::model() {
 
 void Pipeline::export_tables() {
   IdentifiedModel model = this->model();
-  progress_.stage("proving ranges and errors, writing tables", 4);
+  model.drop_tables();
   const Formats formats = choose_formats(model);
+  write_export(model, formats, directory_);
+  write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
+}
+
+void Pipeline::write_export(IdentifiedModel& model, const Formats& formats, const fs::path& directory) {
+  progress_.stage("proving ranges and errors, writing tables", 4);
+  model.formats = formats;
+  model.layout = layout_of(model, formats);
   const Proof proof = prove(model, &formats);
   progress_.step();
   const Attained attained = attain(model);
@@ -374,20 +378,19 @@ void Pipeline::export_tables() {
     }
   }
   const auto n = model.joints.size();
-  model.tables_crc = write_tables(model, formats, error, proof.error, all_joints(model), directory_);
+  model.tables_crc = write_tables(model, formats, error, proof.error, all_joints(model), directory);
   // Tables of drives that the project no longer asks for would be of another model.
   for (std::size_t j = 0; j < n; ++j) {
     for (const char* name : {"tables.hpp", "tables.bin", "replay.json"})
-      fs::remove(directory_ / fmt::format("joint_{}", j + 1) / name);
+      fs::remove(directory / fmt::format("joint_{}", j + 1) / name);
   }
   json drives = json::array();
   for (const std::size_t j : project_.target.joints) {
-    const fs::path own = directory_ / fmt::format("joint_{}", j + 1);
+    const fs::path own = directory / fmt::format("joint_{}", j + 1);
     fs::create_directories(own);
     const std::uint32_t crc = write_tables(model, formats, error, proof.error, 1U << j, own);
     drives.push_back({{"index", j + 1}, {"tables_crc", crc}, {"table_bytes", fs::file_size(own / "tables.bin")}});
   }
-  model.formats = formats;
   json joints = json::array();
   for (std::size_t j = 0; j < n; ++j) {
     const auto k = static_cast<Eigen::Index>(j);
@@ -415,9 +418,8 @@ void Pipeline::export_tables() {
                          {"joints", joints},
                          {"drives", drives},
                          {"saturations_on_logs", clean.saturations},
-                         {"table_bytes", fs::file_size(directory_ / "tables.bin")}};
-  write_file(directory_ / "export.json", document.dump(1) + "\n");
-  write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
+                         {"table_bytes", fs::file_size(directory / "tables.bin")}};
+  write_file(directory / "export.json", document.dump(1) + "\n");
   progress_.step();
   progress_.done();
 }
@@ -446,6 +448,19 @@ void Pipeline::run() {
   report();
 }
 
+Log read_log_for(const IdentifiedModel& model, const fs::path& file, std::optional<double> from_s,
+                 std::optional<double> to_s, bool torque_required) {
+  std::vector<bool> revolute;
+  for (const Joint& joint : model.robot.joints) revolute.push_back(joint.type == JointType::revolute);
+  for (const std::string& name : {file.filename().string(), std::string()}) {
+    if (const auto found = model.log_formats.find(name); found != model.log_formats.end())
+      return read_log(file, model.robot.size(), revolute, found->second, from_s, to_s, torque_required);
+  }
+  throw InputError(fmt::format(
+      "{}: the project's logs have different columns or gains, and this one is none of them; name it like one",
+      file.string()));
+}
+
 void identify_payload(const fs::path& model_file, const fs::path& log_file, const fs::path& directory) {
   IdentifiedModel model = read_model(model_file);
   std::error_code ignored;
@@ -453,13 +468,10 @@ void identify_payload(const fs::path& model_file, const fs::path& log_file, cons
     throw InputError(
         fmt::format("{}: would be overwritten by the model with load; choose another --out", model_file.string()));
   }
-  std::vector<bool> revolute;
-  for (const Joint& joint : model.robot.joints) revolute.push_back(joint.type == JointType::revolute);
-  const Log log = read_log(log_file, model.robot.size(), revolute, format_of(model, log_file), {}, {});
+  const Log log = read_log_for(model, log_file, {}, {});
   const LoadFit fit = identify_load(model, process(log, model.filter));
   model.body.push_back(fit.effect);
-  model.formats.reset();  // the tables are another model's now
-  model.tables_crc = 0;
+  model.drop_tables();  // they are another model's now
   const json report = load_json(fit, model.robot);
   write_file(directory / "model.json", to_json(model).dump(1) + "\n");
   write_file(directory / "payload.json", report.dump(1) + "\n");
@@ -468,13 +480,11 @@ void identify_payload(const fs::path& model_file, const fs::path& log_file, cons
 void predict_log(const fs::path& model_file, const fs::path& log_file, bool fixed, const fs::path& directory) {
   const IdentifiedModel model = read_model(model_file);
   const Robot& robot = model.robot;
-  std::vector<bool> revolute;
-  for (const Joint& joint : robot.joints) revolute.push_back(joint.type == JointType::revolute);
   // The run's own metrics.json must survive.
   if (fs::exists(directory / "model.json")) {
     throw InputError(fmt::format("{}: holds a model and its metrics; choose another --out", directory.string()));
   }
-  Log log = read_log(log_file, robot.size(), revolute, format_of(model, log_file), {}, {}, false);
+  Log log = read_log_for(model, log_file, {}, {}, false);
   log.role = Role::test;
   const bool resampled = log.resampled;
   const Eigen::VectorXd stamps = std::move(log.stamps);

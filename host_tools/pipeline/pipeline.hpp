@@ -29,8 +29,14 @@ class Pipeline {
   const std::filesystem::path& directory() const { return directory_; }
   /// DIR/model.json, made by the stages up to training if it is missing or out of date.
   IdentifiedModel model();
+  /// DIR/model.json, if training made it from project and logs as they are now; makes nothing.
+  std::optional<IdentifiedModel> trained() { return written({"trained"}); }
   /// Logs of one role with the model's filter.
   std::vector<ProcessedLog> logs(Role role);
+  /// Tables of the model in these formats and export.json; the model says what is in them.
+  void write_export(IdentifiedModel& model, const Formats& formats, const std::filesystem::path& directory);
+  /// Errors of the model on all logs, for metrics.json.
+  nlohmann::json stage_metrics(const IdentifiedModel& model, const std::string& stage);
 
  private:
   GateData& data();
@@ -40,7 +46,6 @@ class Pipeline {
   /// DIR/model.json, if it is current and one of these stages made it.
   std::optional<IdentifiedModel> written(std::initializer_list<std::string_view> stages);
   void check_motion();
-  nlohmann::json stage_metrics(const IdentifiedModel& model, const std::string& stage);
   nlohmann::json rigid_metrics(Fitter fitter);
   /// Of a fit: what metrics.json and DIR hold beside the model.
   nlohmann::json fit_metrics(const Fitter& fitter, const Estimate& estimate, const nlohmann::json& stages);
@@ -52,6 +57,11 @@ class Pipeline {
   std::optional<std::vector<LogReference>> diagnosed_logs_;
   Progress progress_;
 };
+
+/// A log that the project need not name, or a window of it, with the columns and gains that the model knows.
+/// @throws InputError also where the project's logs differ in them
+Log read_log_for(const IdentifiedModel& model, const std::filesystem::path& file, std::optional<double> from_s,
+                 std::optional<double> to_s, bool torque_required = true);
 
 /// `fxdyn predict`: torque of the model over one log.
 void predict_log(const std::filesystem::path& model, const std::filesystem::path& log, bool fixed,

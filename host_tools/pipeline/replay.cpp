@@ -12,6 +12,7 @@ namespace fxdyn {
 namespace {
 
 using nlohmann::json;
+namespace fs = std::filesystem;
 
 struct Replayed {
   Eigen::Index ticks = 0, different_ticks = 0;
@@ -87,15 +88,14 @@ json to_json(const Replayed& replayed, const TickStates& states, const Identifie
 }
 
 /// Where the tables and the replay of these joints are: of all of them, or of a drive with one.
-std::filesystem::path directory_of(const std::filesystem::path& directory, const std::vector<std::size_t>& outputs,
-                                   std::size_t joints) {
+fs::path directory_of(const fs::path& directory, const std::vector<std::size_t>& outputs, std::size_t joints) {
   if (outputs.size() != 1 || joints == 1) return directory;
   return directory / fmt::format("joint_{}", outputs[0] + 1);
 }
 
 }  // namespace
 
-Replay replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index max_ticks) {
+Replay replay(Pipeline& pipeline, const fs::path& image, Eigen::Index max_ticks) {
   const IdentifiedModel model = pipeline.model();
   if (!model.formats) {
     throw InputError(
@@ -111,18 +111,28 @@ Replay replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Ind
   }
   streams.push_back(perturbed(streams.front(), model, 7));
 
-  QemuTarget target(image);
-  const serial::Identity identity = target.hello();
-  if (identity.state != serial::NodeState::ready)
-    throw InputError(fmt::format("{}: the image refuses its tables (CRC or layout)", image.string()));
+  auto target = std::make_unique<QemuTarget>(image);
+  serial::Identity identity = target->hello();
   const std::uint32_t all = all_joints(model);
   FixedModel fixed(model, *model.formats, identity.outputs & all);
+  const fs::path directory = directory_of(pipeline.directory(), fixed.outputs(), model.robot.size());
+  // Tables of an update go into the slot that firmware of the same layout has for them.
+  const bool updated = identity.layout_hash == fixed.layout_hash() && identity.tables_crc != fixed.crc();
+  if (updated) {
+    target.reset();
+    QemuTarget::Options options;
+    options.update_page = directory / "tables.bin";
+    target = std::make_unique<QemuTarget>(image, options);
+    identity = target->hello();
+  }
+  if (identity.state != serial::NodeState::ready)
+    throw InputError(fmt::format("{}: the image refuses its tables (CRC or layout)", image.string()));
   if (identity.joints != model.robot.size() || identity.outputs == 0 || (identity.outputs & ~all) != 0 ||
       identity.layout_hash != fixed.layout_hash() || identity.tables_crc != fixed.crc()) {
     throw InputError(
         fmt::format("{}: holds other tables (layout {:08x}, CRC {:08x}; expected {:08x}, {:08x}); build it from {}",
                     image.string(), identity.layout_hash, identity.tables_crc, fixed.layout_hash(), fixed.crc(),
-                    (directory_of(pipeline.directory(), fixed.outputs(), model.robot.size()) / "tables.hpp").string()));
+                    (directory / "tables.hpp").string()));
   }
   Progress progress;
   progress.stage("replaying on the firmware", streams.size());
@@ -130,19 +140,22 @@ Replay replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Ind
   for (const std::size_t joint : fixed.outputs()) output_joints.push_back(joint + 1);
   bool same = true;
   for (const TickStates& states : streams) {
-    const Replayed replayed = play(target, model, fixed, states, std::min(max_ticks, states.t.size()));
+    const Replayed replayed = play(*target, model, fixed, states, std::min(max_ticks, states.t.size()));
     same = same && replayed.different_ticks == 0;
     logs.push_back(to_json(replayed, states, model, fixed.outputs()));
     progress.step();
   }
   progress.done();
-  json document = {{"schema", "fxdyn.replay/1"}, {"image", image.filename().string()},
-                   {"tables_crc", fixed.crc()},  {"output_joints", output_joints},
-                   {"bit_exact", same},          {"logs", logs}};
-  const std::filesystem::path size_file = image.parent_path() / "size.json";
-  if (std::filesystem::exists(size_file)) document["size"] = json::parse(read_file(size_file));
-  const std::filesystem::path directory = directory_of(pipeline.directory(), fixed.outputs(), model.robot.size());
-  std::filesystem::create_directories(directory);
+  json document = {{"schema", "fxdyn.replay/1"},
+                   {"image", image.filename().string()},
+                   {"tables_crc", fixed.crc()},
+                   {"output_joints", output_joints},
+                   {"tables_in", updated ? "update slot" : "image"},
+                   {"bit_exact", same},
+                   {"logs", logs}};
+  const fs::path size_file = image.parent_path() / "size.json";
+  if (fs::exists(size_file)) document["size"] = json::parse(read_file(size_file));
+  fs::create_directories(directory);
   write_file(directory / "replay.json", document.dump(1) + "\n");
   return {same, directory / "replay.json"};
 }

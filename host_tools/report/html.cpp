@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "host_tools/compare/section.hpp"
 #include "host_tools/diagnose/section.hpp"
 #include "host_tools/files.hpp"
 #include "host_tools/model/evaluator.hpp"
@@ -181,6 +182,7 @@ std::string bls_section(const json& model, const json& metrics) {
                {"change", "n"},
                {"decision"},
                {"nodes", "n"},
+               {"inputs"},
                {"distances"},
                {"ridge", "n"}});
   for (std::size_t j = 0; j < metrics.at("training").size(); ++j) {
@@ -195,10 +197,15 @@ std::string bls_section(const json& model, const json& metrics) {
                           {kept ? "kept" : "not kept", kept ? "good" : ""}};
     if (kept && model.at("joints").at(j).contains("bls")) {
       const json& bls = model.at("joints").at(j).at("bls");
-      const auto d = bls.at("distances").get<std::vector<double>>();
-      row.push_back({fmt::format("{}", bls.at("nodes").get<int>()), "n"});
-      row.push_back(
-          {fmt::format("{:.2g}, {:.2g}, {:.2g} {}", d[0], d[1], d[2], text(joint.at("unit")) == "N" ? "m" : "rad")});
+      row.push_back({fmt::format("{} {}", bls.at("nodes").get<int>(), bls.value("activation", "tanh")), "n"});
+      row.push_back({bls.value("inputs", "physical")});
+      if (bls.contains("distances")) {
+        const auto d = bls.at("distances").get<std::vector<double>>();
+        row.push_back(
+            {fmt::format("{:.2g}, {:.2g}, {:.2g} {}", d[0], d[1], d[2], text(joint.at("unit")) == "N" ? "m" : "rad")});
+      } else {
+        row.push_back({"none"});
+      }
       row.push_back(number(bls.at("ridge"), 2));
     }
     table.add(row);
@@ -206,9 +213,9 @@ std::string bls_section(const json& model, const json& metrics) {
   return out + table.html() +
          paragraph(
              "Held-out RMSE on the gate data (see Data), not on the test logs. It is kept where that falls by at least "
-             "5 % (20 % where blocks of one log judge). Its "
-             "inputs are velocity and three presliding states; the distances are how far the joint moves until they "
-             "follow.");
+             "5 % (20 % where blocks of one log judge). Physical inputs are velocity and three presliding states, the "
+             "distances are how far the joint moves until they follow; extended ones add load, angle and acceleration; "
+             "the state has no memory.");
 }
 
 std::string limits_section(const json& model) {
@@ -354,6 +361,9 @@ void write_report(const IdentifiedModel& fitted, const std::vector<ProcessedLog>
   page += error_section(model, results);
   if (!results.diagnosis.is_null()) page += diagnosis_section(results.diagnosis, directory);
   page += bls_section(model, results.metrics);
+  page += comparison_section(results.compared, directory);
+  page += efficiency_section(results.efficiency);
+  page += vibration_section(results.vibration);
   page += effects_section(model);
   page += base_section(model);
   page += fixed_point_section(model, results.exported);

@@ -33,6 +33,14 @@ json read_diagnosis(const fs::path& directory, const json& model) {
   return read_json(directory / "diagnosis.json");
 }
 
+/// Null where the file is missing or of another project than the model's.
+json read_of_project(const fs::path& file, const json& model) {
+  json content = read_json(file);
+  const bool same =
+      !content.is_null() && !model.is_null() && content.value("project_hash", json()) == model.value("project_hash", json(""));
+  return same ? content : json();
+}
+
 std::string shown_role(const json& logs) {
   for (const char* role : {"test", "validate"}) {
     for (const json& log : logs) {
@@ -60,6 +68,9 @@ Results read_results(const fs::path& directory) {
   results.exported = read_of_tables(directory / "export.json", model);
   results.replayed = read_of_tables(directory / "replay.json", model);
   results.diagnosis = read_diagnosis(directory, model);
+  results.compared = read_of_project(directory / "compare.json", model);
+  results.efficiency = read_of_project(directory / "efficiency.json", model);
+  results.vibration = read_of_project(directory / "vibration.json", model);
   if (!results.metrics.is_null()) results.role = shown_role(results.metrics.at("logs"));
   return results;
 }

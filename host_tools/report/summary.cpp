@@ -37,7 +37,10 @@ std::string replay_line(const json& replayed) {
 }  // namespace
 
 std::string summary_table(const fs::path& directory) {
-  const auto [metrics, exported, replayed, diagnosis, role] = read_results(directory);
+  const Results results = read_results(directory);
+  const json &metrics = results.metrics, &exported = results.exported, &replayed = results.replayed,
+             &diagnosis = results.diagnosis;
+  const std::string& role = results.role;
   const std::string diagnosed = diagnosis.is_null() ? "" : diagnosis_table(diagnosis);
   if (metrics.is_null()) return diagnosed;
   const json& stages = metrics.at("stages");

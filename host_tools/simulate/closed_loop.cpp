@@ -168,6 +168,17 @@ class Plant {
 
 }  // namespace
 
+void SeenMotion::look(const VectorXd& q, const VectorXd& dq) {
+  if (encoder_ <= 0) {
+    q_ = q;
+    dq_ = dq;
+    return;
+  }
+  const VectorXd now = (q / encoder_).array().round() * encoder_;
+  dq_ = q_.size() == 0 ? dq : VectorXd((now - q_) / period_s_);
+  q_ = now;
+}
+
 ClosedLoopRun run_closed_loop(const IdentifiedModel& plant, const Reference& reference,
                               const ClosedLoopSettings& settings) {
   const Index samples = reference.q.rows(), n = reference.q.cols();
@@ -179,10 +190,12 @@ ClosedLoopRun run_closed_loop(const IdentifiedModel& plant, const Reference& ref
   const VectorXd inertia = robot.mass(robot.q()).diagonal();
   const VectorXd kp = w * w * inertia, kd = 2 * settings.damping * w * inertia;
   VectorXd tau(n), before;
+  SeenMotion seen(settings, reference.step_s);
   for (Index k = 0; k < samples; ++k) {
     if (k % settings.hold == 0) {
-      tau = kp.cwiseProduct(reference.q.row(k).transpose() - robot.q()) +
-            kd.cwiseProduct(reference.dq.row(k).transpose() - robot.v());
+      seen.look(robot.q(), robot.v());
+      tau = kp.cwiseProduct(reference.q.row(k).transpose() - seen.q()) +
+            kd.cwiseProduct(reference.dq.row(k).transpose() - seen.dq());
       if (reference.feedforward.size() > 0) tau += reference.feedforward.row(k).transpose();
     }
     run.q.row(k) = robot.q();

@@ -27,6 +27,23 @@ struct ClosedLoopSettings {
   int substeps = 4;  ///< of the plant between two samples of the reference
   int hold = 1;      ///< the controller acts at every hold-th sample of the reference and keeps its torque till then
   double age_s = 0;  ///< how long the robot has run before (Evaluator::warm_up) [s]
+  /// What the controller sees of q is rounded to this, and its dq is what that changed by since it acted last; 0: it
+  /// sees both exactly [rad | m].
+  double encoder_step = 0;
+};
+
+/// What a controller sees of the motors.
+class SeenMotion {
+ public:
+  SeenMotion(const ClosedLoopSettings& settings, double step_s)
+      : encoder_(settings.encoder_step), period_s_(settings.hold * step_s) {}
+  void look(const Eigen::VectorXd& q, const Eigen::VectorXd& dq);
+  const Eigen::VectorXd& q() const { return q_; }
+  const Eigen::VectorXd& dq() const { return dq_; }
+
+ private:
+  double encoder_, period_s_;
+  Eigen::VectorXd q_, dq_;
 };
 
 /// At the reference's samples. dq and ddq are derivatives of q; ddq jumps with the controller's torque, and shows the

@@ -202,6 +202,7 @@ PlantRun closed_loop_on_mujoco(const IdentifiedModel& plant, const Reference& re
   const VectorXd inertia = robot.inertia();
   const VectorXd kp = w * w * inertia, kd = 2 * settings.damping * w * inertia;
   VectorXd tau, before;
+  SeenMotion seen(settings, run.step_s);
   for (Index k = 0; k < samples; ++k) {
     if (k % settings.hold == 0) {
       VectorXd shown = robot.now().q;
@@ -209,8 +210,9 @@ PlantRun closed_loop_on_mujoco(const IdentifiedModel& plant, const Reference& re
         for (int i = 0; i < 30; ++i)
           shown[j] = robot.now().q[j] + eccentric(plant.joints[static_cast<std::size_t>(j)], shown[j]).delta;
       }
-      tau = kp.cwiseProduct(reference.q.row(k).transpose() - shown) +
-            kd.cwiseProduct(reference.dq.row(k).transpose() - robot.now().dq);
+      seen.look(shown, robot.now().dq);
+      tau = kp.cwiseProduct(reference.q.row(k).transpose() - seen.q()) +
+            kd.cwiseProduct(reference.dq.row(k).transpose() - seen.dq());
       if (reference.feedforward.size() > 0) tau += reference.feedforward.row(k).transpose();
       if (k == 0) before = tau;
     }

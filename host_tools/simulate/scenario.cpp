@@ -1,8 +1,11 @@
 #include "host_tools/simulate/scenario.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "host_tools/files.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/simulate/mujoco_plant.hpp"
 #include "host_tools/toml.hpp"
@@ -27,6 +30,42 @@ double share(const Value& value) {
   return number;
 }
 
+/// Indices of the joints that an effect names: one, a list, or "all".
+std::vector<std::size_t> joints_of(const Value& value, const Scenario& scenario) {
+  const std::size_t n = scenario.plant.robot.size();
+  std::vector<std::size_t> joints;
+  const auto add = [&](const Value& item) {
+    const auto joint = static_cast<std::size_t>(item.integer(1));
+    if (joint > n) item.place().fail(fmt::format("the robot has {} joints", n));
+    joints.push_back(joint - 1);
+  };
+  if (value.is_string()) {
+    value.name({"all"}, "choice of joints");
+    for (std::size_t j = 0; j < n; ++j) joints.push_back(j);
+  } else if (value.is_list()) {
+    for (const Value& item : value.items()) add(item);
+  } else {
+    add(value);
+  }
+  return joints;
+}
+
+/// A number within the parameter's bounds.
+double bounded(const Value& value, const ParameterInfo& parameter) {
+  const double number = value.number();
+  if (number < parameter.lower || number > parameter.upper)
+    value.place().fail(fmt::format("expected {} .. {} {}", parameter.lower, parameter.upper, parameter.unit));
+  return number;
+}
+
+/// One number for all of `count` joints, or a list with one for each.
+Value of_joint(const Value& value, std::size_t at, std::size_t count) {
+  if (!value.is_list()) return value;
+  const std::vector<Value> items = value.items();
+  value.expect(items.size(), count, "one a joint of this effect");
+  return items[at];
+}
+
 void read_effect(Table table, Scenario& scenario) {
   toml_input::Names known;
   for (const std::string_view effect : effect_names()) known.emplace_back(effect);
@@ -35,47 +74,49 @@ void read_effect(Table table, Scenario& scenario) {
   fit.effect = name.name(known, "effect");
   fit.named = true;
   const EffectInfo& info = *find_effect(fit.effect);
-  JointFit* target = nullptr;  // an effect on the body has no joint
-  if (info.acts_on == ActsOn::body) {
+  std::vector<std::size_t> joints;
+  const bool on_body = info.acts_on == ActsOn::body;
+  if (on_body) {
     if (const auto joint = table.find("joint"))
       joint->place().fail(fmt::format("{} acts on the robot as a whole: remove joint", fit.effect));
-  }
-  if (info.acts_on != ActsOn::body) {
-    const Value joint_value = table.need("joint", "1 for the first moving joint");
-    const auto joint = static_cast<std::size_t>(joint_value.integer(1));
-    if (joint > scenario.plant.robot.size()) {
-      joint_value.place().fail(fmt::format("the robot has {} joints", scenario.plant.robot.size()));
-    }
-    target = &scenario.plant.joints[joint - 1];
+  } else {
+    const Value value = table.need("joint", "1 for the first moving joint, a list, or \"all\"");
+    joints = joints_of(value, scenario);
     const bool several = fit.effect == Ripple::name || fit.effect == JointCoupling::name;
-    if (!several && target->find(fit.effect) != nullptr)
-      joint_value.place().fail(fmt::format("joint {} has {} already", joint, fit.effect));
+    for (std::size_t at = 0; at < joints.size(); ++at) {
+      const bool twice = std::find(joints.begin(), joints.begin() + static_cast<std::ptrdiff_t>(at), joints[at]) !=
+                         joints.begin() + static_cast<std::ptrdiff_t>(at);
+      if (twice || (!several && scenario.plant.joints[joints[at]].find(fit.effect) != nullptr))
+        value.place().fail(fmt::format("joint {} has {} already", joints[at] + 1, fit.effect));
+    }
   }
   Table parameters(table.need("parameters", "as in { amplitude = 2.0 }"));
-  const auto read = [&](const ParameterInfo& parameter) {
-    const Value value = parameters.need(std::string(parameter.name), fmt::format("in {}", parameter.unit));
-    const double number = value.number();
-    if (number < parameter.lower || number > parameter.upper) {
-      value.place().fail(fmt::format("expected {} .. {} {}", parameter.lower, parameter.upper, parameter.unit));
-    }
-    return number;
+  const auto need = [&](const ParameterInfo& parameter) {
+    return parameters.need(std::string(parameter.name), fmt::format("in {}", parameter.unit));
   };
-  for (const ParameterInfo& parameter : info.shape) fit.shape.push_back(read(parameter));
-  for (const ParameterInfo& parameter : info.linear) fit.linear.push_back(read(parameter));
-  if (fit.effect == "coulomb") {
-    if (const auto width = parameters.find("width")) target->sign_width = width->positive();
-  }
-  if (info.needs_peers) {
-    const Value other = parameters.need("joint", "the other joint");
-    const double n = static_cast<double>(scenario.plant.robot.size());
-    if (fit.shape[0] != std::floor(fit.shape[0]) || fit.shape[0] > n ||
-        target == &scenario.plant.joints[static_cast<std::size_t>(fit.shape[0]) - 1]) {
-      other.place().fail(fmt::format("expected another joint of 1 .. {}", n));
+  const auto width = fit.effect == Coulomb::name ? parameters.find("width") : std::nullopt;
+  const std::size_t count = on_body ? 1 : joints.size();
+  for (std::size_t at = 0; at < count; ++at) {
+    EffectFit one = fit;
+    for (const ParameterInfo& parameter : info.shape)
+      one.shape.push_back(bounded(of_joint(need(parameter), at, count), parameter));
+    for (const ParameterInfo& parameter : info.linear)
+      one.linear.push_back(bounded(of_joint(need(parameter), at, count), parameter));
+    if (on_body) {
+      scenario.plant.body.push_back(one);
+      continue;
     }
+    JointFit& target = scenario.plant.joints[joints[at]];
+    if (width) target.sign_width = of_joint(*width, at, count).positive();
+    if (info.needs_peers) {
+      const double n = static_cast<double>(scenario.plant.robot.size()), other = one.shape[0];
+      if (other != std::floor(other) || other > n || static_cast<std::size_t>(other) == joints[at] + 1)
+        parameters.need("joint", "").place().fail(fmt::format("expected another joint of 1 .. {}", n));
+    }
+    target.effects.push_back(one);
   }
   parameters.finish();
   table.finish();
-  (target != nullptr ? target->effects : scenario.plant.body).push_back(fit);
 }
 
 /// What the plant can't show with this kind of motion.
@@ -86,27 +127,66 @@ void check_plant(const Value& effects, const Scenario& scenario) {
     Table table(value);
     const auto joint = table.find("joint");
     if (!joint) continue;
-    const JointFit& fit = scenario.plant.joints[static_cast<std::size_t>(joint->integer(1)) - 1];
-    const EffectFit& effect = *fit.find(table.need("name", "").string());
-    if (!mujoco && effect.effect == Delay::name && effect.shape[0] > longest) {
-      value.place().fail(
-          fmt::format("this plant's step of {} s leaves room for a delay of {:.4g} s at most; plant = "
-                      "\"mujoco\" takes any",
-                      plant_step(scenario), longest));
+    for (const std::size_t j : joints_of(*joint, scenario)) {
+      const JointFit& fit = scenario.plant.joints[j];
+      const EffectFit& effect = *fit.find(table.need("name", "").string());
+      if (!mujoco && effect.effect == Delay::name && effect.shape[0] > longest) {
+        value.place().fail(
+            fmt::format("this plant's step of {} s leaves room for a delay of {:.4g} s at most; plant = "
+                        "\"mujoco\" takes any",
+                        plant_step(scenario), longest));
+      }
+      if (!mujoco) continue;
+      if (const auto why = mujoco_refuses(fit, effect, scenario.motion == Scenario::Motion::closed_loop))
+        value.place().fail(*why);
     }
-    if (!mujoco) continue;
-    if (const auto why = mujoco_refuses(fit, effect, scenario.motion == Scenario::Motion::closed_loop))
-      value.place().fail(*why);
   }
 }
 
-ScenarioLog read_scenario_log(Table table) {
+/// A trajectory of an excite.json, for this robot.
+void read_plan(const Value& file, const Value& name, const fs::path& directory, const Scenario& scenario,
+               ScenarioLog& log) {
+  const fs::path path = directory / file.string();
+  if (!fs::is_regular_file(path)) file.place().fail(fmt::format("no file {}: make one by fxdyn excite", path.string()));
+  std::string known;
+  try {
+    const auto plan = nlohmann::json::parse(read_file(path));
+    for (const auto& trajectory : plan.at("trajectories")) {
+      known += " " + trajectory.at("name").get<std::string>();
+      if (trajectory.at("name") != name.string()) continue;
+      const auto& series = trajectory.at("series");
+      if (series.size() != scenario.plant.robot.size())
+        file.place().fail(fmt::format("{} is of a robot with {} joints", path.string(), series.size()));
+      log.period_s = trajectory.at("period_s");
+      for (const auto& joint : series) {
+        const auto a = joint.at("a").get<std::vector<double>>(), b = joint.at("b").get<std::vector<double>>();
+        const auto vector = [](const std::vector<double>& v) {
+          return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size())));
+        };
+        if (a.empty() || a.size() != b.size()) file.place().fail(path.string() + ": a and b of a series differ in length");
+        log.series.push_back({joint.at("centre"), vector(a), vector(b)});
+      }
+      return;
+    }
+  } catch (const nlohmann::json::exception&) {
+    file.place().fail(path.string() + " is no excite.json: make one by fxdyn excite");
+  }
+  name.place().fail(fmt::format("'{}' is not in {} (there:{})", name.string(), path.string(), known));
+}
+
+ScenarioLog read_scenario_log(Table table, const fs::path& directory, const Scenario& scenario) {
   ScenarioLog log;
   log.name = table.need("name", "the log's file name without .csv").string();
   log.duration_s = table.need("duration_s", "seconds").positive();
   toml_input::set(log.period_s, table.find("period_s"), toml_input::as_positive);
   toml_input::set(log.speed, table.find("speed"), toml_input::as_positive);
   if (const auto order = table.find("order")) log.order = order->count(3);
+  if (const auto plan = table.find("plan")) {
+    read_plan(*plan, table.need("trajectory", "the name of one in the plan"), directory, scenario, log);
+    for (const char* key : {"period_s", "speed", "order"}) {
+      if (const auto other = table.find(key)) other->place().fail("the plan has it already: remove it");
+    }
+  }
   log.seed = static_cast<std::uint64_t>(table.need("seed", "another one gives another trajectory").integer(0));
   toml_input::set(log.start_s, table.find("start_s"), not_negative);
   if (const auto amplitude = table.find("amplitude")) {
@@ -154,16 +234,8 @@ void read_link_encoders(Table& sensors, Scenario& scenario) {
   }
   const auto which = sensors.find("link_encoders");
   if (!which) return;
-  scenario.link_encoder.assign(n, which->is_string());
-  if (which->is_string()) {
-    which->name({"all"}, "choice of joints");
-    return;
-  }
-  for (const Value& item : which->items()) {
-    const auto joint = static_cast<std::size_t>(item.integer(1));
-    if (joint > n) item.place().fail(fmt::format("the robot has {} joints", n));
-    scenario.link_encoder[joint - 1] = true;
-  }
+  scenario.link_encoder.assign(n, false);
+  for (const std::size_t joint : joints_of(*which, scenario)) scenario.link_encoder[joint] = true;
 }
 
 /// The largest delay that the plant has to remember [s].
@@ -275,7 +347,7 @@ Scenario read_scenario(const fs::path& file) {
   }
   if (!logs) throw InputError(file.string() + ": no log to simulate; add a [[log]] with name, duration_s and seed");
   for (const Value& value : logs->items()) {
-    scenario.logs.push_back(read_scenario_log(Table(value)));
+    scenario.logs.push_back(read_scenario_log(Table(value), file.parent_path(), scenario));
     check_log(value, scenario);
   }
   return scenario;

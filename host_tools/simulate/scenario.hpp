@@ -17,6 +17,8 @@ struct ScenarioLog {
   std::uint64_t seed = 0;
   double start_s = 0;    ///< since the session's start
   double amplitude = 1;  ///< share of the motion's size once it is scaled to the limits
+  /// Of each joint, planned by `fxdyn excite`, with period_s; empty: drawn from the seed.
+  std::vector<FourierJoint> series;
 };
 
 /// A position loop on every joint.

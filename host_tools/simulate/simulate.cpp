@@ -24,7 +24,9 @@ Reference play(const Scenario& scenario, const ScenarioLog& log, double step_s, 
   Reference motion{step_s, Eigen::MatrixXd(samples, cols), Eigen::MatrixXd(samples, cols),
                    Eigen::MatrixXd(samples, cols), Eigen::MatrixXd()};
   for (std::size_t j = 0; j < n; ++j) {
-    FourierJoint joint = random_fourier(log.seed * 1000 + j, log.order, log.period_s, scenario.bounds[j], log.speed);
+    FourierJoint joint = log.series.empty() ? random_fourier(log.seed * 1000 + j, log.order, log.period_s,
+                                                             scenario.bounds[j], log.speed)
+                                            : log.series[j];
     joint.a *= log.amplitude;
     joint.b *= log.amplitude;
     const auto col = static_cast<Eigen::Index>(j);
@@ -117,7 +119,15 @@ std::string scenario_hash(const fs::path& scenario) {
   const toml::table root = toml_input::parse(scenario);
   const auto urdf = root["robot"]["urdf"].value<std::string>();
   const fs::path robot = scenario.parent_path() / urdf.value_or("");
-  return hash_of(read_file(scenario) + (fs::is_regular_file(robot) ? read_file(robot) : ""));
+  std::string all = read_file(scenario) + (fs::is_regular_file(robot) ? read_file(robot) : "");
+  if (const toml::array* logs = root["log"].as_array()) {
+    for (const toml::node& log : *logs) {
+      const toml::table* table = log.as_table();
+      const auto plan = table != nullptr ? (*table)["plan"].value<std::string>() : std::nullopt;
+      if (plan && fs::is_regular_file(scenario.parent_path() / *plan)) all += read_file(scenario.parent_path() / *plan);
+    }
+  }
+  return hash_of(all);
 }
 
 std::vector<fs::path> simulate(const fs::path& scenario_file, const fs::path& directory) {

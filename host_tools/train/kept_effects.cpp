@@ -34,8 +34,8 @@ VectorXd before_total_effects(const JointFit& joint, VectorXd tau, double step_s
 
 }  // namespace
 
-KeptEffects::KeptEffects(IdentifiedModel diagnosed, const std::vector<ProcessedLog>& logs)
-    : diagnosed_(std::move(diagnosed)) {
+KeptEffects::KeptEffects(IdentifiedModel diagnosed, const std::vector<ProcessedLog>& logs, bool keep_drift)
+    : diagnosed_(std::move(diagnosed)), warm_(keep_drift) {
   for (const ProcessedLog& log : logs) warm_ |= age_of(diagnosed_, log) > 0;
   const DhChain chain = to_dh(diagnosed_.robot);
   BaseSet base;

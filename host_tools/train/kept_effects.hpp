@@ -10,7 +10,8 @@ namespace fxdyn {
 class KeptEffects {
  public:
   /// @param logs on which is fitted
-  KeptEffects(IdentifiedModel diagnosed, const std::vector<ProcessedLog>& logs);
+  /// @param keep_drift drift stays as it is, as it does where a log begins warm
+  KeptEffects(IdentifiedModel diagnosed, const std::vector<ProcessedLog>& logs, bool keep_drift = false);
 
   /// What the Fitter fits, without the kept effects.
   const std::vector<JointFit>& design() const { return design_; }

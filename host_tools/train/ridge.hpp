@@ -2,6 +2,8 @@
 
 #include <Eigen/Dense>
 
+#include "host_tools/identify/solver.hpp"
+
 namespace fxdyn {
 
 /// Sums of products over rows: all that least squares of y on the columns of X needs of them.
@@ -19,27 +21,20 @@ struct Moments {
 
 /// Ridge regression on the first columns of X, as many as one likes (paper Eqs. 26-30):
 ///   w_n = argmin 1/N |y - X_n w|^2 + ridge |w|^2 = (X_n^T X_n + N ridge I)^-1 X_n^T y
-/// The Cholesky factor of the leading n columns is the leading block of the factor of all, and so is L^-1 X^T y: nodes
-/// are added without touching what is there (the BLS's incremental learning), and each number of columns costs one
-/// triangular solution. (Chen, Liu 2018 update a pseudo-inverse instead: N rows where this has n.)
+/// Nodes are added without touching what is there (the BLS's incremental learning, see GrowingSolver). Chen, Liu 2018
+/// update a pseudo-inverse instead: N rows where this has n.
 class GrowingRidge {
  public:
   /// @param moments must outlive it
-  GrowingRidge(const Moments& moments, double ridge) : moments_(&moments), ridge_(ridge) {}
-
-  Eigen::Index columns() const { return size_; }
-  /// Takes in the columns up to `columns`; fewer: nothing happens.
-  void grow(Eigen::Index columns);
+  GrowingRidge(const Moments& moments, double ridge) : solver_(moments.gram, moments.projection) {
+    solver_.set_ridge(ridge * moments.rows);
+  }
   /// Weights of the first n columns; grows to n where needed. Columns that are, within rounding, sums of those before
   /// them get zero.
-  Eigen::VectorXd solve(Eigen::Index n);
+  Eigen::VectorXd solve(Eigen::Index n) { return solver_.solve(n); }
 
  private:
-  const Moments* moments_;
-  double ridge_;
-  Eigen::Index size_ = 0;
-  Eigen::MatrixXd factor_;   ///< L, lower
-  Eigen::VectorXd forward_;  ///< L^-1 X^T y
+  GrowingSolver solver_;
 };
 
 }  // namespace fxdyn

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -25,41 +27,55 @@ struct Choice {
   int evaluations = 0;
 };
 
+/// Presliding distances to choose from, as shares of the joint's range; the state alone has none.
+std::vector<double> grid_distances(const TrainSettings& settings) {
+  if (settings.inputs == StateInputs::name) return {1e-3};
+  return {3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2};
+}
+constexpr std::array grid_scales{1.0, 3.0};
+
+std::vector<Eigen::Index> grid_sizes(const TrainSettings& settings) {
+  if (settings.enhancement) return {*settings.enhancement};
+  if (settings.nodes) return {*settings.nodes * settings.windows.value_or(1)};
+  return {10, 20, 40};
+}
+
 /// Of one joint. Its design has no BLS where none is quiet enough.
 Choice by_grid(const Fitter& fitter, std::size_t j, const TrainSettings& settings, Progress& progress) {
   std::vector<double> ridges{1e-5, 1e-4, 1e-3, 1e-2};
   if (settings.ridge) ridges = {*settings.ridge};
-  std::vector<Eigen::Index> sizes{10, 20, 40};
-  if (settings.enhancement)
-    sizes = {*settings.enhancement};
-  else if (settings.nodes)
-    sizes = {*settings.nodes * settings.windows.value_or(1)};
-  const BlsDesigner design_of(fitter, j, settings.seed);
+  const std::vector<Eigen::Index> sizes = grid_sizes(settings);
+  const Eigen::Index most = *std::max_element(sizes.begin(), sizes.end());
+  const BlsDesigner design_of(fitter, j, settings);
   std::vector<Choice> tried;
   std::optional<std::size_t> best;
   std::vector<double> distance_of;
   Choice out;
-  const auto attempt = [&](const BlsShape& shape) {
-    JointFit design = design_of(shape);
-    const std::vector<Judgement> judgements = fitter.held_out_with(j, design, ridges);
-    for (std::size_t i = 0; i < judgements.size(); ++i) {
-      ++out.evaluations;
-      if (!is_quiet(judgements[i], design.rated_torque)) continue;
-      design.bls->ridge = ridges[i];
-      tried.push_back({design, judgements[i]});
-      distance_of.push_back(shape.distance);
-      if (!best || judgements[i].rmse < tried[*best].judgement.rmse) best = tried.size() - 1;
+  const auto attempt = [&](const BlsShape& shape, const std::vector<Eigen::Index>& counts) {
+    const JointFit largest = design_of(shape);
+    const auto judgements = fitter.held_out_with(j, largest, counts, ridges);
+    for (std::size_t s = 0; s < counts.size(); ++s) {
+      JointFit design = first_nodes(largest, counts[s]);
+      for (std::size_t i = 0; i < ridges.size(); ++i) {
+        const Judgement& judgement = judgements[s][i];
+        ++out.evaluations;
+        if (!is_quiet(judgement, design.rated_torque)) continue;
+        design.bls->ridge = ridges[i];
+        tried.push_back({design, judgement});
+        distance_of.push_back(shape.distance);
+        if (!best || judgement.rmse < tried[*best].judgement.rmse) best = tried.size() - 1;
+      }
+      progress.step();
     }
-    progress.step();
   };
+  const Eigen::Index middling = sizes[sizes.size() / 2];
   // The presliding distance matters most: it is chosen with a middling network, the network with that distance.
-  for (const double share : {3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2})
-    attempt({.nodes = sizes[sizes.size() / 2], .distance = share});
+  for (const double share : grid_distances(settings))
+    attempt({.activation = settings.activation, .nodes = middling, .distance = share}, {middling});
   if (!best) return out;
   const double distance = distance_of[*best];
-  for (const double scale : {1.0, 3.0}) {
-    for (const Eigen::Index nodes : sizes) attempt({.nodes = nodes, .scale = scale, .distance = distance});
-  }
+  for (const double scale : grid_scales)
+    attempt({.activation = settings.activation, .nodes = most, .scale = scale, .distance = distance}, sizes);
   // Of those that are nearly as good, the one with the smallest coefficients: it leans least on its training data.
   const int evaluations = out.evaluations;
   for (const Choice& choice : tried) {
@@ -99,23 +115,18 @@ std::vector<Choice> by_swarm(const Fitter& fitter, const TrainSettings& settings
                              const std::optional<ResumeFile>& resume) {
   const std::size_t n = fitter.joints();
   const PsoSettings& pso = *settings.pso;
-  const BlsSpace space(pso);
   std::vector<Swarm> swarms;
-  std::vector<BlsDesigner> designers;
+  std::vector<BlsFitness> fitness;
   for (std::size_t j = 0; j < n; ++j) {
     SwarmSettings swarm;
     swarm.particles = pso.particles;
     swarm.iterations = pso.iterations;
     swarm.stall = pso.stall;
     swarm.seed = settings.seed * 1000 + j;
-    swarms.emplace_back(space.lower(), space.upper(), swarm);
-    designers.emplace_back(fitter, j, settings.seed);
+    fitness.emplace_back(fitter, j, settings);
+    swarms.emplace_back(fitness[j].space().lower(), fitness[j].space().upper(), swarm);
   }
   if (resume) load(*resume, swarms);
-  const auto judge = [&](std::size_t j, const Eigen::VectorXd& x, JointFit& design) {
-    design = designers[j](space(x));
-    return fitter.held_out_with(j, design, {design.bls->ridge})[0];
-  };
   const auto particles = static_cast<std::size_t>(pso.particles);
   for (const Swarm& swarm : swarms) {
     for (int k = 0; k < swarm.generation(); ++k) progress.step();
@@ -130,11 +141,7 @@ std::vector<Choice> by_swarm(const Fitter& fitter, const TrainSettings& settings
     parallel_for(busy.size() * particles, [&](std::size_t i) {
       const std::size_t j = busy[i / particles];
       const auto p = static_cast<Eigen::Index>(i % particles);
-      JointFit design;
-      const Judgement judgement = judge(j, swarms[j].positions().col(p), design);
-      // Sums that fixed point could not hold count as ten times as bad as they are.
-      const double value = fitness(judgement, design);
-      values[j][p] = is_quiet(judgement, design.rated_torque) ? value : 10 * value;
+      values[j][p] = fitness[j](swarms[j].positions().col(p)).value;
     });
     for (const std::size_t j : busy) {
       swarms[j].tell(values[j]);
@@ -144,10 +151,9 @@ std::vector<Choice> by_swarm(const Fitter& fitter, const TrainSettings& settings
   }
   std::vector<Choice> chosen(n);
   parallel_for(n, [&](std::size_t j) {
-    Choice& choice = chosen[j];
-    choice.judgement = judge(j, swarms[j].best(), choice.design);
-    choice.evaluations = swarms[j].generation() * pso.particles;
-    if (!is_quiet(choice.judgement, choice.design.rated_torque)) choice.design.bls.reset();
+    BlsFitness::Outcome best = fitness[j](swarms[j].best());
+    if (!best.quiet) best.design.bls.reset();
+    chosen[j] = {std::move(best.design), std::move(best.judgement), swarms[j].generation() * pso.particles};
   });
   if (resume) std::filesystem::remove(resume->path);
   return chosen;
@@ -158,7 +164,7 @@ std::vector<Choice> by_swarm(const Fitter& fitter, const TrainSettings& settings
 std::vector<TrainOutcome> train(Fitter& fitter, const TrainSettings& settings, Progress& progress,
                                 const std::optional<ResumeFile>& resume) {
   const std::size_t n = fitter.joints();
-  constexpr std::size_t grid_steps = 12;
+  const std::size_t grid_steps = grid_distances(settings).size() + grid_scales.size() * grid_sizes(settings).size();
   const std::size_t steps = settings.pso ? static_cast<std::size_t>(settings.pso->iterations) + 1 : grid_steps;
   progress.stage(settings.pso ? "training the BLS, by particle swarm" : "training the BLS", n * steps);
   const std::vector<Judgement> without = fitter.held_out();

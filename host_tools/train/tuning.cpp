@@ -2,63 +2,113 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
+#include "host_tools/model/broad_learning_types.hpp"
 #include "host_tools/random.hpp"
-#include "model/broad_learning.hpp"
+#include "host_tools/train/sparse_features.hpp"
+#include "model/catalogue.hpp"
 
 namespace fxdyn {
 namespace {
 
 using Eigen::Index;
+using Eigen::MatrixXd;
 
 /// Weights lie on a grid that every format of theirs holds, so that fixed point does not change them.
 constexpr double weight_grid = 512;
 constexpr double finest_to_coarsest = 3;
+/// Of which fixed point holds the reciprocal (ExtendedInputs) [rad/s^2 | m/s^2].
+constexpr double least_acceleration = 1.0 / 15;
 /// The nodes of fixed point are off by up to 4e-5 (model/dense.hpp), and by a tenth of that on the average:
 /// coefficients that add up to more than this many times the rated torque would show.
 constexpr double largest_sum = 20;
 constexpr double node_rounding = 4e-6;
 constexpr double price_of_multiplication = 1e-7;
+/// Sums that fixed point could not hold count as so many times as bad as they are.
+constexpr double price_of_noise = 10;
 
 }  // namespace
 
-BlsDesigner::BlsDesigner(const Fitter& fitter, std::size_t joint, std::uint64_t seed)
-    : nominal_(fitter.design(joint)), seed_(seed * 100 + joint) {
+BlsDesigner::BlsDesigner(const Fitter& fitter, std::size_t joint, const TrainSettings& settings)
+    : fitter_(&fitter),
+      joint_(joint),
+      settings_(settings),
+      nominal_(fitter.design(joint)),
+      seed_(settings.seed * 100 + joint),
+      revolute_(fitter.chain().links[joint].type == JointType::revolute) {
   const auto j = static_cast<Index>(joint);
-  double low = 1e300, high = -1e300;
+  low_ = 1e300;
+  high_ = -1e300;
   for (const ProcessedLog& log : fitter.logs()) {
-    low = std::min(low, log.q.col(j).minCoeff());
-    high = std::max(high, log.q.col(j).maxCoeff());
-    top_speed_ = std::max(top_speed_, log.joint_motion(j).dq.cwiseAbs().maxCoeff());
+    low_ = std::min(low_, log.q.col(j).minCoeff());
+    high_ = std::max(high_, log.q.col(j).maxCoeff());
+    const MotionRows motion = log.joint_motion(j);
+    top_speed_ = std::max(top_speed_, motion.dq.cwiseAbs().maxCoeff());
+    top_acceleration_ = std::max(top_acceleration_, motion.ddq.cwiseAbs().maxCoeff());
   }
-  range_ = high - low;
+}
+
+MatrixXd BlsDesigner::random_weights(Index nodes, Index inputs) const {
+  Random random(seed_);
+  MatrixXd weights(nodes, inputs + 1);
+  for (Index k = 0; k < nodes; ++k) {
+    for (Index i = 0; i <= inputs; ++i) weights(k, i) = random.uniform(-1, 1);
+    weights(k, 0) *= 1.5;  // half of what the velocity's curve spans
+  }
+  return weights;
 }
 
 JointFit BlsDesigner::operator()(const BlsShape& shape) const {
   JointFit design = nominal_;
   BroadLearningFit bls;
+  bls.inputs = settings_.inputs;
   // fixed point's asinh ends at 128
   bls.reference_velocity = std::max(shape.reference_velocity * top_speed_, design.dq_limit / 120);
   bls.span = std::asinh(std::max(top_speed_, design.dq_limit) / bls.reference_velocity);
-  const double distance = shape.distance * range_;
+  const double range = high_ - low_;
+  const double distance = shape.distance * range;
   bls.distances = {distance / shape.spread, distance, distance * shape.spread};
-  Random random(seed_);
-  const auto inputs = static_cast<Index>(BroadLearningLayout::inputs);
-  bls.weights.resize(shape.nodes, inputs + 1);
+  // The joint's limits count as 1; where a model has none, the logs.
+  const bool limited = design.q_lower < design.q_upper && design.q_upper - design.q_lower < unbounded;
+  bls.middle = limited ? (design.q_lower + design.q_upper) / 2 : (low_ + high_) / 2;
+  bls.half_range = (limited ? design.q_upper - design.q_lower : range) / 2;
+  bls.velocity = std::max(top_speed_, design.dq_limit);
+  bls.acceleration = std::max({top_acceleration_, design.ddq_limit, least_acceleration});
+  bls.torque = design.tau_limit > 0 ? design.tau_limit : design.rated_torque;
+  bls.wavenumber = settings_.wavenumber.value_or(revolute_ ? 1 : 2 * std::numbers::pi / range);
+
+  const Index inputs = bls_inputs(bls);
+  bls.weights = settings_.features == "sparse"
+                    ? sparse_weights(fitter_->bls_inputs(joint_, bls), shape.nodes, settings_.windows.value_or(4),
+                                     settings_.nodes.value_or(10), seed_)
+                    : random_weights(shape.nodes, inputs);
+  const bool sigmoid = shape.activation == "sigmoid";
   for (Index k = 0; k < shape.nodes; ++k) {
     const Index window = k % shape.windows;
     const double finer = shape.windows > 1 ? static_cast<double>(window) / static_cast<double>(shape.windows - 1) : 0.0;
-    const double scale = shape.scale * std::pow(finest_to_coarsest, finer);
-    for (Index i = 0; i <= inputs; ++i) bls.weights(k, i) = scale * random.uniform(-1, 1);
-    bls.weights(k, 0) *= 1.5;  // half of what the velocity's curve spans
+    bls.weights.row(k) *= shape.scale * std::pow(finest_to_coarsest, finer) / (sigmoid ? 2 : 1);
   }
   bls.weights = (bls.weights * weight_grid).array().round() / weight_grid;
+  bls.activation = sigmoid ? "tanh" : shape.activation;
+  // The constant half of every sigmoid.
+  if (sigmoid && design.find(Offset::name) == nullptr && design.find(Spring::name) == nullptr) {
+    EffectFit offset;
+    offset.effect = Offset::name;
+    design.effects.push_back(offset);
+  }
   bls.ridge = shape.ridge;
   design.bls = std::move(bls);
   return design;
 }
 
-BlsSpace::BlsSpace(const PsoSettings& settings) {
+JointFit first_nodes(JointFit design, Index nodes) {
+  design.bls->weights = design.bls->weights.topRows(nodes).eval();
+  return design;
+}
+
+BlsSpace::BlsSpace(const PsoSettings& settings, std::string activation) : activations_(settings.activations) {
+  if (activations_.empty()) activations_ = {std::move(activation)};
   const auto log10 = [](double x) { return std::log10(x); };
   lower_.resize(7);
   upper_.resize(7);
@@ -66,6 +116,11 @@ BlsSpace::BlsSpace(const PsoSettings& settings) {
       log10(5e-3);
   upper_ << settings.nodes[1], settings.windows[1], log10(settings.ridge[1]), log10(6), log10(1e-2), log10(6),
       log10(0.1);
+  if (activations_.size() == 1) return;
+  lower_.conservativeResize(8);
+  upper_.conservativeResize(8);
+  lower_[7] = 0;
+  upper_[7] = static_cast<double>(activations_.size());
 }
 
 BlsShape BlsSpace::operator()(const Eigen::VectorXd& x) const {
@@ -78,6 +133,8 @@ BlsShape BlsSpace::operator()(const Eigen::VectorXd& x) const {
   shape.distance = from_log(4);
   shape.spread = from_log(5);
   shape.reference_velocity = from_log(6);
+  const double choice = x.size() > 7 ? x[7] : 0;
+  shape.activation = activations_[std::min(static_cast<std::size_t>(choice), activations_.size() - 1)];
   return shape;
 }
 
@@ -85,12 +142,25 @@ bool is_quiet(const Judgement& judgement, double rated_torque) {
   return judgement.coefficient_sum <= largest_sum * rated_torque;
 }
 
-double fitness(const Judgement& judgement, const JointFit& design) {
-  constexpr auto inputs = static_cast<double>(BroadLearningLayout::inputs);
-  const double nodes = static_cast<double>(design.bls->nodes());
+BlsFitness::BlsFitness(const Fitter& fitter, std::size_t joint, const TrainSettings& settings)
+    : fitter_(&fitter),
+      joint_(joint),
+      space_(settings.pso.value_or(PsoSettings{}), settings.activation),
+      design_of_(fitter, joint, settings) {}
+
+BlsFitness::Outcome BlsFitness::operator()(const Eigen::VectorXd& x) const {
+  Outcome out;
+  out.design = design_of_(space_(x));
+  out.judgement = fitter_->held_out_with(joint_, out.design, {out.design.bls->ridge})[0];
+  const double rated = out.design.rated_torque;
+  const double nodes = static_cast<double>(out.design.bls->nodes());
+  const auto inputs = static_cast<double>(out.design.bls->input_count());
   const double multiplications = nodes * (inputs + 1) + inputs;
-  return (judgement.rmse + node_rounding * judgement.coefficient_sum) / design.rated_torque +
-         price_of_multiplication * multiplications;
+  out.quiet = is_quiet(out.judgement, rated);
+  out.value = (out.judgement.rmse + node_rounding * out.judgement.coefficient_sum) / rated +
+              price_of_multiplication * multiplications;
+  if (!out.quiet) out.value *= price_of_noise;
+  return out;
 }
 
 }  // namespace fxdyn

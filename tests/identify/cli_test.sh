@@ -83,8 +83,8 @@ run 2 "branch" branch.toml
 run 2 "there.toml" there.toml
 project key.toml '[trian]' 'enabled = true'
 run 2 "trian" key.toml
-project state.toml '[train]' 'inputs = "state"' '[[log]]' 'file = "good.csv"' 'role = "train"'
-expect 2 "not built yet" train "$work/state.toml" --out "$work/out"
+project state.toml '[train]' 'inputs = "stat"' '[[log]]' 'file = "good.csv"' 'role = "train"'
+expect 2 "extended" train "$work/state.toml" --out "$work/out"
 project forgetting.toml '[identify]' 'method = "rls"' 'forgetting = 1.5' '[[log]]' 'file = "good.csv"' 'role = "train"'
 run 2 "at most 1" forgetting.toml
 

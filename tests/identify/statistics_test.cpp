@@ -6,6 +6,7 @@
 #include "host_tools/excite/fourier.hpp"
 #include "host_tools/identify/essential.hpp"
 #include "host_tools/identify/identify.hpp"
+#include "host_tools/identify/solver.hpp"
 #include "host_tools/model/evaluator.hpp"
 #include "host_tools/parallel.hpp"
 #include "host_tools/random.hpp"
@@ -173,6 +174,93 @@ TEST(Statistics, RecursiveLeastSquaresEndsAtTheWeightedSolution) {
   const auto distance = [&](Index k) { return (recursion.trace.row(k).transpose() - x).norm(); };
   EXPECT_LT(distance(90), distance(30));
   EXPECT_NEAR(distance(99), 0, 1e-5 * x.norm());
+}
+
+TEST(Statistics, RecursionGoesOnFromWhatOtherLogsTold) {
+  // Log A, then log B from its stored triangle, as if both had been fitted together; a BLS with its ridge on one joint.
+  const IdentifiedModel model = plant();
+  Log a = record(model), b = a;
+  add_noise(a, model, 0.01, 21);
+  b.q = b.q.rowwise().reverse().eval();  // another motion
+  b.dq = b.dq.rowwise().reverse().eval();
+  b.ddq = b.ddq.rowwise().reverse().eval();
+  b.tau = predict(model, b.q, b.dq, b.ddq, b.step_s);
+  add_noise(b, model, 0.01, 22);
+  std::vector<JointFit> design = model.joints;
+  Random random(5);
+  BroadLearningFit bls;
+  bls.reference_velocity = 0.05;
+  bls.weights = Eigen::MatrixXd::NullaryExpr(8, 5, [&] { return random.uniform(-2, 2); });
+  bls.ridge = 1e-3;
+  design[1].bls = bls;
+  const ProcessedLog first = process(a, filter), second = process(b, filter);
+  const std::vector<ProcessedLog> only_a{first}, only_b{second}, together{first, second};
+  Fitter before(model.robot, only_a, design), after(model.robot, only_b, design), both(model.robot, together, design);
+  before.reweight();
+  after.set_weights(before.weights());
+  both.set_weights(before.weights());
+  const auto of = [](const Solution& solution) { return stacked(solution.beta, solution.theta); };
+  const VectorXd batch = of(both.estimate()), alone = of(before.estimate());
+  const SquareRootInformation known = before.information();
+  EXPECT_LT((known.solve() - alone).cwiseAbs().maxCoeff(), 1e-8 * alone.cwiseAbs().maxCoeff());
+  EXPECT_GT((batch - alone).cwiseAbs().maxCoeff(), 1e-4 * batch.cwiseAbs().maxCoeff());  // B does tell something
+
+  const Fitter::Recursion recursion = after.recursive(1, 0, known);
+  EXPECT_LT((of(recursion.solution) - batch).cwiseAbs().maxCoeff(), 1e-8 * batch.cwiseAbs().maxCoeff());
+  // The triangle holds as much as both logs' rows: information, residual and count.
+  const NormalEquations equations = both.normal_equations();
+  EXPECT_LT((recursion.information.information() - equations.information).norm(), 1e-8 * equations.information.norm());
+  EXPECT_NEAR(recursion.information.rows(), both.train_rows(), 1e-6);
+  const Solution fit = both.estimate();
+  const double rest = recursion.information.variance_of_row() * both.train_rows();
+  const double ridge =  // its penalty counts as a residual
+      before.weights()[1] * both.train_rows() / 6 * bls.ridge * fit.theta[1].tail(12).squaredNorm();
+  EXPECT_NEAR(rest, both.weighted_square(fit) + ridge, 1e-6 * rest);
+
+  // What is forgotten counts by its age, whichever log it came from.
+  const double seconds = static_cast<double>(second.rows()) * second.step_s * static_cast<double>(second.decimation);
+  SquareRootInformation faded = known;
+  faded.forget(std::pow(0.9, seconds));
+  after.forget(0.9);
+  Fitter fresh(model.robot, only_b, design);
+  fresh.set_weights(before.weights());
+  const VectorXd by_recursion = of(fresh.recursive(0.9, 0, known).solution);
+  const NormalEquations late = after.normal_equations();
+  const VectorXd by_batch =
+      SymmetricSolver(faded.information() + late.information).solve(faded.projection() + late.projection);
+  EXPECT_LT((by_recursion - by_batch).cwiseAbs().maxCoeff(), 1e-8 * by_batch.cwiseAbs().maxCoeff());
+}
+
+TEST(Statistics, UnknownsThatStayZeroAndOthersThatStayWhereTheyAre) {
+  const IdentifiedModel model = plant();
+  Log log = record(model);
+  add_noise(log, model, 0.01, 23);
+  const std::vector<ProcessedLog> logs{process(log, filter)};
+  Fitter fitter(model.robot, logs, model.joints);
+  fitter.reweight();
+  SquareRootInformation known = fitter.information();
+  // Least squares over the other unknowns alone.
+  const NormalEquations equations = fitter.normal_equations();
+  const std::vector<Index> zeros{3, 7};
+  std::vector<Index> others;
+  for (Index i = 0; i < known.unknowns(); ++i) {
+    if (i != 3 && i != 7) others.push_back(i);
+  }
+  VectorXd expected = VectorXd::Zero(known.unknowns());
+  expected(others) = SymmetricSolver(equations.information(others, others)).solve(equations.projection(others));
+  const VectorXd x = known.solve_without(zeros);
+  EXPECT_EQ(x[3], 0);
+  EXPECT_EQ(x[7], 0);
+  EXPECT_LT((x - expected).cwiseAbs().maxCoeff(), 1e-8 * expected.cwiseAbs().maxCoeff());
+  // Deviations are those of the inverse.
+  const VectorXd inverse = SymmetricSolver(equations.information).inverse().diagonal().cwiseSqrt();
+  EXPECT_LT(((known.deviations() - inverse).array() / inverse.array()).abs().maxCoeff(), 1e-6);
+  // Around another solution, with the same information.
+  const VectorXd elsewhere = 1.1 * known.solve();
+  const Eigen::MatrixXd before = known.information();
+  known.recentre(elsewhere);
+  EXPECT_LT((known.solve() - elsewhere).cwiseAbs().maxCoeff(), 1e-9 * elsewhere.cwiseAbs().maxCoeff());
+  EXPECT_EQ((known.information() - before).norm(), 0);
 }
 
 TEST(Statistics, ForgettingFollowsAChange) {

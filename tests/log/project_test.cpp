@@ -24,6 +24,7 @@ std::filesystem::path write_project(const std::string& name, const std::string& 
   std::string csv = "t,q1,q2,tau1,tau2\n";
   for (int i = 0; i < 100; ++i) csv += std::to_string(i) + ",0,0,0,0\n";
   write("a.csv", csv);
+  write("copy.csv", csv);
   write("s.toml", "");
   return write(name + ".toml", text);
 }
@@ -70,6 +71,9 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"overlap",
             robot + log + "to_s = 20\n[[log]]\nfile = \"./a.csv\"\nrole = \"test\"\nfrom_s = 19.9\n",
             {":7:", "overlaps the log in line 3"}},
+        Bad{"copy",
+            robot + log + "[[log]]\nfile = \"copy.csv\"\nrole = \"validate\"\n",
+            {":6:", "overlaps the log in line 3", "same content under another name"}},
         Bad{"torque_gain", robot + log + "torque_gain = [1]\n", {":6:", "has 1 values, expected 2"}},
         Bad{"method",
             robot + "[identify]\nmethod = \"lsq\"\n" + log,

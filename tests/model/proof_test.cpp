@@ -6,6 +6,7 @@
 #include "host_tools/export/proof.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/random.hpp"
+#include "tests/support/broad_learning.hpp"
 
 namespace fxdyn {
 namespace {
@@ -86,6 +87,28 @@ TEST(Proof, HoldsForABlsAlsoWhereItsVelocityRunsOut) {
     model.joints[1].bls = bls;
     expect_within(model, "bls");
   }
+}
+
+TEST(Proof, HoldsForEveryKindOfBls) {
+  for (const auto& [inputs, activation] : test::bls_kinds()) {
+    for (const double weight : {0.5, 4.0}) {  // arguments within +-8, and far beyond
+      IdentifiedModel model = two_joints();
+      model.joints[1].bls = test::random_bls(inputs, activation, model.joints[1], 20, weight, 3);
+      expect_within(model, inputs + " " + activation);
+    }
+  }
+}
+
+TEST(Proof, HoldsForABlsOnABentJoint) {
+  // The rigid-body torque that the BLS sees is then that of the link's motion.
+  IdentifiedModel model = two_joints();
+  EffectFit gear;
+  gear.effect = "elasticity";
+  for (const ParameterInfo& shape : find_effect(gear.effect)->shape) gear.shape.push_back(shape_value(shape, false));
+  gear.linear.assign(find_effect(gear.effect)->linear.size(), 1e-4);
+  model.joints[1].effects.push_back(gear);
+  model.joints[1].bls = test::random_bls("extended", "relu", model.joints[1], 20, 1, 3);
+  expect_within(model, "extended beside elasticity");
 }
 
 TEST(Proof, HoldsForALateTorqueThatDrifts) {

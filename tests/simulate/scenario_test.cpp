@@ -1,9 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "host_tools/excite/fourier.hpp"
 #include "host_tools/files.hpp"
+#include "host_tools/log/project.hpp"
 #include "host_tools/model/evaluator.hpp"
+#include "host_tools/simulate/scenario.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "tests/simulate/support.hpp"
 
@@ -49,6 +53,47 @@ TEST(Scenario, TruthIsTheModelsTorqueOnTheMotionThatTheLogShows) {
     const MatrixXd model = predict(played.plant, played.log.q, played.log.dq, played.log.ddq, 0.0005, nullptr, 12);
     EXPECT_LT((model - played.truth.tau).rightCols(3).cwiseAbs().maxCoeff(), 0.1) << top;
     EXPECT_LT((model - played.truth.tau).leftCols(2).cwiseAbs().maxCoeff(), 1e-9) << top;
+  }
+}
+
+TEST(Scenario, AnEffectOnSeveralJoints) {
+  const std::string one_by_one = test::effect_text(1, "coulomb", "amplitude = 7, width = 0.002") +
+                                 test::effect_text(3, "coulomb", "amplitude = 6, width = 0.004");
+  const std::string together =
+      "[[effect]]\nname = \"coulomb\"\njoint = [1, 3]\nparameters = { amplitude = [7, 6], width = [0.002, 0.004] }\n";
+  const Played a = play("one_by_one", test::puma_scenario("", "") + one_by_one + log_text);
+  const Played b = play("together", test::puma_scenario("", "") + together + log_text);
+  EXPECT_EQ(a.log.tau, b.log.tau);
+  const Played all = play("all", test::puma_scenario("", "") +
+                                     "[[effect]]\nname = \"viscous\"\njoint = \"all\"\nparameters = { coefficient = 2 }\n" +
+                                     log_text);
+  for (const JointFit& joint : all.plant.joints) EXPECT_NE(joint.find("viscous"), nullptr);
+}
+
+TEST(Scenario, PlaysAPlannedTrajectory) {
+  const FourierJoint series{0.3, Eigen::Vector3d(0.2, -0.3, 0.1), Eigen::Vector3d::Zero()};
+  std::string joints;
+  for (int j = 0; j < 6; ++j)
+    joints += std::string(j == 0 ? "" : ",") + "{\"joint\":\"j\",\"centre\":0.3,\"a\":[0.2,-0.3,0.1],\"b\":[0,0,0]}";
+  test::write("plan.json", "{\"trajectories\":[{\"name\":\"fast\",\"period_s\":4,\"series\":[" + joints + "]}]}");
+  const std::string planned =
+      "[[log]]\nname = \"run\"\nduration_s = 4\nseed = 7\nplan = \"plan.json\"\ntrajectory = \"fast\"\n";
+  const Played played = play("planned", test::puma_scenario("", "exact_motion = true") + planned);
+  for (Eigen::Index k = 0; k < played.log.q.rows(); k += 100)
+    EXPECT_NEAR(played.log.q(k, 2), evaluate(series, 4, played.log.t[k]).q, 1e-9);
+}
+
+/// What comes with the program can be read: robots, effects, logs, settings.
+TEST(Scenario, BundledOnesAreRead) {
+  const std::filesystem::path demo = std::filesystem::path(FXDYN_SOURCE_DIR) / "host_tools" / "demo";
+  for (const char* name : {".", "paper", "rich", "efficiency", "vibration"}) {
+    const Scenario scenario = read_scenario(demo / name / "scenario.toml");
+    const Project project = read_project(demo / name / "project.toml");
+    for (const LogEntry& entry : project.logs) {
+      EXPECT_TRUE(std::any_of(scenario.logs.begin(), scenario.logs.end(),
+                              [&](const ScenarioLog& log) { return log.name == entry.scenario_log; }))
+          << name << " " << entry.scenario_log;
+    }
   }
 }
 
@@ -208,6 +253,16 @@ INSTANTIATE_TEST_SUITE_P(
         test::Bad{"self",
                   scenario("", "", test::effect_text(2, "joint_coupling", "joint = 2, coulomb = 1, viscous = 1")),
                   {":12:", "another joint of 1 .. 6"}},
+        test::Bad{"joints",
+                  scenario("", "", "[[effect]]\nname = \"viscous\"\njoint = [1, 7]\nparameters = { coefficient = 1 }\n"),
+                  {":11:", "the robot has 6 joints"}},
+        test::Bad{"twice",
+                  scenario("", "", "[[effect]]\nname = \"viscous\"\njoint = [1, 1]\nparameters = { coefficient = 1 }\n"),
+                  {":11:", "joint 1 has viscous already"}},
+        test::Bad{"each",
+                  scenario("", "", "[[effect]]\nname = \"viscous\"\njoint = [1, 2]\nparameters = { coefficient = [1] }\n"),
+                  {":12:", "has 1 values, expected 2"}},
+        test::Bad{"plan", scenario("", "") + "plan = \"nowhere.json\"\ntrajectory = \"fast\"\n", {"nowhere.json"}},
         test::Bad{"backlash",
                   scenario("plant = \"mujoco\"\nmotion = \"closed_loop\"", "",
                            test::effect_text(1, "rotor_inertia", "inertia = 1") +

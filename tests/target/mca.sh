@@ -11,7 +11,7 @@ printf '%-12s %-10s %12s %8s\n' kernel core instructions cycles
 for core in cortex-m4 cortex-m7; do
   arm-none-eabi-g++ -S -o "$work/kernels.s" -mcpu=$core -mthumb -mfloat-abi=soft -std=c++20 -O2 -fno-exceptions -ffreestanding \
     -Wno-psabi -DEIGEN_NO_MALLOC -DEIGEN_NO_IO -DEIGEN_NO_DEBUG -DEIGEN_DONT_VECTORIZE -isystem /usr/include/eigen3 -I"$root" "$root/tests/target/mca_kernels.cpp"
-  for kernel in two_nodes two_tanh row_16 sin_cos rotate dahl; do
+  for kernel in two_nodes two_tanh two_ramps row_16 sin_cos rotate dahl; do
     # The function's instructions without directives, labels and literals. The M7 model doesn't know IT: what is conditional
     # there costs the same when it always happens.
     awk -v name="kernel_$kernel" '

@@ -19,6 +19,11 @@ void kernel_two_tanh(const std::int32_t* coefficients, const std::int32_t* x, st
   *out = raw::weighted_tanh(2, coefficients, x);
 }
 
+/// The same of two ramps.
+void kernel_two_ramps(const std::int32_t* coefficients, const std::int32_t* x, std::int64_t* out) {
+  *out = raw::weighted_ramp(2, coefficients, x);
+}
+
 /// Sixteen products of a dense row.
 void kernel_row_16(const std::int32_t* row, const std::int32_t* u, std::int64_t* out) {
   *out = raw::dense_row<16>(row, u).value();

@@ -12,6 +12,9 @@
 #include "host_tools/model/effects.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
 #include "host_tools/random.hpp"
+#include "host_tools/update/update.hpp"
+#include "tests/diagnose/arm.hpp"
+#include "tests/support/broad_learning.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/files.hpp"
 
@@ -87,8 +90,8 @@ TEST(Target, FirmwareGivesTheHostsBitsOnASimulatedRobot) {
   expect_exact(replay_on_target(project, test::folder() / "simulated"), 3000);
 }
 
-/// An arm whose joints 2 and 5 have every effect of the catalogue and a BLS and whose joint 3 slides, with a load and
-/// on a tilted base.
+/// An arm whose joints 2 and 5 have every effect of the catalogue and a BLS, of different kinds, and whose joint 3
+/// slides, with a load and on a tilted base.
 IdentifiedModel every_effect() {
   IdentifiedModel model;
   model.robot = read_urdf(FXDYN_SOURCE_DIR "/host_tools/demo/puma560.urdf");
@@ -121,7 +124,7 @@ IdentifiedModel every_effect() {
       bls.reference_velocity = 0.05;
       bls.weights = Eigen::MatrixXd::NullaryExpr(7, 5, [&] { return std::round(512 * random.uniform(-2, 2)) / 512; });
       bls.coefficients = Eigen::VectorXd::NullaryExpr(11, [&] { return random.uniform(-3, 3); });
-      joint.bls = bls;
+      joint.bls = j == 1 ? bls : test::random_bls("extended", "relu", joint, 7, 2, 8);
     }
     model.joints.push_back(joint);
   }
@@ -177,6 +180,84 @@ TEST(Target, EveryEffectGivesTheHostsBits) {
     }
     EXPECT_EQ(fewest, most) << "instructions depend on the data";
     EXPECT_GT(saturated, 0U);
+  }
+}
+
+TEST(Target, AnUpdatedPageRunsInTheOldImageAndADamagedOneDoesNot) {
+  const test::Arm arm("updated");
+  const fs::path project =
+      test::write("updated.project",
+                  "[robot]\nurdf = \"updated.urdf\"\nrated_torque = [40, 15]\n[diagnose]\nmax_effects = 0\n"
+                  "[train]\nnodes = 10\n[[log]]\nrole = \"train\"\nfile = \"" +
+                      arm.logs[0].string() + "\"\n");
+  // A second session, with more friction.
+  Log worn = read_log(arm.logs[1], 2, {true, true}, {}, {}, {});
+  worn.tau += 0.4 * (differentiate(worn.q, worn.step_s) / 0.02).array().tanh().matrix();
+  write_log(test::folder() / "worn.csv", worn);
+
+  const fs::path out = test::folder() / "updated_out";
+  Pipeline pipeline(project, out);
+  pipeline.export_tables();
+  const IdentifiedModel before = pipeline.model();
+  struct Board {
+    const char *preset, *machine;
+  };
+  const Board boards[] = {{"cortex-m4", "mps2-an386"}, {"cortex-m33", "mps2-an505"}};
+  const auto image = [&](const Board& board) {
+    return out / board.preset / ("fxdyn-" + std::string(board.machine) + ".elf");
+  };
+  for (const Board& board : boards)
+    shell(FXDYN_SOURCE_DIR "/toolchains/build_image.sh " + (out / "tables.hpp").string() + " " +
+          (out / board.preset).string() + " " + board.preset);
+  EXPECT_TRUE(replay(pipeline, image(boards[0]), 500).same);
+  EXPECT_EQ(json::parse(read_file(out / "replay.json")).at("tables_in"), "image");
+
+  ASSERT_TRUE(update(pipeline, {test::folder() / "worn.csv", {}, false}).accepted);
+  const IdentifiedModel after = pipeline.model();
+  ASSERT_NE(after.tables_crc, before.tables_crc);
+  EXPECT_TRUE(replay(pipeline, image(boards[0]), 1500).same);
+  const json replayed = json::parse(read_file(out / "replay.json"));
+  EXPECT_EQ(replayed.at("tables_in"), "update slot");
+  EXPECT_EQ(replayed.at("tables_crc"), after.tables_crc);
+  expect_exact(replayed, 3000);
+
+  // Whole, it is what the node computes with; one byte wrong or half of it, the node says that it runs on its own.
+  const std::string page = read_file(out / "tables.bin");
+  const auto with_byte = [&](std::size_t at) {
+    std::string damaged = page;
+    damaged[at] = static_cast<char>(damaged[at] ^ 0x10);
+    return damaged;
+  };
+  struct Flashed {
+    std::string bytes;
+    const IdentifiedModel& runs;
+  };
+  const Flashed cases[] = {{page, after},
+                           {with_byte(0), before},
+                           {with_byte(5), before},
+                           {with_byte(13), before},
+                           {with_byte(page.size() / 2), before},
+                           {page.substr(0, page.size() / 2), before}};
+  const TickStates states = within_limits(before, 50, 4);
+  for (const Board& board : boards) {
+    for (const Flashed& flashed : cases) {
+      QemuTarget::Options options;
+      options.machine = board.machine;
+      options.update_page = test::folder() / "page,flashed.bin";
+      write_file(options.update_page, flashed.bytes);
+      QemuTarget target(image(board), options);
+      const serial::Identity identity = target.hello();
+      ASSERT_EQ(identity.state, serial::NodeState::ready);
+      EXPECT_EQ(identity.tables_crc, flashed.runs.tables_crc) << board.machine;
+      FixedModel fixed(flashed.runs, *flashed.runs.formats);
+      EXPECT_EQ(identity.layout_hash, fixed.layout_hash());
+      for (Eigen::Index k = 0; k < states.t.size(); ++k) {
+        const std::vector<std::int32_t> words = raw_states(states, k, fixed.formats());
+        Saturations saturations;
+        const std::vector<std::int32_t> expected = fixed.tick(words, saturations);
+        ASSERT_EQ(target.tick(words).torques, expected) << board.machine << ", tick " << k;
+      }
+    }
   }
 }
 

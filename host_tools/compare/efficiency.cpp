@@ -1,0 +1,129 @@
+#include "host_tools/compare/efficiency.hpp"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "host_tools/compare/compare.hpp"
+#include "host_tools/error.hpp"
+#include "host_tools/files.hpp"
+#include "host_tools/identify/identify.hpp"
+#include "host_tools/progress.hpp"
+
+namespace fxdyn {
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+const std::vector<double> seconds{5, 10, 20, 40, 60, 120};
+const std::vector<double> mixed_seconds{10, 60};
+const std::vector<double> slow_shares{0, 0.25, 0.5, 0.75, 1};
+const std::vector<std::string> methods{"rigid_ls", "friction_ls", "mlp", "bls_physical", "lugre"};
+const std::vector<std::string> mixed_methods{"friction_ls", "lugre"};
+
+struct Source {
+  LogEntry entry;
+  double from_s = 0, length_s = 0, speed = 0;
+};
+
+class Efficiency {
+ public:
+  Efficiency(const fs::path& project, const fs::path& directory)
+      : project_(read_project(project)), directory_(directory) {
+    std::size_t next = 0;
+    std::vector<Log> logs = read_logs(project_, Role::train, directory);
+    for (const LogEntry& entry : project_.logs) {
+      if (entry.role != Role::train) continue;
+      const Log& log = logs[next++];
+      const Eigen::Index rows = log.q.rows();
+      const double step = (log.t[rows - 1] - log.t[0]) / static_cast<double>(rows - 1);
+      const double speed = (log.q.bottomRows(rows - 1) - log.q.topRows(rows - 1)).norm() / step /
+                           std::sqrt(static_cast<double>(rows));
+      sources_.push_back({entry, log.t[0], step * static_cast<double>(rows), speed});
+    }
+    double fastest = 0;
+    for (const Source& source : sources_) fastest = std::max(fastest, source.speed);
+    for (const Source& source : sources_) (source.speed < 0.5 * fastest ? slow_ : fast_).push_back(source);
+    if (slow_.empty() || fast_.empty()) {
+      throw DataError(fmt::format("{}: efficiency needs fast and slow train logs (less than half as fast)",
+                                  project_.file.string()));
+    }
+  }
+
+  json run() {
+    json curve = json::array(), mix = json::array();
+    for (const double s : seconds) add(curve, s, 0.5, methods);
+    for (const double s : mixed_seconds) {
+      for (const double share : slow_shares) add(mix, s, share, mixed_methods);
+    }
+    return {{"schema", "fxdyn.efficiency/1"}, {"project_hash", project_hash(project_)}, {"curve", curve}, {"mix", mix}};
+  }
+
+ private:
+  /// Nothing where the logs are shorter.
+  void add(json& to, double s, double slow_share, const std::vector<std::string>& names) {
+    Project part = project_;
+    std::erase_if(part.logs, [](const LogEntry& entry) { return entry.role == Role::train; });
+    if (!take(part, fast_, s * (1 - slow_share)) || !take(part, slow_, s * slow_share)) return;
+    json errors;
+    std::string why;
+    for (const std::string& name : names) {
+      try {
+        const json result = compare_methods(part, directory_, {name});
+        errors[name] = result.at("methods").at(0).at("mean_percent_rated");
+      } catch (const DataError& error) {
+        errors[name] = nullptr;
+        why = error.what();
+      }
+    }
+    json point{{"seconds", s}, {"slow_share", slow_share}, {"percent_rated", errors}};
+    if (!why.empty()) point["failed"] = why;
+    to.push_back(point);
+  }
+
+  static bool take(Project& part, const std::vector<Source>& from, double s) {
+    for (const Source& source : from) {
+      if (s <= 1e-9) return true;
+      LogEntry entry = source.entry;
+      entry.from_s = source.from_s;
+      entry.to_s = source.from_s + std::min(s, source.length_s);
+      part.logs.push_back(entry);
+      s -= source.length_s;
+    }
+    return s <= 1e-9;
+  }
+
+  Project project_;
+  fs::path directory_;
+  std::vector<Source> sources_, fast_, slow_;
+};
+
+}  // namespace
+
+json efficiency(const fs::path& project, const fs::path& directory) {
+  const json result = Efficiency(project, directory).run();
+  write_file(directory / "efficiency.json", result.dump(1) + "\n");
+  return result;
+}
+
+std::string efficiency_table(const json& result) {
+  const auto cell = [](const json& errors, const std::string& name) {
+    if (!errors.contains(name) || errors.at(name).is_null()) return fmt::format("{:>13}", "-");
+    return fmt::format("{:>13.3g}", errors.at(name).get<double>());
+  };
+  std::string out = "test error, % of rated, mean of the joints\n   seconds  slow";
+  for (const std::string& name : methods) out += fmt::format("{:>13}", name);
+  for (const char* part : {"curve", "mix"}) {
+    out += "\n";
+    for (const json& point : result.at(part)) {
+      out += fmt::format("{:>10g} {:>4.0f} %", point.at("seconds").get<double>(),
+                         100 * point.at("slow_share").get<double>());
+      for (const std::string& name : methods) out += cell(point.at("percent_rated"), name);
+      out += "\n";
+    }
+  }
+  return out;
+}
+
+}  // namespace fxdyn

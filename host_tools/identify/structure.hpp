@@ -1,0 +1,23 @@
+#pragma once
+
+#include "host_tools/identify/identify.hpp"
+
+namespace fxdyn {
+
+/// Structures that others are compared with: friction that everybody has, and the paper's reference (LuGre).
+inline const std::vector<std::string> coulomb_and_viscous{"viscous", "coulomb", "offset", "rotor_inertia"};
+inline const std::vector<std::string> lugre_friction{"viscous",       "coulomb",  "offset",
+                                                     "rotor_inertia", "stribeck", "presliding"};
+
+/// The project with these effects and nothing else: no choice of effects, no physical or essential parameters.
+Project with_structure(Project project, const std::vector<std::string>& effects, const std::string& method);
+
+/// Rigid body and `effects` identified on the project's train logs; method rls: the last of the recursive estimates.
+IdentifiedModel identify_structure(const Project& project, GateData data, const std::vector<std::string>& effects,
+                                   const std::string& method, Progress& progress);
+
+/// Rigid body and rotors alone of a model that has more: no friction is hidden in inertias, as it is where a rigid body
+/// alone was identified.
+IdentifiedModel rigid_part(IdentifiedModel model);
+
+}  // namespace fxdyn

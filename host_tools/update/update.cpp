@@ -1,0 +1,383 @@
+#include "host_tools/update/update.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "host_tools/error.hpp"
+#include "host_tools/export/export.hpp"
+#include "host_tools/files.hpp"
+#include "host_tools/identify/plausible.hpp"
+#include "host_tools/report/metrics.hpp"
+#include "host_tools/report/results.hpp"
+#include "host_tools/train/kept_effects.hpp"
+#include "host_tools/train/stored_information.hpp"
+#include "model/table_page.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+/// Of the new log, in time: what refits; the rest judges.
+constexpr double refit_share = 2.0 / 3;
+
+PageHeader header_of(const fs::path& page) {
+  const std::string bytes = read_file(page);
+  PageHeader header;
+  if (bytes.size() < sizeof header) return {0, 0, 0, 0};
+  std::memcpy(&header, bytes.data(), sizeof header);
+  return header;
+}
+
+/// The model in DIR with the tables that a drive may run on.
+IdentifiedModel exported_model(Pipeline& pipeline) {
+  const fs::path file = pipeline.directory() / "model.json";
+  const auto refuse = [&](const std::string& why, const char* verb) {
+    return InputError(fmt::format("{}: {}: run `fxdyn {} {} --out {}` first", file.string(), why, verb,
+                                  pipeline.project().file.string(), pipeline.directory().string()));
+  };
+  if (!fs::exists(file)) throw refuse("there is no model", "run");
+  std::optional<IdentifiedModel> model = pipeline.trained();
+  if (!model) throw refuse("not a trained model of this project and its logs as they are now", "run");
+  const fs::path page = pipeline.directory() / "tables.bin";
+  if (!model->formats || !model->layout || !fs::exists(page) || header_of(page).crc32 != model->tables_crc)
+    throw refuse("its tables are not exported", "export");
+  return *std::move(model);
+}
+
+/// The new log in two parts, and the logs that the fit never saw.
+struct NewSession {
+  LogReference reference;
+  std::vector<ProcessedLog> refit;  ///< one
+  ProcessedLog held_out;
+  std::vector<ProcessedLog> test;
+  double refit_s = 0, held_out_s = 0;
+};
+
+NewSession read_session(const Pipeline& pipeline, const IdentifiedModel& model, double row_interval_s,
+                        const fs::path& file) {
+  const Project& project = pipeline.project();
+  NewSession out;
+  out.reference = {file.filename().string(), "update", hash_of_file(file), 0, 0};
+  const auto used = [&](const std::string& as) {
+    return InputError(
+        fmt::format("{}: this model knows it already, as {} log: update with a new one", file.string(), as));
+  };
+  for (const auto* logs : {&model.logs, &model.updates}) {
+    for (const LogReference& log : *logs) {
+      if (log.hash == out.reference.hash) throw used(log.role);
+    }
+  }
+  for (Log& log : read_logs(project, Role::test, pipeline.directory())) {
+    if (hash_of_file(log.file) == out.reference.hash) throw used("test");
+    out.test.push_back(process(std::move(log), model.filter));
+  }
+  double cut_s = 0;
+  {
+    const Log whole = read_log_for(model, file, {}, {});
+    check_torque(whole, model.robot);
+    const double from = whole.t[0], to = whole.t[whole.samples() - 1];
+    cut_s = from + refit_share * (to - from);
+    out.refit_s = cut_s - from;
+    out.held_out_s = to - cut_s;
+    out.reference.from_s = from;
+    out.reference.to_s = cut_s;
+  }
+  Log refit = read_log_for(model, file, {}, cut_s), held_out = read_log_for(model, file, cut_s, {});
+  refit.role = Role::train;
+  held_out.role = Role::test;
+  ProcessSettings settings;
+  settings.torque_limits = project.limits.torque;
+  settings.shortest_interval_s = row_interval_s;  // a second of it counts what a second of the train logs does
+  out.refit.push_back(process(std::move(refit), model.filter, settings));
+  out.held_out = process(std::move(held_out), model.filter);
+  const std::vector<bool> moving = moving_joints(out.refit);
+  for (std::size_t j = 0; j < moving.size(); ++j) {
+    if (!moving[j])
+      throw DataError(
+          fmt::format("{}: joint {} ({}) never moves in its first two thirds: record a log in which it does",
+                      file.string(), j + 1, model.robot.joints[j].name));
+  }
+  for (const Suspicion& suspicion : check_plausible(project.robot, out.refit, model.joints)) {
+    if (suspicion.severity == Severity::error) throw DataError(fmt::format("{}: {}", file.string(), suspicion.text));
+  }
+  return out;
+}
+
+/// Base parameters that the tables do not compute: they stay zero.
+std::vector<Index> zeros_of(const IdentifiedModel& model) {
+  std::vector<Index> zeros;
+  for (std::size_t i = 0; i < model.base.size(); ++i) {
+    const std::size_t link = model.base[i].column / parameters_per_link, k = model.base[i].column % parameters_per_link;
+    if ((model.layout->parameters[link] >> k & 1U) == 0) zeros.push_back(static_cast<Index>(i));
+  }
+  return zeros;
+}
+
+/// Standard deviations in the order of coefficients_of().
+VectorXd deviations_of(IdentifiedModel model, std::vector<JointFit> design) {
+  for (BaseParameter& parameter : model.base) parameter.value = parameter.std;
+  for (JointFit& joint : design) {
+    for (EffectFit& fit : joint.effects) {
+      fit.linear_std.resize(fit.linear.size(), 0.0);
+      fit.linear = fit.linear_std;
+    }
+    if (joint.bls) joint.bls->coefficients.setZero();
+  }
+  return coefficients_of(model, design);
+}
+
+struct Refit {
+  IdentifiedModel model;
+  StoredInformation stored;
+};
+
+Refit refit(const Project& project, const IdentifiedModel& old, const StoredInformation& stored,
+            std::vector<ProcessedLog>& logs, double forgetting) {
+  const auto is_drift = [](const std::string& name) {
+    return name.find(fmt::format(": {},", FrictionDrift::name)) != std::string::npos;
+  };
+  const bool fits_drift = std::any_of(stored.unknowns.begin(), stored.unknowns.end(), is_drift);
+  const KeptEffects kept(old, logs, !fits_drift);
+  std::vector<JointFit> design = kept.design();
+  kept.mark_hidden(logs);
+  Fitter fitter(project.robot, logs, design);
+  fitter.set_structural(structural_torque(old, logs));  // a BLS may have it among its inputs
+  for (std::size_t j = 0; j < design.size(); ++j) design[j].bls = old.joints[j].bls;
+  fitter.set_designs(design);
+  if (fitter.unknowns() != stored.unknowns)
+    throw InputError(
+        "information.cbor: about other coefficients than this log refits: run `fxdyn run` with the log in the project");
+  fitter.set_weights(stored.weights);
+
+  const std::vector<Index> zeros = zeros_of(old);
+  const VectorXd std_before = deviations_of(old, design), known_before = stored.information.deviations();
+  Refit out{old, stored};
+  std::vector<MatrixXd> torque;
+  // The kept effects follow the rigid body that is fitted beside them.
+  for (int round = 0; round < 2; ++round) {
+    std::vector<MatrixXd> now = kept.torque(out.model, logs);
+    if (round > 0 && now == torque) break;
+    torque = std::move(now);
+    fitter.set_torque_lead(old.filter.torque_lead_s, torque);
+    out.stored.information = fitter.recursive(forgetting, 0, stored.information).information;
+    const SquareRootInformation& known = out.stored.information;
+    VectorXd x = known.solve_without(zeros);
+    if (project.identify.physical && !project.identify.essential) {
+      const PhysicalFit possible =
+          fit_physical(fitter, project.robot, known.information(), known.projection(), known.variance_of_row());
+      if (possible.constrained) x << possible.beta, possible.theta;
+      for (const Index i : zeros) x[i] = 0;
+    }
+    Solution solution = fitter.split(x);
+    for (const BaseParameter& parameter : old.base) solution.essential.push_back(parameter.essential);
+    // What the noise's correlation makes of them is as it was; what is known has changed.
+    const VectorXd known_now = known.deviations();
+    const Solution std = fitter.split(
+        (known_before.array() > 0).select(std_before.array() * known_now.array() / known_before.array(), 0).matrix());
+    solution.beta_std = std.beta;
+    solution.theta_std = std.theta;
+    IdentifiedModel fitted = kept.restore(fitter.to_model(solution));
+    out.model.inertia = std::move(fitted.inertia);
+    out.model.base = std::move(fitted.base);
+    out.model.joints = std::move(fitted.joints);
+  }
+  return out;
+}
+
+/// Errors of a model over some logs, pooled.
+struct Errors {
+  explicit Errors(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs) {
+    json list = json::array();
+    for (const ProcessedLog* log : logs)
+      list.push_back(metrics_json(*log, model.robot, judge(*log, predict(model, *log))));
+    for (std::size_t j = 0; j < model.joints.size(); ++j) rmse.push_back(pooled_error(list, "test", j).rmse);
+  }
+  std::vector<double> rmse;  ///< of each joint [N*m | N]
+};
+
+struct Judged {
+  Errors before, after;
+};
+
+Judged judged(const IdentifiedModel& before, const IdentifiedModel& after,
+              const std::vector<const ProcessedLog*>& logs) {
+  return {Errors(before, logs), Errors(after, logs)};
+}
+
+/// Mean over the joints of log(after / before).
+double mean_log_ratio(const Judged& judged) {
+  double sum = 0;
+  const std::size_t n = judged.before.rmse.size();
+  for (std::size_t j = 0; j < n; ++j)
+    sum += std::log(std::max(judged.after.rmse[j], 1e-300) / std::max(judged.before.rmse[j], 1e-300));
+  return sum / static_cast<double>(n);
+}
+
+std::string change_text(const Judged& judged, std::size_t joint, double rated) {
+  const double before = judged.before.rmse[joint], after = judged.after.rmse[joint];
+  return fmt::format("{:>10.4g} ({:5.2f}%) -> {:>9.4g} ({:5.2f}%) {:>+5.0f} %", before, 100 * before / rated, after,
+                     100 * after / rated, before > 0 ? 100 * (after / before - 1) : 0.0);
+}
+
+std::string table_of(const IdentifiedModel& model, const NewSession& session, const Judged& held_out,
+                     const std::optional<Judged>& test, double forgetting) {
+  std::size_t width = 8;
+  for (const Joint& joint : model.robot.joints) width = std::max(width, joint.name.size() + 2);
+  std::string out = fmt::format(
+      "\n{:.1f} s of {} refitted, what was known a second ago counts {:g}; {:.1f} s judge\n"
+      "RMSE before -> after (in parentheses: share of the rated torque)\n{:<{}}{:<6}{:>49}",
+      session.refit_s, session.reference.file, forgetting, session.held_out_s, "joint", width, "unit",
+      "last third of the log");
+  if (test) out += fmt::format("{:>51}", "test logs of the project");
+  out += "\n";
+  for (std::size_t j = 0; j < model.joints.size(); ++j) {
+    const double rated = model.joints[j].rated_torque;
+    out += fmt::format("{:<{}}{:<6}{}", model.robot.joints[j].name, width, model.robot.joints[j].torque_unit(),
+                       change_text(held_out, j, rated));
+    if (test) out += "  " + change_text(*test, j, rated);
+    out += "\n";
+  }
+  return out;
+}
+
+json update_json(const IdentifiedModel& before, const NewSession& session, const Judged& held_out,
+                 const std::optional<Judged>& test, double forgetting) {
+  json joints = json::array();
+  const auto change = [](const Judged& judged, std::size_t j) {
+    return json{{"old", judged.before.rmse[j]}, {"new", judged.after.rmse[j]}};
+  };
+  for (std::size_t j = 0; j < before.joints.size(); ++j) {
+    joints.push_back(
+        {{"joint", before.robot.joints[j].name},
+         {"index", j + 1},
+         {"unit", before.robot.joints[j].torque_unit()},
+         {"rated_torque", before.joints[j].rated_torque},
+         {"rmse", {{"held_out", change(held_out, j)}, {"test", test ? change(*test, j) : json(nullptr)}}}});
+  }
+  return {{"schema", "fxdyn.update/1"},
+          {"log", session.reference.file},
+          {"hash", session.reference.hash},
+          {"refit_seconds", session.refit_s},
+          {"held_out_seconds", session.held_out_s},
+          {"forgetting", forgetting},
+          {"joints", joints},
+          {"mean_log_ratio", mean_log_ratio(held_out)},
+          {"tables_crc", {{"old", before.tables_crc}, {"new", nullptr}}},
+          {"accepted", false}};
+}
+
+/// A folder for files that replace those of `directory` together; gone with the object.
+class Staging {
+ public:
+  explicit Staging(const fs::path& directory) : directory_(directory), staged_(directory / "update.tmp") {
+    fs::remove_all(staged_);
+    fs::create_directories(staged_);
+  }
+  ~Staging() {
+    std::error_code ignored;
+    fs::remove_all(staged_, ignored);
+  }
+  Staging(const Staging&) = delete;
+  Staging& operator=(const Staging&) = delete;
+
+  const fs::path& path() const { return staged_; }
+  /// Keeps every tables.bin as tables.previous.bin; `last` comes when all others are in place.
+  void replace(const fs::path& last) const {
+    std::vector<fs::path> files;
+    for (const auto& entry : fs::recursive_directory_iterator(staged_)) {
+      if (entry.is_regular_file()) files.push_back(fs::relative(entry.path(), staged_));
+    }
+    std::sort(files.begin(), files.end(),
+              [&](const fs::path& a, const fs::path& b) { return std::pair(a == last, a) < std::pair(b == last, b); });
+    for (const fs::path& file : files) {
+      const fs::path place = directory_ / file;
+      if (file.filename() == "tables.bin" && fs::exists(place))
+        write_file(place.parent_path() / "tables.previous.bin", read_file(place));
+    }
+    for (const fs::path& file : files) {
+      fs::create_directories((directory_ / file).parent_path());
+      fs::rename(staged_ / file, directory_ / file);
+    }
+  }
+
+ private:
+  fs::path directory_, staged_;
+};
+
+}  // namespace
+
+Update update(Pipeline& pipeline, const UpdateSettings& settings) {
+  const Project& project = pipeline.project();
+  const fs::path& directory = pipeline.directory();
+  const double forgetting = settings.forgetting.value_or(project.identify.forgetting);
+  if (!(forgetting > 0 && forgetting <= 1))
+    throw InputError(fmt::format("--forgetting {:g}: more than 0, at most 1 (1 forgets nothing)", forgetting));
+  const IdentifiedModel old = exported_model(pipeline);
+  const StoredInformation stored = read_information(old, directory);
+
+  Progress progress;
+  progress.stage("refitting, judging", 3);
+  NewSession session = read_session(pipeline, old, stored.row_interval_s, settings.log);
+  progress.step();
+  auto [updated, known] = refit(project, old, stored, session.refit, forgetting);
+  progress.step();
+  const Judged held_out = judged(old, updated, {&session.held_out});
+  std::optional<Judged> test;
+  if (!session.test.empty()) {
+    std::vector<const ProcessedLog*> logs;
+    for (const ProcessedLog& log : session.test) logs.push_back(&log);
+    test = judged(old, updated, logs);
+  }
+  progress.step();
+  progress.done();
+  Update out{mean_log_ratio(held_out) < 0, table_of(old, session, held_out, test, forgetting)};
+  json report = update_json(old, session, held_out, test, forgetting);
+  if (!out.accepted) {
+    write_file(directory / "update.json", report.dump(1) + "\n");
+    return out;
+  }
+
+  Formats formats = *old.formats;
+  if (settings.rebuild) {
+    updated.drop_tables();
+    formats = choose_formats(updated);
+  } else if (const std::string why = why_not_in_layout(updated, formats); !why.empty()) {
+    throw DataError(
+        fmt::format("{}: the new coefficients do not fit the tables that the firmware was built for ({}): it needs a "
+                    "rebuild; add --rebuild and build it from the new tables.hpp",
+                    settings.log.string(), why));
+  }
+  updated.updates.push_back(session.reference);
+  updated.notes.push_back(fmt::format("coefficients updated with {:.1f} s of {}, forgetting {:g}", session.refit_s,
+                                      session.reference.file, forgetting));
+  const Staging staging(directory);
+  pipeline.write_export(updated, formats, staging.path());
+  if (const PageHeader now = header_of(directory / "tables.bin"), next = header_of(staging.path() / "tables.bin");
+      !settings.rebuild && (now.layout_hash != next.layout_hash || now.words != next.words)) {
+    throw DataError(fmt::format("{}: the tables' layout has changed: it needs a rebuild; add --rebuild",
+                                (directory / "tables.bin").string()));
+  }
+  write_file(staging.path() / "model.json", to_json(updated).dump(1) + "\n");
+  write_information(known, read_model(staging.path() / "model.json"), staging.path());
+  if (const fs::path file = directory / "metrics.json"; fs::exists(file)) {
+    json metrics = json::parse(read_file(file));
+    metrics["logs"] = pipeline.stage_metrics(updated, "update").at("logs");
+    metrics["notes"].push_back(updated.notes.back());
+    write_file(staging.path() / "metrics.json", metrics.dump(1) + "\n");
+  }
+  report["accepted"] = true;
+  report["tables_crc"]["new"] = updated.tables_crc;
+  write_file(staging.path() / "update.json", report.dump(1) + "\n");
+  staging.replace("model.json");
+  return out;
+}
+
+}  // namespace fxdyn

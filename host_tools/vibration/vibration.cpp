@@ -1,0 +1,277 @@
+#include "host_tools/vibration/vibration.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <utility>
+
+#include "host_tools/error.hpp"
+#include "host_tools/export/export.hpp"
+#include "host_tools/files.hpp"
+#include "host_tools/identify/structure.hpp"
+#include "host_tools/parallel.hpp"
+#include "host_tools/pipeline/pipeline.hpp"
+#include "host_tools/random.hpp"
+#include "host_tools/simulate/mujoco_plant.hpp"
+#include "host_tools/simulate/scenario.hpp"
+#include "host_tools/vibration/moves.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+constexpr std::array<double, 8> bandwidths{4, 8, 16, 24, 32, 48, 64, 96};  // Hz
+constexpr std::array<double, 5> dampings{0.3, 0.5, 0.7, 1, 1.4};
+constexpr double encoder_step = 2 * std::numbers::pi / (1 << 22);
+constexpr double still = 0.2e-3;  ///< rad | m
+constexpr std::uint64_t tuning_moves = 1, judged_moves = 2;
+
+/// What one move comes to.
+struct Outcome {
+  double motor = 0, link = 0;   ///< mean squares of the error while it moves [rad^2 | m^2]
+  double with_rest = 0;         ///< the link's, to the end
+  double residual = 0;          ///< [rad | m]
+  double settling_s = 0, roughness = 0;
+  MatrixXd q;                   ///< of the motors
+};
+
+class Experiment {
+ public:
+  Experiment(const fs::path& project, const fs::path& directory)
+      : pipeline_(project, directory), model_(with_tables()), plant_(scenario_plant()) {}
+
+  json run() {
+    tune();
+    const std::vector<Move> moves = make_moves(model_, model_.tick_s, judged_moves);
+    json methods = json::array();
+    progress_.stage("vibration: feedforward in the loop", moves.size() * 13);
+    const auto add = [&](const std::string& name, const std::string& numbers, const std::string& error,
+                         const IdentifiedModel* model) {
+      methods.push_back(judge(name, numbers, error, model, moves));
+    };
+    GateData data = read_gate_data(pipeline_.project(), pipeline_.directory());
+    Progress quiet;
+    const IdentifiedModel friction =
+        identify_structure(pipeline_.project(), data, coulomb_and_viscous, "wls", quiet);
+    const IdentifiedModel rigid = rigid_part(friction);
+    add("none", "-", "none", nullptr);
+    add("rigid", "fixed", "none", &rigid);
+    add("friction", "fixed", "none", &friction);
+    add("model", "fixed", "none", &model_);
+    add("model", "real", "none", &model_);
+    compare_numbers(moves);
+    for (const double factor : {0.8, 1.2}) {
+      const std::string error = factor < 1 ? "-20 %" : "+20 %";
+      for (const auto& [name, model] : {std::pair("rigid", &rigid), std::pair("friction", &friction),
+                                        std::pair("model", &std::as_const(model_))}) {
+        const IdentifiedModel wrong = scaled(*model, [&] { return factor; });
+        add(name, "fixed", error, &wrong);
+      }
+    }
+    Random random(5);
+    const IdentifiedModel mixed = scaled(model_, [&] { return random.uniform() < 0.5 ? 0.8 : 1.2; });
+    add("model", "fixed", "+-20 %", &mixed);
+    progress_.done();
+    return {{"schema", "fxdyn.vibration/1"},
+            {"project_hash", model_.project_hash},
+            {"control",
+             {{"bandwidth_hz", settings_.bandwidth_hz},
+              {"damping", settings_.damping},
+              {"tick_s", model_.tick_s},
+              {"encoder_step", encoder_step},
+              {"grid", {{"bandwidth_hz", bandwidths}, {"damping", dampings}}}}},
+            {"methods", methods},
+            {"fixed_against_double", {{"error_change", error_change_}, {"path_difference", path_difference_}}}};
+  }
+
+ private:
+  IdentifiedModel with_tables() {
+    IdentifiedModel model = pipeline_.model();
+    if (model.formats) return model;
+    pipeline_.export_tables();
+    return pipeline_.model();
+  }
+
+  IdentifiedModel scenario_plant() const {
+    for (const LogEntry& entry : pipeline_.project().logs) {
+      if (entry.role == Role::train && entry.scenario) return read_scenario(*entry.scenario).plant;
+    }
+    throw InputError(fmt::format("{}: vibration needs a robot to move: a train log with scenario = \"x.toml\"",
+                                 pipeline_.project().file.string()));
+  }
+
+  Outcome play(const Move& move, MatrixXd feedforward, const ClosedLoopSettings& settings) const {
+    Reference reference = move.reference;
+    reference.feedforward = std::move(feedforward);
+    const PlantRun run = closed_loop_on_mujoco(plant_, reference, settings);
+    const MatrixXd link = run.q - run.deflections;
+    const Index n = run.q.cols(), moving = move.stop - move.start, after = run.q.rows() - move.stop;
+    Outcome out;
+    const auto mean_square = [](const MatrixXd& m) { return m.squaredNorm() / static_cast<double>(m.size()); };
+    out.motor = mean_square((run.q - reference.q).middleRows(move.start, moving));
+    const MatrixXd error = link - reference.q;
+    out.link = mean_square(error.middleRows(move.start, moving));
+    out.with_rest = mean_square(error.bottomRows(error.rows() - move.start));
+    // its place at the end: the mean over the last tenth of a second
+    const auto last = static_cast<Index>(std::lround(0.1 / run.step_s));
+    const Eigen::RowVectorXd end = link.bottomRows(last).colwise().mean();
+    const MatrixXd off = (link.bottomRows(after).rowwise() - end).cwiseAbs();
+    out.residual = off.colwise().maxCoeff().mean();
+    for (Index k = 0; k < after; ++k) {
+      if (off.row(k).maxCoeff() > still) out.settling_s = run.step_s * static_cast<double>(k + 1);
+    }
+    for (Index j = 0; j < n; ++j) {
+      const VectorXd torque = run.tau.col(j).segment(move.start, moving);
+      const VectorXd change = torque.tail(moving - 1) - torque.head(moving - 1);
+      out.roughness += std::sqrt(change.squaredNorm() / static_cast<double>(moving - 1)) /
+                       plant_.joints[static_cast<std::size_t>(j)].rated_torque / static_cast<double>(n);
+    }
+    out.q = run.q;
+    return out;
+  }
+
+  void tune() {
+    const std::vector<Move> moves = make_moves(model_, model_.tick_s, tuning_moves, 1);
+    progress_.stage("vibration: tuning the PD", bandwidths.size() * dampings.size());
+    std::vector<double> cost(bandwidths.size() * dampings.size());
+    const auto settings = [&](std::size_t i) {
+      ClosedLoopSettings s;
+      s.bandwidth_hz = bandwidths[i / dampings.size()];
+      s.damping = dampings[i % dampings.size()];
+      s.substeps = 1;
+      s.encoder_step = encoder_step;
+      return s;
+    };
+    parallel_for(cost.size(), [&](std::size_t i) {
+      try {
+        for (const Move& move : moves) cost[i] += play(move, {}, settings(i)).with_rest;
+      } catch (const RunsAway&) {
+        cost[i] = 1e300;
+      }
+      progress_.step();
+    });
+    const auto best = std::min_element(cost.begin(), cost.end());
+    if (*best >= 1e300) throw DataError("vibration: no PD of the grid holds this robot");
+    settings_ = settings(static_cast<std::size_t>(best - cost.begin()));
+  }
+
+  /// Every linear parameter, of the rigid body and the effects, times what `factor` says.
+  template <class Factor>
+  static IdentifiedModel scaled(IdentifiedModel model, Factor factor) {
+    for (LinkInertia<Real>& link : model.inertia) {
+      for (double* value : {&link.m, &link.h.x, &link.h.y, &link.h.z, &link.xx, &link.yy, &link.zz, &link.xy, &link.xz,
+                            &link.yz})
+        *value *= factor();
+    }
+    for (JointFit& joint : model.joints) {
+      for (EffectFit& fit : joint.effects) {
+        for (double& value : fit.linear) value *= factor();
+      }
+      if (joint.bls) joint.bls->coefficients *= factor();
+    }
+    return model;
+  }
+
+  MatrixXd feedforward(const IdentifiedModel& model, const std::string& numbers, const Reference& r) const {
+    if (numbers == "real") return predict(unlimited(model), r.q, r.dq, r.ddq, r.step_s);
+    TickStates states{"", VectorXd(), r.q, r.dq, r.ddq};
+    states.t = VectorXd::LinSpaced(r.q.rows(), 0, r.step_s * static_cast<double>(r.q.rows() - 1));
+    return predict_fixed(model, model.formats ? *model.formats : choose_formats(model), states);
+  }
+
+  json judge(const std::string& name, const std::string& numbers, const std::string& wrong,
+             const IdentifiedModel* model, const std::vector<Move>& moves) {
+    std::vector<Outcome> outcomes(moves.size());
+    parallel_for(moves.size(), [&](std::size_t i) {
+      outcomes[i] = play(moves[i], model == nullptr ? MatrixXd() : feedforward(*model, numbers, moves[i].reference),
+                         settings_);
+      progress_.step();
+    });
+    json kinds = json::object();
+    const auto mean = [&](const std::string& kind) {
+      Outcome sum;
+      double count = 0;
+      for (std::size_t i = 0; i < moves.size(); ++i) {
+        if (kind != "all" && moves[i].kind != kind) continue;
+        ++count;
+        sum.motor += outcomes[i].motor;
+        sum.link += outcomes[i].link;
+        sum.residual += outcomes[i].residual;
+        sum.settling_s += outcomes[i].settling_s;
+        sum.roughness += outcomes[i].roughness;
+      }
+      return json{{"tracking_motor", 1e3 * std::sqrt(sum.motor / count)},
+                  {"tracking_link", 1e3 * std::sqrt(sum.link / count)},
+                  {"residual", 1e3 * sum.residual / count},
+                  {"settling_s", sum.settling_s / count},
+                  {"roughness", sum.roughness / count}};
+    };
+    for (const char* kind : {"all", "point_to_point", "reversals", "slow"}) kinds[kind] = mean(kind);
+    return {{"feedforward", name}, {"numbers", numbers}, {"parameters_off", wrong}, {"moves", kinds}};
+  }
+
+  /// Of the motors' remaining error (RMS, double in the loop): how much it is another in fixed point, and how far both
+  /// paths are apart. Exact encoders: the steps of real ones part any two runs that differ at all.
+  void compare_numbers(const std::vector<Move>& moves) {
+    ClosedLoopSettings exact = settings_;
+    exact.encoder_step = 0;
+    VectorXd error(moves.size()), fixed(moves.size()), apart(moves.size());
+    parallel_for(moves.size(), [&](std::size_t i) {
+      const Reference& reference = moves[i].reference;
+      const MatrixXd real = play(moves[i], feedforward(model_, "real", reference), exact).q;
+      const MatrixXd rounded = play(moves[i], feedforward(model_, "fixed", reference), exact).q;
+      const auto k = static_cast<Index>(i);
+      error[k] = (real - reference.q).squaredNorm();
+      fixed[k] = (rounded - reference.q).squaredNorm();
+      apart[k] = (rounded - real).squaredNorm();
+      progress_.step();
+    });
+    path_difference_ = std::sqrt(apart.sum() / error.sum());
+    error_change_ = std::fabs(std::sqrt(fixed.sum() / error.sum()) - 1);
+  }
+
+  Pipeline pipeline_;
+  IdentifiedModel model_, plant_;
+  ClosedLoopSettings settings_;
+  double path_difference_ = 0, error_change_ = 0;
+  Progress progress_;
+};
+
+}  // namespace
+
+json vibration(const fs::path& project, const fs::path& directory) {
+  const json result = Experiment(project, directory).run();
+  write_file(directory / "vibration.json", result.dump(1) + "\n");
+  return result;
+}
+
+std::string vibration_table(const json& result) {
+  const json& control = result.at("control");
+  std::string out =
+      fmt::format("PD of {:.3g} Hz, damping {:.2g} (best alone), tick {:.3g} ms; means over all moves\n",
+                  control.at("bandwidth_hz").get<double>(), control.at("damping").get<double>(),
+                  1e3 * control.at("tick_s").get<double>());
+  out += fmt::format("{:<10} {:<6} {:<7} {:>12} {:>12} {:>12} {:>11} {:>10}\n", "feedforward", "as", "off",
+                     "motor mrad", "link mrad", "residual", "settling s", "roughness");
+  for (const json& method : result.at("methods")) {
+    const json& all = method.at("moves").at("all");
+    const auto value = [&](const char* key) { return all.at(key).get<double>(); };
+    out += fmt::format("{:<11} {:<6} {:<7} {:>11.4g} {:>12.4g} {:>12.3g} {:>11.3f} {:>10.2g}\n",
+                       method.at("feedforward").get<std::string>(), method.at("numbers").get<std::string>(),
+                       method.at("parameters_off").get<std::string>(), value("tracking_motor"), value("tracking_link"),
+                       value("residual"), value("settling_s"), value("roughness"));
+  }
+  const json& numbers = result.at("fixed_against_double");
+  out += fmt::format("fixed point against double in the loop, of the remaining error: {:.2g} more or less, paths {:.2g} apart\n",
+                     numbers.at("error_change").get<double>(), numbers.at("path_difference").get<double>());
+  return out;
+}
+
+}  // namespace fxdyn

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+namespace fxdyn {
+
+/// `fxdyn vibration`: what the model is worth as feedforward of a robot whose gears bend. Returns vibration.json.
+///
+/// The robot is the one of the project's first train log with a scenario, in MuJoCo: motors and links with K, B,
+/// rotors and friction with presliding, which share no code with the model. Each joint's motor has
+///
+///   tau = kp (q_r - q) + kd (dq_r - dq) + feedforward,  kp = M w^2, kd = 2 damping M w
+///
+/// at the drive's tick, on the motor's encoder (2^22 steps a turn of the joint, dq by differences). Bandwidth and
+/// damping are the best of a grid for the PD alone, on other moves than those that are judged, and stay.
+///
+/// Feedforward: none; friction (rigid body, rotors, Coulomb and viscous friction, offset by least squares); rigid (the
+/// same without its friction); model (what diagnosis and training made: DIR/model.json). All but none are the firmware's fixed-point code, fed
+/// with the reference; the model also in double, and both once more on exact encoders (fixed_against_double: of the
+/// motors' remaining error, how much it is another, and how far the paths are apart). Then all of them with parameters 20 % too small, too large, and each
+/// parameter of the model one or the other at random.
+///
+/// Per move and over all joints:
+///   tracking_motor, tracking_link  RMS of q - q_r while it moves [mrad | mm]
+///   residual   largest |q_link - its place at the end| after the stop, mean over the joints [mrad | mm]
+///   settling_s  from the stop until every link stays within 0.2 mrad (0.2 mm) of that place
+///   roughness  RMS of the torque's change from tick to tick, of rated, mean over the joints
+/// @throws InputError: no train log comes from a scenario
+nlohmann::json vibration(const std::filesystem::path& project, const std::filesystem::path& directory);
+
+/// For the terminal.
+std::string vibration_table(const nlohmann::json& result);
+
+}  // namespace fxdyn
