@@ -353,7 +353,7 @@ Fitter::Own Fitter::own_moments(std::size_t joint, const Eigen::MatrixXd& own) c
   for (const Block& block : data_->blocks) {
     OwnMoments m{Eigen::MatrixXd::Zero(base_rows.cols(), own.cols()), Eigen::MatrixXd::Zero(own.cols(), own.cols()),
                  Eigen::VectorXd::Zero(own.cols())};
-    for (Eigen::Index from = block.from; from < block.to; from += cached_rows) {
+    for (Eigen::Index from = block.from; own.cols() > 0 && from < block.to; from += cached_rows) {
       const Eigen::Index count = std::min(cached_rows, block.to - from);
       const auto x = own.middleRows(from, count);
       const Eigen::MatrixXd wx = row_weights_[joint].segment(from, count).asDiagonal() * x;

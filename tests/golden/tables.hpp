@@ -21,6 +21,9 @@
 
 #pragma once
 
+#include <array>
+#include <cstdint>
+
 #include "model/joint_model.hpp"
 
 namespace fxdyn::tables {
@@ -205,5 +208,8 @@ using Model = RobotModel<Numbers, 0x3f,
 static_assert(page.header.words == TablePage<Model>::parameter_words && page.header.layout_hash == Model::layout_hash(),
               "these tables are for another version of the model library: export them anew");
 inline constexpr const Model::Parameters& parameters = page.parameters;
+
+/// Rated torque of every joint [mN*m | mN], what a bus counts torques in.
+inline constexpr std::array<std::int32_t, Model::joints> rated_torque{97600, 186400, 89400, 24200, 20100, 21300};
 
 }  // namespace fxdyn::tables

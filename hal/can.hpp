@@ -1,0 +1,50 @@
+#pragma once
+
+#include <array>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+
+#include "hal/status.hpp"
+
+namespace fxdyn::hal {
+
+/// One frame of a CAN bus as ISO 11898-1 knows it. `capacity`: 8 bytes in classic frames, 64 in CAN FD.
+template <std::size_t capacity>
+struct CanFrame {
+  static constexpr std::size_t most_bytes = capacity;
+  std::uint32_t id = 0;   ///< 11 bits; 29 where `extended`
+  bool extended = false;  ///< 29-bit identifier
+  bool remote = false;    ///< asks for data and carries none (classic only)
+  bool fd = false;        ///< CAN FD, with the bit rate switched in the data phase
+  std::uint8_t size = 0;  ///< bytes of `data` that count; in FD frames one of the lengths that a DLC can tell
+  std::array<std::uint8_t, capacity> data{};
+};
+using ClassicFrame = CanFrame<8>;
+using FdFrame = CanFrame<64>;
+
+/// Fault confinement, ISO 11898-1: error active below 128 errors, passive from there on, off the bus above 255 transmit
+/// errors.
+enum class CanState : std::uint8_t { active, passive, bus_off };
+
+struct CanErrors {
+  CanState state = CanState::active;
+  std::uint8_t transmit = 0, receive = 0;  ///< error counters
+  std::uint32_t lost = 0;                  ///< received frames dropped for want of room since start, as far as known
+};
+
+/// A CAN controller or socket that is open, bit rate set. No call blocks.
+///   send      ok: queued; busy: no room now; failed: not on the bus (bus-off, interface down)
+///   receive   ok: `frame` is the oldest one waiting; busy: none; failed: the device is gone
+///   restart   leaves bus-off as ISO 11898-1 has it, after 128 times 11 recessive bits; busy while that takes
+/// Nothing that a bus can carry is filtered out but frames the device's acceptance filters leave out.
+template <class T>
+concept CanBus = requires(T& bus, const typename T::Frame& out, typename T::Frame& in) {
+  { T::Frame::most_bytes } -> std::convertible_to<std::size_t>;
+  { bus.send(out) } -> std::same_as<Status>;
+  { bus.receive(in) } -> std::same_as<Status>;
+  { bus.errors() } -> std::same_as<CanErrors>;
+  { bus.restart() } -> std::same_as<Status>;
+};
+
+}  // namespace fxdyn::hal
