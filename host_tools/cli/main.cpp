@@ -105,8 +105,24 @@ int run(int argc, char** argv) {
   const CLI::App* vibration_verb = stage(
       "vibration", "The model as feedforward of the scenario's robot with gears that bend: vibration.json.");
   CLI::App* replay_verb =
-      stage("replay", "Stream the held-out logs to a firmware image in QEMU and compare bit for bit: replay.json.");
-  replay_verb->add_option("--image", image, "firmware image (.elf) made by toolchains/build_image.sh")->required();
+      stage("replay",
+            "Stream the held-out logs to a firmware image in QEMU (--image) or to drive nodes on a CAN bus (--can) and\n"
+            "compare bit for bit: replay.json, can_replay.json.");
+  auto* image_option = replay_verb->add_option("--image", image, "firmware image (.elf) made by toolchains/build_image.sh");
+  CanReplaySettings can_replay;
+  auto* can_option =
+      replay_verb->add_option("--can", can_replay.interface, "SocketCAN interface with the drives, e.g. can0")
+          ->excludes(image_option);
+  std::vector<unsigned> nodes;
+  replay_verb->add_option("--nodes", nodes, "node ids (default: whoever answers of 1 .. joints)")
+      ->delimiter(',')
+      ->check(CLI::Range(1, 127))
+      ->needs(can_option);
+  replay_verb->add_flag("--fd", can_replay.fd, "CAN FD: all setpoints in one frame")->needs(can_option);
+  replay_verb
+      ->add_flag("--closed-loop", can_replay.closed_loop,
+                 "no log: move the scenario's robot with the torque that comes over the bus")
+      ->needs(can_option);
   replay_verb->add_option("--ticks", ticks, "at most this many ticks of each log")->capture_default_str();
 
   UpdateSettings new_session;
@@ -197,7 +213,17 @@ int run(int argc, char** argv) {
     if (*train_verb) pipeline.train();
     if (*export_verb) pipeline.export_tables();
     if (*report_verb) pipeline.report();
+    if (*can_option) {
+      can_replay.most_ticks = ticks;
+      can_replay.nodes.assign(nodes.begin(), nodes.end());
+      const CanReplay done = replay_on_can(pipeline, can_replay);
+      fmt::print("{}", can_replay_table(done.result));
+      if (!done.same)
+        throw DataError(fmt::format("drives and host differ: see {}", (pipeline.directory() / "can_replay.json").string()));
+      return 0;
+    }
     if (*replay_verb) {
+      if (image.empty()) throw InputError("replay: where to? --image drive.elf (QEMU) or --can can0 (drives)");
       const Replay done = replay(pipeline, image, ticks);
       if (!done.same) throw DataError(fmt::format("firmware and host differ: see {}", done.file.string()));
       fmt::print("bit-exact: {}\n", done.file.string());

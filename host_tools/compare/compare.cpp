@@ -17,9 +17,11 @@
 #include "host_tools/files.hpp"
 #include "host_tools/identify/structure.hpp"
 #include "host_tools/log/truth.hpp"
+#include "host_tools/model/broad_learning_types.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/parallel.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
+#include "host_tools/pipeline/provenance.hpp"
 #include "host_tools/train/ridge.hpp"
 #include "host_tools/train/swarm.hpp"
 #include "host_tools/train/train.hpp"
@@ -34,7 +36,8 @@ using nlohmann::json;
 namespace fs = std::filesystem;
 
 constexpr Index mlp_nodes = 32;
-/// Of one joint's share of the rigid body (852 for six joints, counted in the generated code).
+/// Of one joint's share of the rigid body: the PUMA's (852 for six joints, counted in the generated code) for every
+/// robot.
 constexpr double rnea_multiplications = 142;
 
 /// A test log and what it is judged against.
@@ -90,16 +93,15 @@ class Comparison {
   }
 
   json run(const std::vector<std::string>& methods) {
-    const auto wanted = [&](const char* name) { return std::find(methods.begin(), methods.end(), name) != methods.end(); };
+    const auto wanted = [&](const char* name) {
+      return std::find(methods.begin(), methods.end(), name) != methods.end();
+    };
     if (wanted("rigid_ls")) structural("rigid_ls", {}, "ls");
     if (wanted("friction_ls")) structural("friction_ls", coulomb_and_viscous, "wls");
     if (wanted("rls")) structural("rls", coulomb_and_viscous, "rls");
-    if (wanted("mlp")) mlp(identify_structure(project_, data_, coulomb_and_viscous, "wls", progress_));
-    if (wanted("bls_default") || wanted("bls_pso")) {
-      const IdentifiedModel rigid = identify_structure(project_, data_, {}, "ls", progress_);
-      if (wanted("bls_default")) state_bls("bls_default", rigid, false);
-      if (wanted("bls_pso")) state_bls("bls_pso", rigid, true);
-    }
+    if (wanted("mlp")) mlp();
+    if (wanted("bls_default")) state_bls("bls_default", false);
+    if (wanted("bls_pso")) state_bls("bls_pso", true);
     if (wanted("bls_physical")) physical_bls("bls_physical", false);
     if (wanted("bls_pso_physical")) physical_bls("bls_pso_physical", true);
     if (wanted("lugre")) structural("lugre", lugre_friction, "wls");
@@ -110,6 +112,7 @@ class Comparison {
     return {{"schema", "fxdyn.compare/1"},
             {"against", against_truth_ ? "truth" : "measurement"},
             {"project_hash", project_hash(project_)},
+            {"made_from", made_from(project_, directory_, true)},
             {"paper", project_.compare.paper},
             {"methods", methods_}};
   }
@@ -128,10 +131,11 @@ class Comparison {
     out.t = log.t.segment(log.first, inside);
     out.measured = log.tau.middleRows(log.first, inside);
     out.reference = filtered(test.reference);
+    out.reference_name = against_truth_ ? "true" : "measured";
     out.torque = torque_;
     out.rated = rated_;
-    const auto train = std::find_if(data_.logs.begin(), data_.logs.end(),
-                                    [](const ProcessedLog& l) { return l.role == Role::train; });
+    const auto train =
+        std::find_if(data_.logs.begin(), data_.logs.end(), [](const ProcessedLog& l) { return l.role == Role::train; });
     out.train_t = train->t;
     out.train_q = train->q;
     if (test.truth && learned_) {
@@ -146,7 +150,7 @@ class Comparison {
   void stage(const std::string& name) { progress_.stage("compare: " + name, 1); }
 
   /// Judges a method. @param model where it is one that firmware could have
-  void add(const std::string& name, const Torque& torque, double multiplications, double train_s,
+  void add(const std::string& name, const Torque& torque, double multiplications, const json& train_s,
            const IdentifiedModel* model) {
     const auto n = static_cast<Index>(project_.robot.size());
     VectorXd square = VectorXd::Zero(n), peak = VectorXd::Zero(n), rough = VectorXd::Zero(n), rough_ref = rough;
@@ -209,12 +213,12 @@ class Comparison {
     double sum = rnea_multiplications * static_cast<double>(model.joints.size());
     for (const JointFit& joint : model.joints) {
       for (const EffectFit& fit : joint.effects) sum += static_cast<double>(fit.linear.size() + fit.shape.size());
-      if (joint.bls) sum += static_cast<double>(joint.bls->weights.size() + joint.bls->coefficients.size());
+      if (joint.bls) sum += static_cast<double>(fxdyn::multiplications(*joint.bls));
     }
     return sum;
   }
 
-  void add_model(const std::string& name, double train_s) {
+  void add_model(const std::string& name, const json& train_s) {
     add(
         name, [&](const ProcessedLog& log) { return predict(*last_, log); }, multiplications(*last_), train_s, &*last_);
   }
@@ -238,9 +242,10 @@ class Comparison {
     return out;
   }
 
-  void mlp(const IdentifiedModel& structure) {
-    stage("mlp");
+  void mlp() {
     const auto start = std::chrono::steady_clock::now();
+    const IdentifiedModel structure = identify_structure(project_, data_, coulomb_and_viscous, "wls", progress_);
+    stage("mlp");
     const std::vector<MatrixXd> rest = missing(structure);
     const std::size_t n = project_.robot.size();
     std::vector<std::optional<Mlp>> nets(n);
@@ -315,9 +320,10 @@ class Comparison {
   }
 
   /// The paper's: what the rigid body leaves, as a function of the state.
-  void state_bls(const std::string& name, const IdentifiedModel& structure, bool search) {
+  void state_bls(const std::string& name, bool search) {
     const std::size_t n = project_.robot.size();
     const auto start = std::chrono::steady_clock::now();
+    const IdentifiedModel structure = identify_structure(project_, data_, {}, "ls", progress_);
     const std::vector<MatrixXd> rest = missing(structure);
     PsoSettings pso;
     pso.particles = 12;
@@ -386,11 +392,9 @@ class Comparison {
   }
 
   void named_bls() {
-    const auto start = std::chrono::steady_clock::now();
     last_ = Pipeline(project_.file, directory_).model();
-    const double spent = seconds_since(start);
     stage("named_bls");
-    add_model("named_bls", spent);
+    add_model("named_bls", training_seconds(directory_));
   }
 
   void oracle() {
@@ -429,9 +433,8 @@ json compare_methods(const Project& project, const fs::path& directory, const st
 
 json compare(const fs::path& project, const fs::path& directory) {
   Comparison comparison(read_project(project), directory);
-  const json result =
-      comparison.run({"rigid_ls", "friction_ls", "rls", "mlp", "bls_default", "bls_pso", "bls_pso_physical", "lugre",
-                      "named_bls", "oracle", "noise_floor"});
+  const json result = comparison.run({"rigid_ls", "friction_ls", "rls", "mlp", "bls_default", "bls_pso",
+                                      "bls_pso_physical", "lugre", "named_bls", "oracle", "noise_floor"});
   write_comparison_plots(comparison.shown(), directory);
   write_file(directory / "compare.json", result.dump(1) + "\n");
   return result;
@@ -449,8 +452,16 @@ std::string compare_table(const json& comparison) {
     out += fmt::format("{:<17} {:>7.3f}  {:<48} {:>6.3f} {:>7.0f} {:>8.2f} {:>8.2f} {:>9}\n",
                        method.at("name").get<std::string>(), method.at("mean_percent_rated").get<double>(), joints,
                        method.at("smoothness").get<double>(), method.at("macs_per_tick").get<double>(),
-                       method.at("train_s").get<double>(), method.at("predict_us").get<double>(),
+                       method.at("train_s").is_null() ? NAN : method.at("train_s").get<double>(),
+                       method.at("predict_us").get<double>(),
                        fixed.is_null() ? "-" : fmt::format("{:.2g}", fixed.get<double>()));
+  }
+  out += fmt::format("\n{:<17} RMSE, peak of every joint [N*m | N]\n", "method");
+  for (const json& method : comparison.at("methods")) {
+    out += fmt::format("{:<17}", method.at("name").get<std::string>());
+    for (std::size_t j = 0; j < method.at("rmse").size(); ++j)
+      out += fmt::format(" {:.3g}, {:.3g}{}", method["rmse"][j].get<double>(), method["peak"][j].get<double>(),
+                         j + 1 < method.at("rmse").size() ? ";" : "\n");
   }
   return out;
 }

@@ -16,7 +16,9 @@ namespace fxdyn {
 ///   rmse, peak           per joint [N*m | N], over all test logs
 ///   percent_rated        rmse, % of rated torque
 ///   smoothness           RMS of d(torque)/dt over that of the reference's, mean over the joints: 1 is as smooth
-///   macs_per_tick        multiplications of one tick, all joints
+///   macs_per_tick        multiplications of one tick, all joints; the rigid body counts as the PUMA's, 142 a joint
+///   train_s              wall time from the logs to the model; named_bls: of diagnose and train when they last ran in
+///                        DIR, null where that is not known
 ///   fixed_error          largest |fixed - double| on the test logs, share of rated; null: not for firmware
 /// Methods: rigid_ls friction_ls rls mlp bls_default bls_pso bls_pso_physical lugre named_bls oracle noise_floor; the
 /// last two only where the truth is known.

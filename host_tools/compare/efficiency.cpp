@@ -8,6 +8,7 @@
 #include "host_tools/error.hpp"
 #include "host_tools/files.hpp"
 #include "host_tools/identify/identify.hpp"
+#include "host_tools/pipeline/provenance.hpp"
 #include "host_tools/progress.hpp"
 
 namespace fxdyn {
@@ -38,8 +39,8 @@ class Efficiency {
       const Log& log = logs[next++];
       const Eigen::Index rows = log.q.rows();
       const double step = (log.t[rows - 1] - log.t[0]) / static_cast<double>(rows - 1);
-      const double speed = (log.q.bottomRows(rows - 1) - log.q.topRows(rows - 1)).norm() / step /
-                           std::sqrt(static_cast<double>(rows));
+      const double speed =
+          (log.q.bottomRows(rows - 1) - log.q.topRows(rows - 1)).norm() / step / std::sqrt(static_cast<double>(rows));
       sources_.push_back({entry, log.t[0], step * static_cast<double>(rows), speed});
     }
     double fastest = 0;
@@ -57,7 +58,11 @@ class Efficiency {
     for (const double s : mixed_seconds) {
       for (const double share : slow_shares) add(mix, s, share, mixed_methods);
     }
-    return {{"schema", "fxdyn.efficiency/1"}, {"project_hash", project_hash(project_)}, {"curve", curve}, {"mix", mix}};
+    return {{"schema", "fxdyn.efficiency/1"},
+            {"project_hash", project_hash(project_)},
+            {"made_from", made_from(project_, directory_, false)},
+            {"curve", curve},
+            {"mix", mix}};
   }
 
  private:
@@ -120,6 +125,7 @@ std::string efficiency_table(const json& result) {
       out += fmt::format("{:>10g} {:>4.0f} %", point.at("seconds").get<double>(),
                          100 * point.at("slow_share").get<double>());
       for (const std::string& name : methods) out += cell(point.at("percent_rated"), name);
+      if (point.contains("failed")) out += "  -: " + point.at("failed").get<std::string>();
       out += "\n";
     }
   }

@@ -89,7 +89,7 @@ void write_comparison_plots(const ComparedLog& log, const std::filesystem::path&
           }));
   }
   write("compare_torque.svg", of_joints(log, "torque", [&](Index j) {
-          return std::vector<Curve>{{log.t, log.reference.col(j), truth_colour, 1.6, "true"},
+          return std::vector<Curve>{{log.t, log.reference.col(j), truth_colour, 1.6, log.reference_name},
                                     {log.t, predicted.col(j), learned_colour, 1, "predicted"}};
         }));
   write("compare_torque_error.svg", of_joints(log, "error", [&](Index j) {
@@ -102,7 +102,7 @@ void write_comparison_plots(const ComparedLog& log, const std::filesystem::path&
     if (found == log.torque.end()) continue;
     charts.push_back({time_label(log),
                       torque_label(log, 0, "torque"),
-                      {{log.t, log.reference.col(0), truth_colour, 1.8, "true"},
+                      {{log.t, log.reference.col(0), truth_colour, 1.8, log.reference_name},
                        {log.t, found->second.col(0), method.colour, 1.1, method.title}}});
     VectorXd mean = VectorXd::Zero(log.t.size());
     for (Index j = 0; j < log.reference.cols(); ++j) {

@@ -17,6 +17,7 @@ struct ComparedLog {
   Eigen::VectorXd t;
   Eigen::MatrixXd measured;                       ///< as it is in the log
   Eigen::MatrixXd reference;                      ///< the noise-free torque, else the measured one
+  std::string reference_name;                     ///< "true" or "measured"
   Eigen::MatrixXd rigid;                          ///< torque of the true rigid body and rotors; empty: not known
   Eigen::MatrixXd learned_friction;               ///< what bls_pso_physical adds to its rigid body
   std::map<std::string, Eigen::MatrixXd> torque;  ///< by method

@@ -49,8 +49,11 @@ std::string paper_table(const json& methods) {
   return subsection("Beside the paper's Table 2") + table.html() +
          paragraph(
              "RMSE is the mean over the joints in N m; the paper gives no unit, no robot and no test data, defines "
-             "neither its smoothness nor what its time is of. BLS-PSO is the paper's, on q, dq, ddq. Only the order of "
-             "the methods can be compared.");
+             "neither its smoothness nor what its time is of. BLS-PSO is the paper's, on q, dq, ddq, and learns what "
+             "the rigid "
+             "body leaves, while the MLP and RLS have Coulomb and viscous friction as well. Only the order of the "
+             "methods "
+             "can be compared.");
 }
 
 }  // namespace
@@ -62,7 +65,8 @@ std::string comparison_section(const json& comparison, const std::filesystem::pa
   out += paragraph("Every method had the same train and validate logs; errors on the test logs, against the " +
                    comparison.at("against").get<std::string>() + ".");
   std::vector<Cell> head{{"method"}, {"mean of rated", "n"}};
-  for (std::size_t j = 0; j < methods.at(0).at("rmse").size(); ++j) head.push_back({fmt::format("joint {}", j + 1), "n"});
+  for (std::size_t j = 0; j < methods.at(0).at("rmse").size(); ++j)
+    head.push_back({fmt::format("joint {}", j + 1), "n"});
   for (const char* name : {"smoothness", "multiplications a tick", "training [s]", "us a prediction", "fixed - double"})
     head.push_back({name, "n"});
   Table table(head);
@@ -73,7 +77,8 @@ std::string comparison_section(const json& comparison, const std::filesystem::pa
       row.push_back({fmt::format("{:.3g} %", share.get<double>()), "n"});
     row.push_back(number(method.at("smoothness"), 3));
     row.push_back({fmt::format("{:.0f}", method.at("macs_per_tick").get<double>()), "n"});
-    row.push_back(number(method.at("train_s"), 3));
+    const json& train_s = method.at("train_s");
+    row.push_back(train_s.is_null() ? Cell{"-", "n"} : number(train_s, 3));
     row.push_back(number(method.at("predict_us"), 2));
     const json& fixed = method.at("fixed_error");
     row.push_back(fixed.is_null() ? Cell{"-", "n"} : Cell{fmt::format("{:.1e}", fixed.get<double>()), "n"});
@@ -81,8 +86,21 @@ std::string comparison_section(const json& comparison, const std::filesystem::pa
   }
   out += table.html();
   out += paragraph(
-      "RMSE of each joint as a share of its rated torque. Smoothness: how much the torque changes from sample to sample "
+      "RMSE of each joint as a share of its rated torque. Smoothness: how much the torque changes from sample to "
+      "sample "
       "(RMS) beside the reference; 1 is as smooth. Fixed - double: the largest difference, of rated torque.");
+  std::vector<Cell> joints_head{{"RMSE, peak [N*m | N]"}};
+  for (std::size_t j = 0; j < methods.at(0).at("rmse").size(); ++j)
+    joints_head.push_back({fmt::format("joint {}", j + 1), "n"});
+  Table absolute(joints_head);
+  for (const json& method : methods) {
+    std::vector<Cell> row{{method.at("name").get<std::string>()}};
+    for (std::size_t j = 0; j < method.at("rmse").size(); ++j)
+      row.push_back(
+          {fmt::format("{:.3g}, {:.3g}", method["rmse"][j].get<double>(), method["peak"][j].get<double>()), "n"});
+    absolute.add(row);
+  }
+  out += absolute.html();
   if (comparison.value("paper", false)) out += paper_table(methods);
   for (const ComparisonPlot& plot : comparison_plots) {
     const std::filesystem::path file = directory / "plots" / plot.file;
@@ -96,7 +114,8 @@ std::string vibration_section(const json& vibration) {
   const json& control = vibration.at("control");
   std::string out = section("Vibration");
   out += paragraph(fmt::format(
-      "The scenario's robot in closed loop, gears that bend and friction on its motors, in a simulator that shares no code "
+      "The scenario's robot in closed loop, gears that bend and friction on its motors, in a simulator that shares no "
+      "code "
       "with the model. PD of {:.3g} Hz and damping {:.2g}, the best of a grid without feedforward; tick {:.3g} ms.",
       control.at("bandwidth_hz").get<double>(), control.at("damping").get<double>(),
       1e3 * control.at("tick_s").get<double>()));
@@ -123,8 +142,11 @@ std::string vibration_section(const json& vibration) {
     out += subsection(std::string("Moves: ") + kind) + table.html();
   }
   return out + paragraph(
-                   "Motor, link: RMS of the position error while it moves. Residual: how far a link is from where it comes to rest, "
-                   "at most, after the stop, mean over the joints. Settling: until every link stays within 0.2 mrad of that. "
+                   "Motor, link: RMS of the position error while it moves. Residual: how far a link is from where it "
+                   "comes to rest, "
+                   "at most, after the stop, mean over the joints. Settling: until every link stays within a quarter "
+                   "of what it is "
+                   "off at most with the PD alone. "
                    "Roughness: RMS of the torque's change from tick to tick.");
 }
 
@@ -148,7 +170,8 @@ std::string efficiency_section(const json& efficiency) {
       const auto vector = [](const std::vector<double>& v) {
         return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size())));
       };
-      chart.curves.push_back({vector(points.first), vector(points.second), colours[chart.curves.size() % 6], 1.6, title});
+      chart.curves.push_back(
+          {vector(points.first), vector(points.second), colours[chart.curves.size() % 6], 1.6, title});
     }
     return draw({chart}, 1);
   };

@@ -11,6 +11,7 @@
 #include <numbers>
 
 #include "host_tools/error.hpp"
+#include "host_tools/log/log_file.hpp"
 #include "host_tools/files.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/simulate/simulate.hpp"
@@ -246,6 +247,9 @@ class ProjectReader {
         const std::vector<double> ends = value->numbers(2, "lower, upper");
         if (!(ends[0] >= least && ends[0] <= ends[1] && ends[1] <= most))
           value->place().fail(fmt::format("expected {:g} <= lower <= upper <= {:g}", least, most));
+        const bool whole = key != std::string_view("ridge");
+        if (whole && (ends[0] != std::floor(ends[0]) || ends[1] != std::floor(ends[1])))
+          value->place().fail("expected whole numbers");
         to = {ends[0], ends[1]};
       };
       read(pso.windows, "windows", 1, 100);
@@ -368,8 +372,9 @@ class ProjectReader {
         const double from = std::max(a.from_s.value_or(-infinity), b.from_s.value_or(-infinity));
         const double to = std::min(a.to_s.value_or(infinity), b.to_s.value_or(infinity));
         if (from < to) {
-          throw InputError(fmt::format("{}:{}: overlaps the log in line {} ({}); separate them by from_s and to_s", file_,
-                                       b.line, a.line, copy ? "the same content under another name" : "same file"));
+          throw InputError(fmt::format("{}:{}: overlaps the log in line {} ({}); separate them by from_s and to_s",
+                                       file_, b.line, a.line,
+                                       copy ? "the same content under another name" : "same file"));
         }
       }
     }
@@ -383,8 +388,7 @@ class ProjectReader {
 
 /// The log of a scenario; simulated where it is missing or older than the scenario.
 fs::path simulated(const LogEntry& entry, const Project& project, const fs::path& directory) {
-  const fs::path folder = directory / "logs" / entry.scenario->stem();
-  const fs::path file = folder / (entry.scenario_log + ".csv");
+  const fs::path file = log_file(entry, directory), folder = file.parent_path();
   // Of the scenario and its URDF, not the time stamps: a checkout or a copy changes those.
   const std::string hash = scenario_hash(*entry.scenario);
   const fs::path hash_file = folder / "scenario.hash";
@@ -420,6 +424,10 @@ bool Project::has_role(Role role) const {
 }
 
 Project read_project(const fs::path& file) { return ProjectReader(file).read(); }
+
+fs::path log_file(const LogEntry& entry, const fs::path& directory) {
+  return entry.scenario ? directory / "logs" / entry.scenario->stem() / (entry.scenario_log + ".csv") : entry.file;
+}
 
 std::vector<Log> read_logs(const Project& project, Role role, const fs::path& directory) {
   std::vector<bool> revolute;

@@ -39,4 +39,9 @@ inline Eigen::Index bls_inputs(const BroadLearningFit& fit) {
   return static_cast<Eigen::Index>(count);
 }
 
+/// Of one evaluation; biases are added.
+inline Eigen::Index multiplications(const BroadLearningFit& fit) {
+  return fit.nodes() * (fit.input_count() + 1) + fit.input_count();
+}
+
 }  // namespace fxdyn

@@ -1,8 +1,9 @@
 #include "host_tools/pipeline/pipeline.hpp"
 
-#include <nlohmann/json.hpp>
-
 #include <fmt/format.h>
+
+#include <chrono>
+#include <nlohmann/json.hpp>
 
 #include "host_tools/diagnose/diagnose.hpp"
 #include "host_tools/diagnose/evidence.hpp"
@@ -12,6 +13,7 @@
 #include "host_tools/export/proof.hpp"
 #include "host_tools/files.hpp"
 #include "host_tools/identify/payload.hpp"
+#include "host_tools/pipeline/provenance.hpp"
 #include "host_tools/report/metrics.hpp"
 #include "host_tools/report/report.hpp"
 #include "host_tools/robot/write_urdf.hpp"
@@ -33,6 +35,24 @@ constexpr double tight_enough = 2;
 /// ... or this many boxes were looked at.
 constexpr int proof_boxes = 40'000;
 constexpr Eigen::Index random_states = 20'000;
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+/// Settings of the grid that a swarm chooses itself. Sparse features have windows of nodes, which it does not.
+std::string unused_beside_swarm(const TrainSettings& settings) {
+  if (!settings.enabled || !settings.pso) return {};
+  const bool sparse = settings.features == "sparse";
+  std::string out;
+  const auto add = [&](bool given, const char* key) {
+    if (given) out += (out.empty() ? "" : ", ") + std::string(key);
+  };
+  add(settings.windows && !sparse, "windows");
+  add(settings.nodes && !sparse, "nodes");
+  add(settings.enhancement.has_value(), "enhancement");
+  add(settings.ridge.has_value(), "ridge");
+  return out;
+}
 
 std::string weak_note(const std::vector<WeakParameter>& weak, const Robot& robot) {
   if (weak.empty()) return {};
@@ -199,6 +219,7 @@ void Pipeline::identify() {
 }
 
 void Pipeline::diagnose() {
+  const auto start = Clock::now();
   data().notes = data_notes_;
   std::vector<ProcessedLog> baseline;
   for (Log& log : read_logs(project_, Role::baseline, directory_)) {
@@ -238,14 +259,20 @@ void Pipeline::diagnose() {
   progress_.done();
   for (const std::string& note : data().notes) fmt::print(stderr, "note: {}\n", note);
   if (!no_plots.empty()) fmt::print(stderr, "note: no plots of the diagnosis: {}\n", no_plots);
+  note_seconds(directory_, "diagnose", seconds_since(start));
 }
 
 void Pipeline::train() {
   const TrainSettings& settings = project_.train;
   check_motion();
+  std::string inputs = project_hash(project_);
+  for (const LogReference& log : data().references) inputs += log.hash;
+  ResumeFile resume{directory_ / "train.pso.json", {}, hash_of(inputs)};
+  if (settings.enabled && settings.pso) resume.check_inputs();
   // An updated model is not what diagnosis left.
   if (const auto before = written({"diagnosed", "trained"}); !before || !before->updates.empty()) diagnose();
   // Always from the files: `fxdyn run` gives the same bytes as the verbs one by one.
+  const auto start = Clock::now();
   const IdentifiedModel diagnosed = read_model(directory_ / "model.json");
   json stages = json::array();
   if (const fs::path file = directory_ / "metrics.json"; fs::exists(file)) {
@@ -255,6 +282,11 @@ void Pipeline::train() {
     }
   }
   data().notes = diagnosed.notes;
+  if (const std::string unused = unused_beside_swarm(settings); !unused.empty()) {
+    const std::string note =
+        fmt::format("train.{}: not used, the swarm of [train.pso] chooses within its bounds", unused);
+    if (std::find(data().notes.begin(), data().notes.end(), note) == data().notes.end()) data().notes.push_back(note);
+  }
   const KeptEffects kept(diagnosed, data().logs);
   kept.mark_hidden(data().logs);
   progress_.stage("building the regressor", 1);
@@ -274,7 +306,7 @@ void Pipeline::train() {
   json training = json::array();
   if (settings.enabled) {
     // The model holds the hashes of project and logs: all that the outcome depends on.
-    const ResumeFile resume{directory_ / "train.pso.json", hash_of(to_json(diagnosed).dump())};
+    resume.identity = hash_of(to_json(diagnosed).dump());
     const auto outcomes = fxdyn::train(fitter, settings, progress_, resume);
     for (std::size_t j = 0; j < outcomes.size(); ++j) {
       training.push_back({{"joint", project_.robot.joints[j].name},
@@ -325,8 +357,10 @@ void Pipeline::train() {
   json metrics = fit_metrics(fitter, estimate, stages);
   metrics["training"] = training;
   write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
+  fs::remove(resume.path);  // not before the outcome is about to be written: a search can take hours
   write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
   write_information(stored, read_model(directory_ / "model.json"), directory_);
+  note_seconds(directory_, "train", seconds_since(start));
 }
 
 IdentifiedModel Pipeline::model() {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json_fwd.hpp>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "host_tools/identify/identify.hpp"
@@ -77,5 +77,23 @@ struct Replay {
 };
 /// `fxdyn replay`: streams the test logs (and a perturbed copy) to the firmware image under QEMU.
 Replay replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index max_ticks);
+
+struct CanReplaySettings {
+  std::string interface;            ///< as in "can0"
+  std::vector<std::uint8_t> nodes;  ///< ids; empty: whoever answers of 1 .. number of joints
+  bool fd = false;
+  bool closed_loop = false;  ///< no log: the vibration experiment with the torque of the bus
+  Eigen::Index most_ticks = 20000;
+};
+struct CanReplay {
+  bool same = false;  ///< every torque frame byte for byte, none lost
+  nlohmann::json result;
+};
+/// `fxdyn replay --can`: streams the test and validate logs under SYNC to the drive nodes of a bus, in lockstep,
+/// compares every torque frame with the host's fixed-point model and the torque with the measured one:
+/// DIR/can_replay.json.
+/// @throws InputError: no such interface, it is down, no node answers, other tables
+CanReplay replay_on_can(Pipeline& pipeline, const CanReplaySettings& settings);
+std::string can_replay_table(const nlohmann::json& result);
 
 }  // namespace fxdyn

@@ -364,6 +364,11 @@ void write_report(const IdentifiedModel& fitted, const std::vector<ProcessedLog>
   page += comparison_section(results.compared, directory);
   page += efficiency_section(results.efficiency);
   page += vibration_section(results.vibration);
+  for (const std::string& verb : results.stale) {
+    page += paragraph(fmt::format(
+        "{}.json is of another project file, other logs or another model and left out: run `fxdyn {}` again.", verb,
+        verb));
+  }
   page += effects_section(model);
   page += base_section(model);
   page += fixed_point_section(model, results.exported);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "host_tools/files.hpp"
+#include "host_tools/pipeline/provenance.hpp"
 
 namespace fxdyn {
 namespace {
@@ -33,12 +34,17 @@ json read_diagnosis(const fs::path& directory, const json& model) {
   return read_json(directory / "diagnosis.json");
 }
 
-/// Null where the file is missing or of another project than the model's.
-json read_of_project(const fs::path& file, const json& model) {
-  json content = read_json(file);
-  const bool same =
-      !content.is_null() && !model.is_null() && content.value("project_hash", json()) == model.value("project_hash", json(""));
-  return same ? content : json();
+/// Null where the file is missing or of another project than the model's, other logs or another model.
+json read_of_inputs(const std::string& verb, const fs::path& directory, const json& model,
+                    std::vector<std::string>& stale) {
+  json content = read_json(directory / (verb + ".json"));
+  if (content.is_null()) return content;
+  const bool same = !model.is_null() &&
+                    content.value("project_hash", json()) == model.value("project_hash", json("")) &&
+                    is_unchanged(content.value("made_from", json()), directory);
+  if (same) return content;
+  stale.push_back(verb);
+  return {};
 }
 
 std::string shown_role(const json& logs) {
@@ -68,9 +74,9 @@ Results read_results(const fs::path& directory) {
   results.exported = read_of_tables(directory / "export.json", model);
   results.replayed = read_of_tables(directory / "replay.json", model);
   results.diagnosis = read_diagnosis(directory, model);
-  results.compared = read_of_project(directory / "compare.json", model);
-  results.efficiency = read_of_project(directory / "efficiency.json", model);
-  results.vibration = read_of_project(directory / "vibration.json", model);
+  results.compared = read_of_inputs("compare", directory, model, results.stale);
+  results.efficiency = read_of_inputs("efficiency", directory, model, results.stale);
+  results.vibration = read_of_inputs("vibration", directory, model, results.stale);
   if (!results.metrics.is_null()) results.role = shown_role(results.metrics.at("logs"));
   return results;
 }

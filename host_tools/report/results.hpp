@@ -3,14 +3,16 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 namespace fxdyn {
 
 /// What the stages left in DIR, as far as it belongs together: an export or a replay of other tables
 /// than the model's (CRC) counts as missing (null), and so does a diagnosis of other logs or another
-/// project, and what compare, efficiency and vibration wrote for another project file.
+/// project, and what compare, efficiency and vibration wrote for another project file, other logs or another model.
 struct Results {
   nlohmann::json metrics, exported, replayed, diagnosis, compared, efficiency, vibration;
+  std::vector<std::string> stale;  ///< verbs whose results are left out because they belong to something else
   std::string role;  ///< of the logs that a reader wants to see: test, else validate, else train
 };
 Results read_results(const std::filesystem::path& directory);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <functional>
 
 #include "host_tools/error.hpp"
 #include "host_tools/model/identified_model.hpp"
@@ -30,6 +31,9 @@ struct ClosedLoopSettings {
   /// What the controller sees of q is rounded to this, and its dq is what that changed by since it acted last; 0: it
   /// sees both exactly [rad | m].
   double encoder_step = 0;
+  /// Torque that a drive adds at this sample of the reference, asked for when its time has come [N*m | N]; empty: none.
+  /// Of closed_loop_on_mujoco().
+  std::function<Eigen::VectorXd(Eigen::Index)> drive{};
 };
 
 /// What a controller sees of the motors.

@@ -214,6 +214,7 @@ PlantRun closed_loop_on_mujoco(const IdentifiedModel& plant, const Reference& re
       tau = kp.cwiseProduct(reference.q.row(k).transpose() - seen.q()) +
             kd.cwiseProduct(reference.dq.row(k).transpose() - seen.dq());
       if (reference.feedforward.size() > 0) tau += reference.feedforward.row(k).transpose();
+      if (settings.drive) tau += settings.drive(k);
       if (k == 0) before = tau;
     }
     run.q.row(k) = robot.now().q;

@@ -48,7 +48,7 @@ MatrixXd to_columns(const json& j, Index rows, Index cols) {
 }  // namespace
 
 Swarm::Swarm(VectorXd lower, VectorXd upper, const SwarmSettings& settings)
-    : lower_(std::move(lower)), upper_(std::move(upper)), settings_(settings), best_value_(never) {
+    : lower_(std::move(lower)), upper_(std::move(upper)), settings_(settings), best_value_(never), milestone_(never) {
   const Index d = lower_.size(), n = settings_.particles;
   x_.resize(d, n);
   v_.resize(d, n);
@@ -69,7 +69,6 @@ Swarm::Swarm(VectorXd lower, VectorXd upper, const SwarmSettings& settings)
 bool Swarm::finished() const { return generation_ > settings_.iterations || stalled_ >= settings_.stall; }
 
 void Swarm::tell(const VectorXd& values) {
-  const double before = best_value_;
   for (Index p = 0; p < x_.cols(); ++p) {
     const double value = std::isfinite(values[p]) ? values[p] : never;
     if (value < own_value_[p]) {
@@ -81,7 +80,9 @@ void Swarm::tell(const VectorXd& values) {
       best_ = x_.col(p);
     }
   }
-  const bool progress = best_value_ < before - settings_.tolerance * std::fabs(before);
+  // Against the last progress, not the last generation: many steps too small to count one by one add up.
+  const bool progress = best_value_ < milestone_ - settings_.tolerance * std::fabs(milestone_);
+  if (progress) milestone_ = best_value_;
   stalled_ = progress ? 0 : stalled_ + 1;
   ++generation_;
   if (!finished()) move();
@@ -110,7 +111,8 @@ json Swarm::to_json() const {
   return {{"generation", generation_},      {"stalled", stalled_},
           {"positions", columns(x_)},       {"velocities", columns(v_)},
           {"own_best", columns(own_best_)}, {"own_value", columns(own_value_)},
-          {"best", columns(best_)},         {"best_value", best_value_}};
+          {"best", columns(best_)},         {"best_value", best_value_},
+          {"milestone", milestone_}};
 }
 
 void Swarm::from_json(const json& state) {
@@ -118,14 +120,21 @@ void Swarm::from_json(const json& state) {
   const MatrixXd x = to_columns(state.at("positions"), d, n), v = to_columns(state.at("velocities"), d, n),
                  own = to_columns(state.at("own_best"), d, n), value = to_columns(state.at("own_value"), n, 1),
                  best = to_columns(state.at("best"), d, 1);
-  const double least = state.at("best_value");
+  const double least = state.at("best_value"), milestone = state.at("milestone");
   const int generation = state.at("generation"), stalled = state.at("stalled");
+  const auto in_box = [&](const MatrixXd& positions) {
+    return positions.allFinite() && ((positions.colwise() - lower_).array() >= 0).all() &&
+           ((positions.colwise() - upper_).array() <= 0).all();
+  };
+  if (generation < 0 || stalled < 0 || !in_box(x) || !in_box(own) || !in_box(best) || !v.allFinite())
+    throw InputError("not a state that a search can be in");
   x_ = x;
   v_ = v;
   own_best_ = own;
   own_value_ = value;
   best_ = best;
   best_value_ = least;
+  milestone_ = milestone;
   generation_ = generation;
   stalled_ = stalled;
 }

@@ -58,6 +58,7 @@ class Swarm {
   Eigen::MatrixXd x_, v_, own_best_;
   Eigen::VectorXd own_value_, best_;
   double best_value_;
+  double milestone_;  ///< best value when the search last made progress
 };
 
 }  // namespace fxdyn

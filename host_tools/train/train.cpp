@@ -87,27 +87,39 @@ Choice by_grid(const Fitter& fitter, std::size_t j, const TrainSettings& setting
 }
 
 void save(const ResumeFile& file, const std::vector<Swarm>& swarms) {
-  json state = {{"schema", "fxdyn.pso/1"}, {"identity", file.identity}, {"swarms", json::array()}};
+  json state = {
+      {"schema", "fxdyn.pso/1"}, {"identity", file.identity}, {"inputs", file.inputs}, {"swarms", json::array()}};
   for (const Swarm& swarm : swarms) state["swarms"].push_back(swarm.to_json());
   write_file(file.path, state.dump() + "\n");
 }
 
-void load(const ResumeFile& file, std::vector<Swarm>& swarms) {
-  if (!std::filesystem::exists(file.path)) return;
-  const std::string refused = fmt::format(
+DataError of_another(const ResumeFile& file) {
+  return DataError(fmt::format(
       "{}: the generations in it are of another project, other logs or other settings; remove it to start anew",
-      file.path.string());
+      file.path.string()));
+}
+
+/// Calls read(state) with what the file holds, if there is one.
+template <class Read>
+void with_state(const ResumeFile& file, Read&& read) {
+  if (!std::filesystem::exists(file.path)) return;
   try {
     const json state = json::parse(read_file(file.path));
-    if (state.at("schema") != "fxdyn.pso/1" || state.at("identity") != file.identity) throw DataError(refused);
-    if (state.at("swarms").size() != swarms.size()) throw DataError(refused);
-    for (std::size_t j = 0; j < swarms.size(); ++j) swarms[j].from_json(state["swarms"][j]);
+    if (state.at("schema") != "fxdyn.pso/1" || state.at("inputs") != file.inputs) throw of_another(file);
+    read(state);
   } catch (const json::exception&) {
     throw DataError(
         fmt::format("{}: not a generation of a search, or cut off; remove it to start anew", file.path.string()));
   } catch (const InputError&) {
-    throw DataError(refused);
+    throw of_another(file);
   }
+}
+
+void load(const ResumeFile& file, std::vector<Swarm>& swarms) {
+  with_state(file, [&](const json& state) {
+    if (state.at("identity") != file.identity || state.at("swarms").size() != swarms.size()) throw of_another(file);
+    for (std::size_t j = 0; j < swarms.size(); ++j) swarms[j].from_json(state["swarms"][j]);
+  });
 }
 
 /// All joints, generation by generation: with few joints left the particles still fill all cores.
@@ -155,11 +167,14 @@ std::vector<Choice> by_swarm(const Fitter& fitter, const TrainSettings& settings
     if (!best.quiet) best.design.bls.reset();
     chosen[j] = {std::move(best.design), std::move(best.judgement), swarms[j].generation() * pso.particles};
   });
-  if (resume) std::filesystem::remove(resume->path);
   return chosen;
 }
 
 }  // namespace
+
+void ResumeFile::check_inputs() const {
+  with_state(*this, [](const json&) {});
+}
 
 std::vector<TrainOutcome> train(Fitter& fitter, const TrainSettings& settings, Progress& progress,
                                 const std::optional<ResumeFile>& resume) {

@@ -16,10 +16,14 @@ struct TrainOutcome {
   int evaluations = 0;
 };
 
-/// Where a search by swarm keeps its last generation, so that a killed run goes on from there.
+/// Where a search by swarm keeps its last generation, so that a killed run goes on from there. Whoever has written the
+/// outcome down removes it.
 struct ResumeFile {
   std::filesystem::path path;
   std::string identity;  ///< of everything that the outcome depends on
+  std::string inputs;    ///< of project and logs, which are known before the work starts
+  /// @throws DataError: there is one, of other inputs
+  void check_inputs() const;
 };
 
 /// Fits a BLS on every joint together with the structure (joint least squares, ridge on the BLS's coefficients),

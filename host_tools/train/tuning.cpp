@@ -153,12 +153,10 @@ BlsFitness::Outcome BlsFitness::operator()(const Eigen::VectorXd& x) const {
   out.design = design_of_(space_(x));
   out.judgement = fitter_->held_out_with(joint_, out.design, {out.design.bls->ridge})[0];
   const double rated = out.design.rated_torque;
-  const double nodes = static_cast<double>(out.design.bls->nodes());
-  const auto inputs = static_cast<double>(out.design.bls->input_count());
-  const double multiplications = nodes * (inputs + 1) + inputs;
+  const auto products = static_cast<double>(multiplications(*out.design.bls));
   out.quiet = is_quiet(out.judgement, rated);
   out.value = (out.judgement.rmse + node_rounding * out.judgement.coefficient_sum) / rated +
-              price_of_multiplication * multiplications;
+              price_of_multiplication * products;
   if (!out.quiet) out.value *= price_of_noise;
   return out;
 }

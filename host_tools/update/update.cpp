@@ -27,6 +27,8 @@ namespace fs = std::filesystem;
 
 /// Of the new log, in time: what refits; the rest judges.
 constexpr double refit_share = 2.0 / 3;
+/// Shorter ones show too little of the motion to say anything of it.
+constexpr double shortest_s = 6;
 
 PageHeader header_of(const fs::path& page) {
   const std::string bytes = read_file(page);
@@ -82,8 +84,13 @@ NewSession read_session(const Pipeline& pipeline, const IdentifiedModel& model, 
   double cut_s = 0;
   {
     const Log whole = read_log_for(model, file, {}, {});
-    check_torque(whole, model.robot);
     const double from = whole.t[0], to = whole.t[whole.samples() - 1];
+    if (to - from < shortest_s)
+      throw DataError(
+          fmt::format("{}: {:.1f} s are too short to refit from two thirds and judge by the rest; record {:g} s "
+                      "at least",
+                      file.string(), to - from, shortest_s));
+    check_torque(whole, model.robot);
     cut_s = from + refit_share * (to - from);
     out.refit_s = cut_s - from;
     out.held_out_s = to - cut_s;

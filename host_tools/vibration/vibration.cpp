@@ -13,10 +13,12 @@
 #include "host_tools/identify/structure.hpp"
 #include "host_tools/parallel.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
+#include "host_tools/pipeline/provenance.hpp"
 #include "host_tools/random.hpp"
 #include "host_tools/simulate/mujoco_plant.hpp"
 #include "host_tools/simulate/scenario.hpp"
 #include "host_tools/vibration/moves.hpp"
+#include "model/catalogue.hpp"
 
 namespace fxdyn {
 namespace {
@@ -28,24 +30,45 @@ using nlohmann::json;
 namespace fs = std::filesystem;
 
 constexpr std::array<double, 8> bandwidths{4, 8, 16, 24, 32, 48, 64, 96};  // Hz
-constexpr std::array<double, 5> dampings{0.3, 0.5, 0.7, 1, 1.4};
+constexpr std::array<double, 7> dampings{0.1, 0.2, 0.3, 0.5, 0.7, 1, 1.4};
 constexpr double encoder_step = 2 * std::numbers::pi / (1 << 22);
-constexpr double still = 0.2e-3;  ///< rad | m
+constexpr double still = 0.25;  ///< of the residual of the PD alone
 constexpr std::uint64_t tuning_moves = 1, judged_moves = 2;
 
 /// What one move comes to.
 struct Outcome {
-  double motor = 0, link = 0;   ///< mean squares of the error while it moves [rad^2 | m^2]
-  double with_rest = 0;         ///< the link's, to the end
-  double residual = 0;          ///< [rad | m]
+  double motor = 0, link = 0;  ///< mean squares of the error while it moves [rad^2 | m^2]
+  double with_rest = 0;        ///< the link's, to the end
+  double residual = 0;         ///< [rad | m]
   double settling_s = 0, roughness = 0;
-  MatrixXd q;                   ///< of the motors
+  MatrixXd q;  ///< of the motors
 };
 
 class Experiment {
  public:
   Experiment(const fs::path& project, const fs::path& directory)
       : pipeline_(project, directory), model_(with_tables()), plant_(scenario_plant()) {}
+
+  json with_drive(const Feedforward& drive) {
+    tune();
+    const std::vector<Move> moves = make_moves(model_, model_.tick_s, judged_moves);
+    progress_.stage("vibration: the drive in the loop", moves.size() * 3);
+    set_band(moves);
+    json methods = json::array();
+    methods.push_back(judge("none", "-", "none", nullptr, moves));
+    methods.push_back(judge("model", "fixed", "none", &model_, moves));
+    std::vector<Outcome> outcomes;
+    ClosedLoopSettings settings = settings_;
+    settings.drive = drive.torque;
+    for (const Move& move : moves) {
+      drive.begin(move.reference);
+      outcomes.push_back(play(move, {}, settings));
+      progress_.step();
+    }
+    methods.push_back(summary("model", "drive", "none", moves, outcomes));
+    progress_.done();
+    return {{"schema", "fxdyn.vibration/1"}, {"control", control_json()}, {"methods", methods}};
+  }
 
   json run() {
     tune();
@@ -58,9 +81,9 @@ class Experiment {
     };
     GateData data = read_gate_data(pipeline_.project(), pipeline_.directory());
     Progress quiet;
-    const IdentifiedModel friction =
-        identify_structure(pipeline_.project(), data, coulomb_and_viscous, "wls", quiet);
+    const IdentifiedModel friction = identify_structure(pipeline_.project(), data, coulomb_and_viscous, "wls", quiet);
     const IdentifiedModel rigid = rigid_part(friction);
+    set_band(moves);
     add("none", "-", "none", nullptr);
     add("rigid", "fixed", "none", &rigid);
     add("friction", "fixed", "none", &friction);
@@ -69,8 +92,8 @@ class Experiment {
     compare_numbers(moves);
     for (const double factor : {0.8, 1.2}) {
       const std::string error = factor < 1 ? "-20 %" : "+20 %";
-      for (const auto& [name, model] : {std::pair("rigid", &rigid), std::pair("friction", &friction),
-                                        std::pair("model", &std::as_const(model_))}) {
+      for (const auto& [name, model] :
+           {std::pair("rigid", &rigid), std::pair("friction", &friction), std::pair("model", &std::as_const(model_))}) {
         const IdentifiedModel wrong = scaled(*model, [&] { return factor; });
         add(name, "fixed", error, &wrong);
       }
@@ -81,17 +104,26 @@ class Experiment {
     progress_.done();
     return {{"schema", "fxdyn.vibration/1"},
             {"project_hash", model_.project_hash},
-            {"control",
-             {{"bandwidth_hz", settings_.bandwidth_hz},
-              {"damping", settings_.damping},
-              {"tick_s", model_.tick_s},
-              {"encoder_step", encoder_step},
-              {"grid", {{"bandwidth_hz", bandwidths}, {"damping", dampings}}}}},
+            {"made_from", made_from(pipeline_.project(), pipeline_.directory(), true)},
+            {"control", control_json()},
             {"methods", methods},
             {"fixed_against_double", {{"error_change", error_change_}, {"path_difference", path_difference_}}}};
   }
 
  private:
+  json control_json() const {
+    return {{"bandwidth_hz", settings_.bandwidth_hz},
+            {"damping", settings_.damping},
+            {"tick_s", model_.tick_s},
+            {"encoder_step", encoder_step},
+            {"settling_band", band_},
+            {"grid", {{"bandwidth_hz", bandwidths}, {"damping", dampings}}}};
+  }
+
+  void set_band(const std::vector<Move>& moves) {
+    for (const Move& move : moves) band_ = std::max(band_, still * play(move, {}, settings_).residual);
+  }
+
   IdentifiedModel with_tables() {
     IdentifiedModel model = pipeline_.model();
     if (model.formats) return model;
@@ -101,7 +133,14 @@ class Experiment {
 
   IdentifiedModel scenario_plant() const {
     for (const LogEntry& entry : pipeline_.project().logs) {
-      if (entry.role == Role::train && entry.scenario) return read_scenario(*entry.scenario).plant;
+      if (entry.role != Role::train || !entry.scenario) continue;
+      IdentifiedModel plant = read_scenario(*entry.scenario).plant;
+      const bool bends = std::any_of(plant.joints.begin(), plant.joints.end(),
+                                     [](const JointFit& joint) { return joint.find(Elasticity::name) != nullptr; });
+      if (!bends)
+        fmt::print(stderr, "note: no gear of {} bends (effect \"elasticity\"): there is little to vibrate\n",
+                   entry.scenario->string());
+      return plant;
     }
     throw InputError(fmt::format("{}: vibration needs a robot to move: a train log with scenario = \"x.toml\"",
                                  pipeline_.project().file.string()));
@@ -125,7 +164,7 @@ class Experiment {
     const MatrixXd off = (link.bottomRows(after).rowwise() - end).cwiseAbs();
     out.residual = off.colwise().maxCoeff().mean();
     for (Index k = 0; k < after; ++k) {
-      if (off.row(k).maxCoeff() > still) out.settling_s = run.step_s * static_cast<double>(k + 1);
+      if (off.row(k).maxCoeff() > band_) out.settling_s = run.step_s * static_cast<double>(k + 1);
     }
     for (Index j = 0; j < n; ++j) {
       const VectorXd torque = run.tau.col(j).segment(move.start, moving);
@@ -166,8 +205,8 @@ class Experiment {
   template <class Factor>
   static IdentifiedModel scaled(IdentifiedModel model, Factor factor) {
     for (LinkInertia<Real>& link : model.inertia) {
-      for (double* value : {&link.m, &link.h.x, &link.h.y, &link.h.z, &link.xx, &link.yy, &link.zz, &link.xy, &link.xz,
-                            &link.yz})
+      for (double* value :
+           {&link.m, &link.h.x, &link.h.y, &link.h.z, &link.xx, &link.yy, &link.zz, &link.xy, &link.xz, &link.yz})
         *value *= factor();
     }
     for (JointFit& joint : model.joints) {
@@ -190,10 +229,15 @@ class Experiment {
              const IdentifiedModel* model, const std::vector<Move>& moves) {
     std::vector<Outcome> outcomes(moves.size());
     parallel_for(moves.size(), [&](std::size_t i) {
-      outcomes[i] = play(moves[i], model == nullptr ? MatrixXd() : feedforward(*model, numbers, moves[i].reference),
-                         settings_);
+      outcomes[i] =
+          play(moves[i], model == nullptr ? MatrixXd() : feedforward(*model, numbers, moves[i].reference), settings_);
       progress_.step();
     });
+    return summary(name, numbers, wrong, moves, outcomes);
+  }
+
+  static json summary(const std::string& name, const std::string& numbers, const std::string& wrong,
+                      const std::vector<Move>& moves, const std::vector<Outcome>& outcomes) {
     json kinds = json::object();
     const auto mean = [&](const std::string& kind) {
       Outcome sum;
@@ -241,10 +285,15 @@ class Experiment {
   IdentifiedModel model_, plant_;
   ClosedLoopSettings settings_;
   double path_difference_ = 0, error_change_ = 0;
+  double band_ = 0;  ///< within which a link counts as still [rad | m]
   Progress progress_;
 };
 
 }  // namespace
+
+json vibration_with(const fs::path& project, const fs::path& directory, const Feedforward& drive) {
+  return Experiment(project, directory).with_drive(drive);
+}
 
 json vibration(const fs::path& project, const fs::path& directory) {
   const json result = Experiment(project, directory).run();
@@ -254,10 +303,9 @@ json vibration(const fs::path& project, const fs::path& directory) {
 
 std::string vibration_table(const json& result) {
   const json& control = result.at("control");
-  std::string out =
-      fmt::format("PD of {:.3g} Hz, damping {:.2g} (best alone), tick {:.3g} ms; means over all moves\n",
-                  control.at("bandwidth_hz").get<double>(), control.at("damping").get<double>(),
-                  1e3 * control.at("tick_s").get<double>());
+  std::string out = fmt::format("PD of {:.3g} Hz, damping {:.2g} (best alone), tick {:.3g} ms; means over all moves\n",
+                                control.at("bandwidth_hz").get<double>(), control.at("damping").get<double>(),
+                                1e3 * control.at("tick_s").get<double>());
   out += fmt::format("{:<10} {:<6} {:<7} {:>12} {:>12} {:>12} {:>11} {:>10}\n", "feedforward", "as", "off",
                      "motor mrad", "link mrad", "residual", "settling s", "roughness");
   for (const json& method : result.at("methods")) {
@@ -268,9 +316,11 @@ std::string vibration_table(const json& result) {
                        method.at("parameters_off").get<std::string>(), value("tracking_motor"), value("tracking_link"),
                        value("residual"), value("settling_s"), value("roughness"));
   }
+  if (!result.contains("fixed_against_double")) return out;
   const json& numbers = result.at("fixed_against_double");
-  out += fmt::format("fixed point against double in the loop, of the remaining error: {:.2g} more or less, paths {:.2g} apart\n",
-                     numbers.at("error_change").get<double>(), numbers.at("path_difference").get<double>());
+  out += fmt::format(
+      "fixed point against double in the loop, of the remaining error: {:.2g} more or less, paths {:.2g} apart\n",
+      numbers.at("error_change").get<double>(), numbers.at("path_difference").get<double>());
   return out;
 }
 

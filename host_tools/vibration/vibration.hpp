@@ -1,8 +1,11 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+
+#include "host_tools/simulate/closed_loop.hpp"
 
 namespace fxdyn {
 
@@ -17,18 +20,29 @@ namespace fxdyn {
 /// damping are the best of a grid for the PD alone, on other moves than those that are judged, and stay.
 ///
 /// Feedforward: none; friction (rigid body, rotors, Coulomb and viscous friction, offset by least squares); rigid (the
-/// same without its friction); model (what diagnosis and training made: DIR/model.json). All but none are the firmware's fixed-point code, fed
-/// with the reference; the model also in double, and both once more on exact encoders (fixed_against_double: of the
-/// motors' remaining error, how much it is another, and how far the paths are apart). Then all of them with parameters 20 % too small, too large, and each
-/// parameter of the model one or the other at random.
+/// same without its friction); model (what diagnosis and training made: DIR/model.json). All but none are the
+/// firmware's fixed-point code, fed with the reference; the model also in double, and both once more on exact encoders
+/// (fixed_against_double: of the motors' remaining error, how much it is another, and how far the paths are apart).
+/// Then all of them with parameters 20 % too small, too large, and each parameter of the model one or the other at
+/// random.
 ///
 /// Per move and over all joints:
 ///   tracking_motor, tracking_link  RMS of q - q_r while it moves [mrad | mm]
 ///   residual   largest |q_link - its place at the end| after the stop, mean over the joints [mrad | mm]
-///   settling_s  from the stop until every link stays within 0.2 mrad (0.2 mm) of that place
+///   settling_s  from the stop until every link stays within a quarter of the PD's residual of that place
 ///   roughness  RMS of the torque's change from tick to tick, of rated, mean over the joints
 /// @throws InputError: no train log comes from a scenario
 nlohmann::json vibration(const std::filesystem::path& project, const std::filesystem::path& directory);
+
+/// A drive that is asked for its torque tick by tick.
+struct Feedforward {
+  std::function<void(const Reference&)> begin;          ///< the robot at rest at the reference's start
+  std::function<Eigen::VectorXd(Eigen::Index)> torque;  ///< at a sample of it [N*m | N]
+};
+/// The same moves under the same controller with this drive in the loop, beside none and the model on the host; writes
+/// nothing.
+nlohmann::json vibration_with(const std::filesystem::path& project, const std::filesystem::path& directory,
+                              const Feedforward& drive);
 
 /// For the terminal.
 std::string vibration_table(const nlohmann::json& result);

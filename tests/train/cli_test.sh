@@ -44,6 +44,7 @@ project() {
 project arm.project 1
 "$fxdyn" diagnose arm.project --out whole >whole.txt 2>&1 || fail "diagnose: $(tail -1 whole.txt)"
 cp -r whole killed
+cp -r whole diagnosed
 FXDYN_THREADS=1 "$fxdyn" train arm.project --out whole >whole.txt 2>&1 || fail "train: $(tail -1 whole.txt)"
 grep -q '"kept": true' whole/metrics.json || fail "no joint kept its BLS"
 [ -e whole/train.pso.json ] && fail "a search that is done leaves its generations"
@@ -72,12 +73,25 @@ refused() {
 refused generation.json 'another project'
 head -c 300 generation.json >half.json
 refused half.json 'cut off'
+rm other/train.pso.json
+cp -r diagnosed nonsense
+sed 's/"generation":[0-9]*/"generation":-1/g' generation.json >nonsense/train.pso.json
+"$fxdyn" train arm.project --out nonsense >nonsense.txt 2>&1
+[ $? -eq 1 ] && tail -1 nonsense.txt | grep -q 'another project' || fail "a generation of -1: $(tail -1 nonsense.txt)"
+sed 's/^\[train\]/[train]\nnodes = 7/' arm.project >fixed.project
+"$fxdyn" train fixed.project --out fixed >fixed.txt 2>&1 || fail "nodes beside a swarm: $(tail -1 fixed.txt)"
+grep -q 'train.nodes: not used' fixed/model.json || fail "nodes beside a swarm: no note"
 
 "$fxdyn" compare arm.project --out compared >compared.txt 2>&1 || fail "compare: $(tail -1 compared.txt)"
 for method in rigid_ls friction_ls rls mlp bls_default bls_pso bls_pso_physical lugre named_bls oracle noise_floor; do
   grep -q "\"name\": \"$method\"" compared/compare.json || fail "compare: no $method"
 done
 grep -q '"against": "truth"' compared/compare.json || fail "compare: not against the truth"
+"$fxdyn" report arm.project --out compared >report.txt 2>&1 || fail "report: $(tail -1 report.txt)"
+grep -q 'Methods compared' compared/report.html || fail "the report lacks the comparison"
+sed -i '$d' compared/logs/arm/c.csv
+"$fxdyn" report arm.project --out compared >report.txt 2>&1
+grep -q 'compare.json is of another' compared/report.html || fail "a comparison of other logs is in the report"
 
 [ $failures -eq 0 ] && echo "searches go on, and every method is there"
 exit $failures

@@ -1,0 +1,217 @@
+#include "host_tools/hil/can_replay.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "firmware/object_dictionary.hpp"
+#include "host_tools/error.hpp"
+
+namespace fxdyn {
+namespace {
+
+using nlohmann::json;
+using namespace std::chrono_literals;
+
+/// In lockstep a tick takes as long as it takes: SYNC counts as overdue only after this.
+constexpr std::uint32_t patient_period_us = 1'000'000;
+constexpr auto answer_time = 200ms, start_time = 5s;
+
+}  // namespace
+
+CanDrives::CanDrives(can::Bus& bus, const IdentifiedModel& model, const Settings& settings)
+    : master_(bus), model_(model), fixed_(model, *model.formats), fd_(settings.fd) {
+  const std::size_t n = model.robot.size();
+  std::vector<std::uint8_t> ids = settings.nodes;
+  if (ids.empty()) {
+    for (std::size_t id = 1; id <= n; ++id) ids.push_back(static_cast<std::uint8_t>(id));
+  }
+  const auto patience = master_.sdo_timeout;
+  master_.sdo_timeout = answer_time;
+  std::uint32_t driven = 0;
+  for (const std::uint8_t id : ids) {
+    Node node{.id = id};
+    try {
+      static_cast<void>(master_.read(id, 0x1000, 0));
+    } catch (const can::SdoAbort&) {
+      // It is there.
+    } catch (const can::NodeError&) {
+      if (!settings.nodes.empty())
+        throw InputError(fmt::format(
+            "node {} does not answer: is it powered, is its id {} (rotary switch or image), is its bit rate the bus's?",
+            id, id));
+      continue;
+    }
+    identify(node);
+    check(node);
+    if ((driven & node.outputs) != 0)
+      throw InputError(
+          fmt::format("node {} puts out a joint that another node puts out: give each drive its own image "
+                      "([target] joints, DIR/joint_N/tables.hpp)",
+                      id));
+    driven |= node.outputs;
+    nodes_.push_back(std::move(node));
+  }
+  master_.sdo_timeout = patience;
+  if (nodes_.empty())
+    throw InputError(
+        fmt::format("no node answers to SDO (ids {}): check power, termination and bit rate; `candump <interface>` "
+                    "shows heartbeats "
+                    "0x701 ..; other ids: --nodes",
+                    fmt::join(ids, ", ")));
+  for (std::size_t j = 0; j < n; ++j) {
+    if ((driven >> j & 1U) == 0)
+      throw InputError(fmt::format("no node puts out joint {} ({}): is its drive on the bus? other ids: --nodes", j + 1,
+                                   model.robot.joints[j].name));
+  }
+  joints_.resize(n);
+  for (std::size_t j = 0; j < n; ++j) {
+    const auto sub = static_cast<std::uint8_t>(j + 1);
+    const std::uint8_t id = nodes_.front().id;
+    Joint& joint = joints_[j];
+    joint.velocity = static_cast<std::int32_t>(master_.read(id, 0x2021, sub));
+    joint.acceleration = static_cast<std::int32_t>(master_.read(id, 0x2022, sub));
+    const Formats& formats = fixed_.formats();
+    joint.highest = to_raw(model.joints[j].tau_limit, formats[Quantity::torque]);
+    joint.lowest = -joint.highest;
+    joint.per_mille =
+        TorqueScale::of(formats[Quantity::torque], static_cast<std::int32_t>(master_.read(id, 0x2040, sub)));
+  }
+}
+
+void CanDrives::identify(Node& node) {
+  if (master_.read(node.id, 0x1018, 2) != dictionary::product_code)
+    throw InputError(
+        fmt::format("node {} is no fxdyn drive node (product code {:08x})", node.id, master_.read(node.id, 0x1018, 2)));
+  node.board = master_.read_text(node.id, 0x1009, 0);
+  node.version = master_.read_text(node.id, 0x100A, 0);
+  node.crc = master_.read(node.id, dictionary::tables, 1);
+  node.outputs = master_.read(node.id, dictionary::tables, 5);
+}
+
+void CanDrives::check(const Node& node) {
+  const std::uint32_t layout = master_.read(node.id, dictionary::tables, 2);
+  const std::uint32_t all = all_joints(model_);
+  if (master_.read(node.id, dictionary::tables, 3) == 0)
+    throw InputError(fmt::format("node {}: its tables are damaged (CRC): flash them again (flash-tables)", node.id));
+  if (master_.read(node.id, dictionary::tables, 4) != model_.robot.size() || (node.outputs & ~all) != 0)
+    throw InputError(
+        fmt::format("node {}: its image is for a robot of {} joints, the model has {}: build it from these "
+                    "tables",
+                    node.id, master_.read(node.id, dictionary::tables, 4), model_.robot.size()));
+  const FixedModel expected(model_, *model_.formats, node.outputs);
+  if (layout != expected.layout_hash())
+    throw InputError(fmt::format(
+        "node {}: its image was built for another model (layout {:08x}, expected {:08x}): build and flash it "
+        "from these tables",
+        node.id, layout, expected.layout_hash()));
+  if (node.crc != expected.crc())
+    throw InputError(fmt::format(
+        "node {}: holds other tables (CRC {:08x}, expected {:08x}): flash DIR/tables.bin with the target flash-tables",
+        node.id, node.crc, expected.crc()));
+}
+
+void CanDrives::restart() {
+  if (lockstep_) lost_ += lockstep_->statistics().missing + lockstep_->statistics().late;
+  for (const Node& node : nodes_) {
+    master_.command(canopen::NmtCommand::reset_node, node.id);
+    master_.wait_for(node.id, canopen::NmtState::pre_operational, start_time);
+    master_.write(node.id, 0x1006, 0, patient_period_us, 4);
+    if (fd_) master_.write(node.id, 0x2030, 0, 1, 1);
+  }
+  const auto ramp = static_cast<std::int32_t>(master_.read(nodes_.front().id, 0x2010, 0));
+  for (Joint& joint : joints_) {
+    const std::int32_t limit = std::max({-joint.lowest, joint.highest, std::int32_t{1}});
+    joint.steps = {.ramp = ramp > 0 ? (limit - 1) / ramp + 1 : limit, .following = limit};
+    joint.output = {};
+  }
+  master_.command(canopen::NmtCommand::start);
+  for (const Node& node : nodes_) master_.wait_for(node.id, canopen::NmtState::operational, start_time);
+  fixed_.reset();
+  since_restart_ = 0;
+  lockstep_ = std::make_unique<can::Lockstep>(
+      master_, can::Lockstep::Options{.joints = joints_.size(), .expect = {}, .fd = fd_, .timeout = 2s});
+}
+
+CanDrives::Tick CanDrives::tick(const Eigen::VectorXd& q, const Eigen::VectorXd& dq, const Eigen::VectorXd& ddq) {
+  const Formats& formats = fixed_.formats();
+  std::vector<WireSetpoint> wire(joints_.size());
+  std::vector<std::int32_t> words;
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    const auto i = static_cast<Eigen::Index>(j);
+    const Joint& joint = joints_[j];
+    wire[j] = {to_raw(q[i], formats[Quantity::position]),
+               to_share(to_raw(dq[i], formats[Quantity::velocity]), joint.velocity),
+               to_share(to_raw(ddq[i], formats[Quantity::acceleration]), joint.acceleration)};
+    words.insert(words.end(),
+                 {wire[j].q, from_share(wire[j].dq, joint.velocity), from_share(wire[j].ddq, joint.acceleration)});
+  }
+  Saturations ignored;
+  const std::vector<std::int32_t> model = fixed_.tick(words, ignored);
+  const can::Duration begin = master_.bus().now();
+  const auto& torques = lockstep_->tick(wire);
+  const can::Duration took = master_.bus().now() - begin;
+  round_trips_.add(took);
+  busy_s_ += std::chrono::duration<double>(took).count();
+
+  Tick out;
+  out.equal = true;
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    Joint& joint = joints_[j];
+    std::uint8_t status = torque_status::fresh | torque_status::enabled;
+    if (joint.output.follow(model[j], joint.steps)) status |= torque_status::step_limited;
+    if (!joint.output.is_following()) status |= torque_status::ramping;
+    const std::int32_t raw = joint.output.value();
+    if (raw == joint.lowest || raw == joint.highest) status |= torque_status::at_limit;
+    if (!torques[j]) {
+      out.equal = false;
+      out.torque.push_back(std::numeric_limits<double>::quiet_NaN());
+      continue;
+    }
+    if (since_restart_ == 0) joint.first_count = torques[j]->tick;
+    const WireTorque expected{to_per_mille(raw, joint.per_mille), to_milli(raw, formats[Quantity::torque]),
+                              static_cast<std::uint8_t>(joint.first_count + since_restart_), status};
+    out.equal = out.equal && *torques[j] == expected;
+    out.torque.push_back(1e-3 * torques[j]->milli);
+  }
+  ++since_restart_;
+  ++ticks_;
+  equal_ticks_ += out.equal ? 1 : 0;
+  return out;
+}
+
+json CanDrives::report() {
+  const auto ms = [&](double share) { return 1e-6 * static_cast<double>(round_trips_.quantile(share).count()); };
+  json nodes = json::array();
+  for (const Node& node : nodes_) {
+    json driven = json::array();
+    for (std::size_t j = 0; j < joints_.size(); ++j) {
+      if ((node.outputs >> j & 1U) != 0) driven.push_back(j + 1);
+    }
+    json counters = json::object();
+    for (const dictionary::Described& described : dictionary::described) {
+      if (described.entry.index != dictionary::counter_record) continue;
+      counters[described.name] = master_.read(node.id, described.entry.index, described.entry.sub_index);
+    }
+    nodes.push_back({{"id", node.id},
+                     {"board", node.board},
+                     {"version", node.version},
+                     {"tables_crc", node.crc},
+                     {"joints", driven},
+                     {"most_cost_of_a_tick", master_.read(node.id, dictionary::cost_record, 4)},
+                     {"counters", counters}});
+  }
+  const std::uint64_t lost =
+      lost_ + (lockstep_ ? lockstep_->statistics().missing + lockstep_->statistics().late : 0) + master_.bus().lost();
+  return {{"ticks", ticks_},
+          {"equal_ticks", equal_ticks_},
+          {"frames_lost", lost},
+          {"round_trip_ms", {{"p50", ms(0.5)}, {"p99", ms(0.99)}, {"max", ms(1)}}},
+          {"ticks_per_second", busy_s_ > 0 ? static_cast<double>(ticks_) / busy_s_ : 0},
+          {"nodes", nodes}};
+}
+
+}  // namespace fxdyn

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <cstdint>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "firmware/torque_output.hpp"
+#include "host_tools/can/lockstep.hpp"
+#include "host_tools/export/export.hpp"
+
+namespace fxdyn {
+
+/// Drive nodes on a CAN bus that together put out the torques of a model, in lockstep with the host: all setpoints of a
+/// tick, SYNC, then it waits for all torques. The host computes what every torque frame has to say, byte for byte,
+/// with the node's own functions (firmware/setpoint_codec.hpp, firmware/torque_output.hpp).
+class CanDrives {
+ public:
+  struct Settings {
+    std::vector<std::uint8_t> nodes;  ///< node ids; empty: whoever answers of 1 .. number of joints
+    bool fd = false;
+  };
+
+  /// Finds the nodes, reads who they are, and configures them over SDO.
+  /// @throws InputError: nobody answers, other tables (CRC, layout), a joint that no node or two put out
+  CanDrives(can::Bus& bus, const IdentifiedModel& model, const Settings& settings);
+
+  /// Resets and starts all nodes: the robot at rest, torque zero.
+  void restart();
+
+  struct Tick {
+    std::vector<double> torque;  ///< of every joint, what its node said [N*m | N]; NaN: nothing came
+    bool equal = false;          ///< every frame is what the host expects
+  };
+  /// One tick of the setpoints q, dq, ddq of all joints.
+  Tick tick(const Eigen::VectorXd& q, const Eigen::VectorXd& dq, const Eigen::VectorXd& ddq);
+
+  /// {ticks, equal_ticks, frames_lost, round_trip_ms: {p50, p99, max}, ticks_per_second, nodes: [{id, board, version,
+  /// tables_crc, joints, cost, counters}]}
+  nlohmann::json report();
+
+ private:
+  struct Node {
+    std::uint8_t id = 0;
+    std::uint32_t outputs = 0, crc = 0;
+    std::string board, version;
+  };
+  struct Joint {
+    std::int32_t velocity = 1, acceleration = 1;  ///< raw, of a share of 32768
+    std::int32_t lowest = 0, highest = 0;         ///< raw torque limits
+    TorqueScale per_mille;
+    TorqueSteps steps;
+    TorqueOutput output;
+    std::uint8_t first_count = 0;
+  };
+
+  void identify(Node& node);
+  void check(const Node& node);
+
+  can::Master master_;
+  const IdentifiedModel& model_;
+  FixedModel fixed_;
+  bool fd_;
+  std::vector<Node> nodes_;
+  std::vector<Joint> joints_;
+  std::unique_ptr<can::Lockstep> lockstep_;
+  std::uint64_t since_restart_ = 0, ticks_ = 0, equal_ticks_ = 0, lost_ = 0;
+  can::RoundTrips round_trips_;
+  double busy_s_ = 0;
+};
+
+}  // namespace fxdyn
