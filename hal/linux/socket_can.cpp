@@ -5,8 +5,8 @@
 #include <linux/errqueue.h>
 #include <linux/net_tstamp.h>
 #include <net/if.h>
-#include <sys/ioctl.h>
 #include <sys/socket.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <array>
@@ -18,6 +18,7 @@ namespace {
 
 /// Room for some thousand frames, about a second of a full bus, so that a process that is kept waiting loses none.
 constexpr int receive_buffer_bytes = 4 << 20;
+constexpr std::int64_t restart_interval_ns = 10'000'000;
 
 template <class T>
 bool set(int socket, int level, int name, const T& value) {
@@ -98,7 +99,7 @@ Status CanSocket::send(const canfd_frame& frame, bool fd) {
     written = ::write(socket_, &frame, size);
   } while (written < 0 && errno == EINTR);
   if (written == static_cast<ssize_t>(size)) return Status::ok;
-  return errno == EAGAIN || errno == ENOBUFS ? Status::busy : Status::failed;
+  return errno == EAGAIN || errno == ENOBUFS ? Status::busy : failed();
 }
 
 Status CanSocket::receive(canfd_frame& frame, bool& fd) {
@@ -112,7 +113,7 @@ Status CanSocket::receive(canfd_frame& frame, bool& fd) {
     message.msg_controllen = control.size();
     const ssize_t size = ::recvmsg(socket_, &message, 0);
     if (size < 0 && errno == EINTR) continue;
-    if (size < 0) return errno == EAGAIN ? Status::busy : Status::failed;
+    if (size < 0) return errno == EAGAIN ? Status::busy : failed();
     if (size != CAN_MTU && size != CANFD_MTU) return Status::failed;
     for (cmsghdr* part_of = CMSG_FIRSTHDR(&message); part_of != nullptr; part_of = CMSG_NXTHDR(&message, part_of)) {
       if (part_of->cmsg_level != SOL_SOCKET) continue;
@@ -145,7 +146,17 @@ void CanSocket::read_error_frame(const canfd_frame& frame) {
 
 CanErrors CanSocket::errors() { return errors_; }
 
+Status CanSocket::failed() {
+  failure_ = errno;
+  return Status::failed;
+}
+
 Status CanSocket::restart() {
+  timespec time{};
+  ::clock_gettime(CLOCK_MONOTONIC, &time);
+  const std::int64_t now = time.tv_sec * 1'000'000'000LL + time.tv_nsec;
+  if (now - restarted_ns_ < restart_interval_ns) return restart_error_ == 0 ? Status::busy : Status::failed;
+  restarted_ns_ = now;
   CanLink link;
   restart_error_ = query_link(interface_, link);
   if (restart_error_ != 0) return Status::failed;

@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "hal/can.hpp"
 #include "hal/linux/can_link.hpp"
@@ -48,7 +49,7 @@ class CanSocket {
   void close();
   Status send(const canfd_frame& frame, bool fd);
   Status receive(canfd_frame& frame, bool& fd);
-  /// From the error frames that receive() has met; the counters are asked from the kernel where it has them.
+  /// From the error frames that receive() has met.
   CanErrors errors();
   /// Leaves bus-off: by the kernel's own timer where the interface has `restart-ms`, by netlink with CAP_NET_ADMIN;
   /// failed without either, and restart_error() is EPERM.
@@ -56,27 +57,32 @@ class CanSocket {
 
   int descriptor() const { return socket_; }  ///< to poll for input; -1: closed
   int restart_error() const { return restart_error_; }
+  /// errno of the last call that failed: ENETDOWN, ENODEV (unplugged). It is kept until it is asked for.
+  int take_failure() { return std::exchange(failure_, 0); }
   /// When the kernel took the last received frame from the device [ns since 1970, CLOCK_REALTIME].
   std::int64_t received_ns() const { return received_ns_; }
   const std::string& interface() const { return interface_; }
 
  private:
+  Status failed();
   void read_error_frame(const canfd_frame& frame);
 
   int socket_ = -1;
-  int restart_error_ = 0;
+  int restart_error_ = 0, failure_ = 0;
+  std::int64_t restarted_ns_ = 0;
   std::int64_t received_ns_ = 0;
   std::string interface_;
   CanErrors errors_{};
 };
 
-/// hal::CanBus on SocketCAN. With FdFrame the interface has to be CAN FD capable; classic frames go over it as well.
+/// hal::CanBus on SocketCAN. With FdFrame the interface has to be CAN FD capable, unless it is opened for classic
+/// frames, which go over it as well.
 template <class Frame_>
 class SocketCan : public CanSocket {
  public:
   using Frame = Frame_;
-  static constexpr bool fd = Frame::most_bytes > CAN_MAX_DLEN;
-  [[nodiscard]] CanOpenResult open(std::string_view interface, std::span<const can_filter> filters = {}) {
+  [[nodiscard]] CanOpenResult open(std::string_view interface, std::span<const can_filter> filters = {},
+                                   bool fd = Frame::most_bytes > CAN_MAX_DLEN) {
     return CanSocket::open(interface, fd, filters);
   }
   Status send(const Frame& frame) {
