@@ -124,13 +124,24 @@ class DriveNode {
       hardware_.counter.start();
       more = hardware_.bus.receive(received_) == hal::Status::ok;
       if (more) handle();
-      const std::uint32_t cost = hardware_.counter.stop() - empty_measurement_;
+      const std::uint32_t cost = measured();
       if (more) since_tick_ += cost;
     }
     serve(hardware_.clock.now_us());
     flush();
     if (!is_supervised()) hardware_.watchdog.feed();
     return more || (pending_ != 0 && !off_bus_);
+  }
+
+  /// How long nothing is due if no frame comes, longest_sleep_us or more: for systems where waking up is expensive.
+  std::uint32_t idle_us() const {
+    constexpr std::uint32_t resolution_us = 5000;  // of heartbeats, inhibit times, time-outs
+    const bool torque_moves =
+        std::any_of(torques_.begin(), torques_.end(), [](const auto& torque) { return torque.value() != 0; });
+    if (off_bus_ || pending_ != 0 || (torque_moves && !is_due_to_tick())) return longest_sleep_us;
+    if (!is_due_to_tick()) return resolution_us;
+    const std::uint32_t since = hardware_.clock.now_us() - sync_us_;
+    return std::clamp(overdue_after_us_ - std::min(since, overdue_after_us_), longest_sleep_us, resolution_us);
   }
 
   NmtState state() const { return state_; }
@@ -497,12 +508,18 @@ class DriveNode {
     synchronised_ = false;
   }
 
+  /// What the counter says of the stretch that ends here, without its own cost; zero where that wavers by more.
+  std::uint32_t measured() {
+    const std::uint32_t cost = hardware_.counter.stop();
+    return cost - std::min(cost, empty_measurement_);
+  }
+
   void measure_model() {
-    since_tick_ += hardware_.counter.stop() - empty_measurement_;
+    since_tick_ += measured();
     saturations_ = {};
     hardware_.counter.start();
     compute();
-    const std::uint32_t cost = hardware_.counter.stop() - empty_measurement_;
+    const std::uint32_t cost = measured();
     hardware_.counter.start();
     since_tick_ += cost;
     note_cost(dictionary::Cost::model, cost);
@@ -512,7 +529,7 @@ class DriveNode {
     model_torques_ = Model::tick(tables_.parameters, model_state_, setpoints_, saturations_);
   }
   void end_of_measurement() {
-    since_tick_ += hardware_.counter.stop() - empty_measurement_;
+    since_tick_ += measured();
     hardware_.counter.start();
     note_cost(dictionary::Cost::everything, since_tick_);
     since_tick_ = 0;
@@ -604,7 +621,7 @@ class DriveNode {
       overdue_after_us_ = configuration_.period_us;
       hardware_.counter.start();
       tick(false);
-      since_tick_ += hardware_.counter.stop() - empty_measurement_;
+      since_tick_ += measured();
     } else if (state_ != NmtState::operational && now - own_tick_us_ >= tick_us_) {
       own_tick_us_ = now - own_tick_us_ < 2 * tick_us_ ? own_tick_us_ + tick_us_ : now;
       for (std::size_t o = 0; o < outputs; ++o) torques_[o].release(steps_[o]);

@@ -247,8 +247,7 @@ int run(const Options& options) {
   static constexpr fxdyn::RatedTorques<M> rated{fxdyn::tables::rated_torque};
 
   static fxdyn::DriveHardware hardware{bus, clock, counter, watchdog, enable, fault, busy};
-  using Node = fxdyn::DriveNode<M, decltype(hardware)>;
-  static Node node(
+  static fxdyn::DriveNode<M, decltype(hardware)> node(
       hardware, {parameters, page.header, valid, options.tables != nullptr, rated},
       {.id = static_cast<std::uint8_t>(options.node), .serial_number = options.serial_number, .board = "linux"});
   std::fprintf(stderr, "fxdyn_node: node %u on %s, %zu of %zu joints, tables %08x%s, costs in %s, watchdog %s\n",
@@ -258,12 +257,11 @@ int run(const Options& options) {
 
   Reporter reporter(options);
   std::array<pollfd, 2> inputs{{{bus.descriptor(), POLLIN, 0}, {enable.pin.descriptor(), POLLIN, 0}}};
-  const timespec longest_sleep{0, 1000L * Node::longest_sleep_us};
   while (stopped == 0) {
     if (node.poll()) continue;
     reporter.look(bus);
-    if (::ppoll(inputs.data(), inputs.size(), &longest_sleep, nullptr) > 0 && inputs[1].revents != 0)
-      enable.pin.events();
+    const timespec idle{0, 1000L * node.idle_us()};
+    if (::ppoll(inputs.data(), inputs.size(), &idle, nullptr) > 0 && inputs[1].revents != 0) enable.pin.events();
   }
   return 0;
 }

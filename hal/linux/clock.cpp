@@ -58,7 +58,7 @@ CycleCounter::~CycleCounter() {
 
 std::uint64_t CycleCounter::now() const {
   std::uint64_t count = 0;
-  if (events_ < 0) return nanoseconds(CLOCK_THREAD_CPUTIME_ID);
+  if (events_ < 0) return nanoseconds(CLOCK_MONOTONIC);
   return ::read(events_, &count, sizeof count) == sizeof count ? count : begin_;
 }
 

@@ -30,8 +30,8 @@ class TickTimer {
 static_assert(hal::TickTimer<TickTimer>);
 
 /// Instructions of this thread in user mode (perf_event_open) where the machine and its permissions
-/// (/proc/sys/kernel/perf_event_paranoid <= 2) let us count them, else nanoseconds of CLOCK_THREAD_CPUTIME_ID. An
-/// interrupt or another process is not counted in either.
+/// (/proc/sys/kernel/perf_event_paranoid <= 2) let us count them, else nanoseconds of CLOCK_MONOTONIC. These contain
+/// what interrupts and other processes take, as a deadline does, but asking for them costs no system call.
 class CycleCounter {
  public:
   CycleCounter();

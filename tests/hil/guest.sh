@@ -44,10 +44,10 @@ shares=(-virtfs "local,path=/,mount_tag=host,security_model=none,readonly=on,mul
 code=0
 timeout --kill-after=5 "${FXDYN_GUEST_TIMEOUT:-120}" qemu-system-x86_64 -accel tcg -cpu max -m "${FXDYN_GUEST_MEMORY:-512M}" \
   -smp "${FXDYN_GUEST_CPUS:-1}" -no-reboot -nodefaults -display none -kernel "$guest/vmlinux" -initrd "$work/initrd" \
-  -append "console=ttyS1 ${FXDYN_GUEST_DEBUG:+x} panic=-1 mitigations=off" "${shares[@]}" \
+  -append "console=ttyS1 ${FXDYN_GUEST_DEBUG:-quiet} panic=-1 mitigations=off no_timer_check" "${shares[@]}" \
   -device isa-debug-exit,iobase=0xf4,iosize=1 -serial "file:$work/console" -serial "file:$work/kernel" "${qemu[@]}" || code=$?
 cat "$work/console"; [ -z "${FXDYN_GUEST_DEBUG:-}" ] || cat "$work/kernel" >&2
 if [ $((code & 1)) -eq 1 ] && [ $code -ne 137 ] && [ $code -lt 251 ]; then exit $((code >> 1)); fi
 echo "guest.sh: the guest did not end by itself (code $code); its kernel said:" >&2
-cat "$work/kernel" >&2
+tail -n 20 "$work/kernel" >&2
 exit 125
