@@ -2,7 +2,7 @@
 
 #include FXDYN_TABLES_HEADER
 
-#include "firmware/drive_node.hpp"
+#include "firmware/replay_node.hpp"
 #include "hal/mps2/systick.hpp"
 #include "hal/mps2/uart.hpp"
 
@@ -29,7 +29,7 @@ int main() {
   const auto& page = tables_in_flash();
   uart.start();
   fxdyn::hal::mps2::SysTick counter;
-  static fxdyn::DriveNode<fxdyn::tables::Model, fxdyn::hal::mps2::Uart, fxdyn::hal::mps2::SysTick> node(
+  static fxdyn::ReplayNode<fxdyn::tables::Model, fxdyn::hal::mps2::Uart, fxdyn::hal::mps2::SysTick> node(
       uart, counter, page.parameters, {page.header.layout_hash, page.header.crc32, fxdyn::page_is_valid(page)});
   for (;;) {
     if (!node.poll()) uart.wait();

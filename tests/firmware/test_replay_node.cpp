@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "firmware/drive_node.hpp"
+#include "firmware/replay_node.hpp"
 #include "hal/fake/clock.hpp"
 #include "hal/fake/serial.hpp"
 
@@ -44,9 +44,9 @@ struct StubModel {
   }
 };
 
-class DriveNodeTest : public ::testing::Test {
+class ReplayNodeTest : public ::testing::Test {
  protected:
-  using Node = DriveNode<StubModel, hal::fake::Serial, hal::fake::CycleCounter>;
+  using Node = ReplayNode<StubModel, hal::fake::Serial, hal::fake::CycleCounter>;
   using Words = std::vector<std::uint32_t>;
   struct Message {
     serial::Type type;
@@ -86,12 +86,12 @@ class DriveNodeTest : public ::testing::Test {
   }
 };
 
-TEST_F(DriveNodeTest, HelloTellsIdentity) {
+TEST_F(ReplayNodeTest, HelloTellsIdentity) {
   EXPECT_EQ(answers(serial::Type::hello, {}),
             (std::vector{Message{serial::Type::identity, {serial::protocol_version, 2, 0x1234, 0x5678, 0, 0, 3}}}));
 }
 
-TEST_F(DriveNodeTest, TickAnswersSequenceTorquesSaturationsCycles) {
+TEST_F(ReplayNodeTest, TickAnswersSequenceTorquesSaturationsCycles) {
   const auto minus = [](std::int32_t x) { return static_cast<std::uint32_t>(x); };
   EXPECT_EQ(answers(serial::Type::tick, {7, 1, 2, 3, minus(-5), 0, 1}),
             (std::vector{Message{serial::Type::torque, {7, 10 + 2 - 3 + 1, minus(-50 - 1 + 1), 1, 1000}}}));
@@ -100,13 +100,13 @@ TEST_F(DriveNodeTest, TickAnswersSequenceTorquesSaturationsCycles) {
             (std::vector{Message{serial::Type::torque, {8, 2, 2, 0, 2000}}}));
 }
 
-TEST_F(DriveNodeTest, ResetForgets) {
+TEST_F(ReplayNodeTest, ResetForgets) {
   answers(serial::Type::tick, {1, 0, 0, 0, 0, 0, 0});
   EXPECT_EQ(answers(serial::Type::reset, {}), (std::vector{Message{serial::Type::reset_done, {}}}));
   EXPECT_EQ(answers(serial::Type::tick, {2, 0, 0, 0, 0, 0, 0}).at(0).words.at(1), 1U);
 }
 
-TEST_F(DriveNodeTest, InvalidTablesAreToldAndNeverComputedWith) {
+TEST_F(ReplayNodeTest, InvalidTablesAreToldAndNeverComputedWith) {
   Node locked(port, counter, parameters, {0x1234, 0x5678, false});
   receive(bytes(serial::Type::hello, {}));
   receive(bytes(serial::Type::tick, {3, 0, 0, 0, 0, 0, 0}));
@@ -117,7 +117,7 @@ TEST_F(DriveNodeTest, InvalidTablesAreToldAndNeverComputedWith) {
                    Message{serial::Type::refused, {3, static_cast<std::uint32_t>(serial::Refusal::tables_invalid)}}}));
 }
 
-TEST_F(DriveNodeTest, WrongLengthAndUnknownTypeAreRefused) {
+TEST_F(ReplayNodeTest, WrongLengthAndUnknownTypeAreRefused) {
   EXPECT_EQ(
       answers(serial::Type::tick, {3, 0, 0, 0}),
       (std::vector{Message{serial::Type::refused, {3, static_cast<std::uint32_t>(serial::Refusal::wrong_length)}}}));
@@ -126,7 +126,7 @@ TEST_F(DriveNodeTest, WrongLengthAndUnknownTypeAreRefused) {
       (std::vector{Message{serial::Type::refused, {0, static_cast<std::uint32_t>(serial::Refusal::unknown_type)}}}));
 }
 
-TEST_F(DriveNodeTest, CorruptTickGetsNoAnswerAndIsCounted) {
+TEST_F(ReplayNodeTest, CorruptTickGetsNoAnswerAndIsCounted) {
   auto damaged = bytes(serial::Type::tick, {1, 0, 0, 0, 0, 0, 0});
   damaged[9] ^= 0x10;
   receive(damaged);
@@ -137,7 +137,7 @@ TEST_F(DriveNodeTest, CorruptTickGetsNoAnswerAndIsCounted) {
   EXPECT_EQ(answers(serial::Type::tick, {2, 0, 0, 0, 0, 0, 0}).at(0).words.at(1), 1U);
 }
 
-TEST_F(DriveNodeTest, SlowPortGetsEveryReplyWhole) {
+TEST_F(ReplayNodeTest, SlowPortGetsEveryReplyWhole) {
   port.write_limit = 3;
   for (std::uint32_t k = 1; k <= 5; ++k) receive(bytes(serial::Type::tick, {k, 0, 0, 0, 0, 0, 0}));
   int polls = 0;
