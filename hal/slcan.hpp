@@ -144,7 +144,9 @@ class SlcanBus {
       }
       begin_ = 0;
       end_ = port_.read(chunk_);
-      if (end_ == 0) return Status::busy;
+      if (end_ > 0) continue;
+      flush();  // answers to commands
+      return Status::busy;
     }
   }
 

@@ -55,7 +55,8 @@ class BasicFdcan {
     const bool compensate = d.prescaler <= 2;
     registers_.write(data_timing, (compensate ? 1U << 23 : 0) | (d.prescaler - 1) << 16 | (d.segment1 - 1) << 8 |
                                       (d.segment2 - 1) << 4 | (d.jump_width - 1));
-    registers_.write(delay_compensation, std::min<std::uint32_t>(d.prescaler * (1 + d.segment1), 0x7fU) << 8);  // to the sample point
+    registers_.write(delay_compensation, std::min<std::uint32_t>(d.prescaler * (1 + d.segment1), 0x7fU)
+                                             << 8);  // to the sample point
     registers_.write(filters, 0);  // no filter elements; all that match none go to FIFO 0, which blocks when full
     registers_.write(transmit_buffers, 0);  // a FIFO: in the order in which they came
     for (Address word = 0; word < message_ram_bytes; word += 4) registers_.write(ram + word, 0);
@@ -109,6 +110,13 @@ class BasicFdcan {
       clear_bits(registers_, control, init);
     }
     return off_bus() ? Status::busy : Status::ok;
+  }
+
+  /// Sleeps until a frame or another interrupt has come. WFI also wakes on a masked one.
+  void wait() {
+    cortex_m::mask_interrupts();
+    if (received_.empty()) cortex_m::wait_for_interrupt();
+    cortex_m::unmask_interrupts();
   }
 
   void on_receive() {

@@ -17,7 +17,9 @@ std::string line_of(const ClassicFrame& frame) {
 std::span<const std::uint8_t> bytes(const std::string& text) {
   return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
-void feed(fake::Serial& port, const std::string& text) { port.incoming.insert(port.incoming.end(), text.begin(), text.end()); }
+void feed(fake::Serial& port, const std::string& text) {
+  port.incoming.insert(port.incoming.end(), text.begin(), text.end());
+}
 std::string said(fake::Serial& port) {
   const std::string text(port.outgoing.begin(), port.outgoing.end());
   port.outgoing.clear();
@@ -49,8 +51,8 @@ TEST(Slcan, LinesAsTheManualHasThem) {
 }
 
 TEST(Slcan, WhatIsNoFrameIsRefused) {
-  for (const char* line : {"", "t", "t12", "t8001", "t80000", "t1239001122334455667788", "t12320", "t1232AB0", "t1232AB0G",
-                           "t1230AB", "r123200", "T200000000", "x1230", "t12x0", "T123456780 "}) {
+  for (const char* line : {"", "t", "t12", "t8001", "t80000", "t1239001122334455667788", "t12320", "t1232AB0",
+                           "t1232AB0G", "t1230AB", "r123200", "T200000000", "x1230", "t12x0", "T123456780 "}) {
     ClassicFrame frame{.id = 42};
     EXPECT_FALSE(slcan::decode(bytes(line), frame)) << line;
     EXPECT_EQ(frame.id, 42U) << line;
@@ -87,8 +89,7 @@ RC_GTEST_PROP(SlcanBus, FramesAmidNoiseAndInAnyPiecesArrive, ()) {
   const int count = *rc::gen::inRange(0, 20);
   for (int i = 0; i < count; ++i) {
     // Noise has no CR of its own and no command that closes the channel: it ends where the next CR stands.
-    for (const auto c : *rc::gen::container<std::string>(rc::gen::element('x', '0', 'z', '\n', '\xff')))
-      stream += c;
+    for (const auto c : *rc::gen::container<std::string>(rc::gen::element('x', '0', 'z', '\n', '\xff'))) stream += c;
     stream += '\r';
     sent.push_back(some_frame());
     stream += line_of(sent.back());

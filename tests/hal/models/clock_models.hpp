@@ -4,7 +4,8 @@
 
 namespace fxdyn::test {
 
-/// RCC, PWR and flash interface of an STM32, with what must hold at the moment of every write. `Part` says what differs.
+/// RCC, PWR and flash interface of an STM32, with what must hold at the moment of every write. `Part` says what
+/// differs.
 struct G4 {
   static constexpr hal::Address rcc = 0x4002'1000, flash = 0x4002'2000, pll = rcc + 0x0c, configuration = rcc + 0x08;
   static constexpr std::uint32_t crystal_mhz = 24, switch_to_pll = 0b11, hsi = 0b01, latency = 4, full_mhz = 170;
@@ -77,6 +78,7 @@ class RccModel : public RegisterModel {
       require(Part::half_before_switch(value), "switches above 80 MHz without AHB / 2");
       require(Part::buses_slow_enough(value), "switches with buses too fast");
     }
+    if (address == Part::rcc) value &= ~(1U << 10 | 1U << 17 | 1U << 25);  // flags
     if (address == Part::rcc && runs_from_pll())
       require((value & 1U << 24) != 0, "switches the PLL off that it runs from");
     registers_[address] = value;

@@ -86,13 +86,18 @@ class FdcanModel : public RegisterModel {
       return memory_[address];
     }
     switch (address - base) {
-      case 0x18: return cccr_;
-      case 0x44: return 7U | (passive_ ? 1U << 5 : 0) | (off_ ? 1U << 7 : 0);
-      case 0x50: return interrupts_;
-      case 0x90: return level_ | get_ << 8 | (get_ + level_) % 3 << 16 | (level_ == 3 ? 1U << 24 : 0);
+      case 0x18:
+        return cccr_;
+      case 0x44:
+        return 7U | (passive_ ? 1U << 5 : 0) | (off_ ? 1U << 7 : 0);
+      case 0x50:
+        return interrupts_;
+      case 0x90:
+        return level_ | get_ << 8 | (get_ + level_) % 3 << 16 | (level_ == 3 ? 1U << 24 : 0);
       case 0xc4:
         return static_cast<std::uint32_t>(3 - pending_.size()) | put_ << 16 | (pending_.size() == 3 ? 1U << 21 : 0);
-      default: return registers_[address];
+      default:
+        return registers_[address];
     }
   }
   void on_write(hal::Address address, std::uint32_t value) override {
@@ -114,12 +119,24 @@ class FdcanModel : public RegisterModel {
         cccr_ = value;
         return;
       }
-      case 0x0c: case 0x1c: case 0x48: case 0x80: case 0xc0: case 0x100:
+      case 0x0c:
+      case 0x1c:
+      case 0x48:
+      case 0x80:
+      case 0xc0:
+      case 0x100:
         require(open, "configuration needs INIT and CCE");
         if (open) registers_[address] = value;
         return;
-      case 0x40: case 0x44: case 0x90: case 0xc4: require(false, "writes a register that only reads"); return;
-      case 0x50: interrupts_ &= ~value; return;
+      case 0x40:
+      case 0x44:
+      case 0x90:
+      case 0xc4:
+        require(false, "writes a register that only reads");
+        return;
+      case 0x50:
+        interrupts_ &= ~value;
+        return;
       case 0x94:
         require(level_ > 0 && value == get_, "acknowledges another element than the oldest");
         get_ = (get_ + 1) % 3;
@@ -131,9 +148,16 @@ class FdcanModel : public RegisterModel {
         pending_.push_back(put_);
         put_ = (put_ + 1) % 3;
         return;
-      case 0xd0: pending_.clear(); return;
-      case 0x54: case 0x58: case 0x5c: registers_[address] = value; return;
-      default: require(false, "writes offset " + std::to_string(address - base));
+      case 0xd0:
+        pending_.clear();
+        return;
+      case 0x54:
+      case 0x58:
+      case 0x5c:
+        registers_[address] = value;
+        return;
+      default:
+        require(false, "writes offset " + std::to_string(address - base));
     }
   }
 

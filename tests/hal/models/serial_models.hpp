@@ -24,7 +24,7 @@ class CmsdkUartModel : public RegisterModel {
     return true;
   }
   bool interrupt() const { return interrupts_ != 0; }
-  /// Called when the driver has cleared the interrupt and not yet read: the worst moment for another byte.
+  /// Another byte arrives the moment the driver has read one, still in its interrupt.
   bool byte_comes_between = false;
 
  protected:
@@ -32,15 +32,19 @@ class CmsdkUartModel : public RegisterModel {
     switch (address - base_) {
       case 0x00:
         require(full_, "reads DATA without a byte");
-        full_ = false;
-        if (byte_comes_between) {
+        {
+          const std::uint32_t byte = received_;
+          full_ = false;
+          if (byte_comes_between) arrives('!');
           byte_comes_between = false;
-          arrives('!');
+          return byte;
         }
-        return received_;
-      case 0x04: return (transmit_full ? 1U : 0) | (full_ ? 0b10U : 0);
-      case 0x0c: return interrupts_;
-      default: return registers_[address];
+      case 0x04:
+        return (transmit_full ? 1U : 0) | (full_ ? 0b10U : 0);
+      case 0x0c:
+        return interrupts_;
+      default:
+        return registers_[address];
     }
   }
   void on_write(hal::Address address, std::uint32_t value) override {
@@ -50,7 +54,9 @@ class CmsdkUartModel : public RegisterModel {
         require(!transmit_full, "overruns the transmitter");
         sent.push_back(static_cast<std::uint8_t>(value));
         return;
-      case 0x0c: interrupts_ &= ~value; return;
+      case 0x0c:
+        interrupts_ &= ~value;
+        return;
       case 0x10:
         require(value >= 16, "BAUDDIV is 16 at least");
         require((registers_[base_ + 0x08] & 0b11) == 0, "BAUDDIV while it runs");
@@ -60,7 +66,8 @@ class CmsdkUartModel : public RegisterModel {
         require(registers_[base_ + 0x10] >= 16, "enables without a baud rate");
         registers_[address] = value;
         return;
-      default: require(false, "writes offset " + std::to_string(address - base_));
+      default:
+        require(false, "writes offset " + std::to_string(address - base_));
     }
   }
 
@@ -92,12 +99,15 @@ class UsartModel : public RegisterModel {
  protected:
   std::uint32_t on_read(hal::Address address) override {
     switch (address - base) {
-      case 0x00: looked_ = true; return status_ | (transmit_full ? 0 : 1U << 7);
+      case 0x00:
+        looked_ = true;
+        return status_ | (transmit_full ? 0 : 1U << 7);
       case 0x04:
         if (looked_) status_ &= ~(1U << 5 | 1U << 3);
         looked_ = false;
         return received_;
-      default: return registers_[address];
+      default:
+        return registers_[address];
     }
   }
   void on_write(hal::Address address, std::uint32_t value) override {

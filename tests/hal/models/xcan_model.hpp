@@ -36,14 +36,24 @@ class XcanModel : public RegisterModel {
  protected:
   std::uint32_t on_read(hal::Address address) override {
     switch (address - base) {
-      case 0x00: return enabled_ ? 0b10 : 0;
-      case 0x10: return (tec_ & 0xff) | rec_ << 8;
+      case 0x00:
+        return enabled_ ? 0b10 : 0;
+      case 0x10:
+        return (tec_ & 0xff) | rec_ << 8;
       case 0x18:
         if (!enabled_) return 1;
-        return (stuck ? 0 : 1U << 3) | (off_ ? 0b10U : tec_ > 127 || rec_ > 127 ? 0b11U : 0b01U) << 7 |
+        return (stuck ? 0 : 1U << 3) |
+               (off_                       ? 0b10U
+                : tec_ > 127 || rec_ > 127 ? 0b11U
+                                           : 0b01U)
+                   << 7 |
                (full_ ? 1U << 10 : 0);
-      case 0x1c: return isr_ | (received_.empty() ? 0 : 1U << 7);
-      case 0x50: case 0x54: case 0x58: case 0x5c: {
+      case 0x1c:
+        return isr_ | (received_.empty() ? 0 : 1U << 7);
+      case 0x50:
+      case 0x54:
+      case 0x58:
+      case 0x5c: {
         const std::uint32_t word = (address - base - 0x50) / 4;
         require(!received_.empty(), "reads an empty FIFO");
         require(word == next_read_, "reads the four words out of order");
@@ -53,7 +63,8 @@ class XcanModel : public RegisterModel {
         if (word == 3) received_.pop_front();
         return value;
       }
-      default: return registers_[address];
+      default:
+        return registers_[address];
     }
   }
   void on_write(hal::Address address, std::uint32_t value) override {
@@ -66,13 +77,23 @@ class XcanModel : public RegisterModel {
         require(!off_ || (value & 0b10) == 0, "enables a controller that is off the bus without a reset");
         enabled_ = (value & 0b10) != 0;
         return;
-      case 0x04: case 0x08: case 0x0c:
+      case 0x04:
+      case 0x08:
+      case 0x0c:
         require(!enabled_, "configuration while CEN is set");
         registers_[address] = value;
         return;
-      case 0x60: case 0x20: registers_[address] = value; return;
-      case 0x24: isr_ &= ~value; return;
-      case 0x30: case 0x34: case 0x38: case 0x3c: {
+      case 0x60:
+      case 0x20:
+        registers_[address] = value;
+        return;
+      case 0x24:
+        isr_ &= ~value;
+        return;
+      case 0x30:
+      case 0x34:
+      case 0x38:
+      case 0x3c: {
         const std::uint32_t word = (address - base - 0x30) / 4;
         require(word == next_write_, "writes the four words out of order");
         require(!full_, "writes to a full FIFO");
@@ -82,7 +103,8 @@ class XcanModel : public RegisterModel {
         if (word == 3) sent.push_back(building_);
         return;
       }
-      default: require(false, "writes offset " + std::to_string(address - base));
+      default:
+        require(false, "writes offset " + std::to_string(address - base));
     }
   }
 
