@@ -15,6 +15,7 @@ packages=(
   gnuplot-nox
   # target
   gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm
+  binutils-aarch64-linux-gnu openocd
   # tests
   libgtest-dev librapidcheck-dev libbenchmark-dev liborocos-kdl-dev libmujoco-dev libpagmo-dev python3 llvm-14
 )
