@@ -179,17 +179,19 @@ struct WithOutputs<outputs, fxdyn::RobotModel<N, all, Joints...>> {
 /// What goes through to the node: all but the torques and SDO answers of the others, half of a bus.
 template <class M>
 auto filters() {
-  std::array<can_filter, 7 + M::outputs> list{{{0x000, 0x780},  // NMT
-                                               {0x080, 0x780},  // SYNC, EMCY
-                                               {0x100, 0x780},  // TIME
-                                               {0x200, 0x600},  // setpoints
-                                               {0x400, 0x700},
-                                               {0x500, 0x780},
-                                               {0x600, 0x600}}};  // SDO requests, heartbeats
-  std::size_t at = 7;
+  constexpr canid_t base = CAN_EFF_FLAG;  // of frames with 11 bits the mask's function codes, of the others all
+  std::array<can_filter, 8 + M::outputs> list{{{CAN_EFF_FLAG, base},
+                                               {0x000, base | 0x780},  // NMT
+                                               {0x080, base | 0x780},  // SYNC, EMCY
+                                               {0x100, base | 0x780},  // TIME
+                                               {0x200, base | 0x600},  // setpoints
+                                               {0x400, base | 0x700},
+                                               {0x500, base | 0x780},
+                                               {0x600, base | 0x600}}};  // SDO requests, heartbeats
+  std::size_t at = 8;
   for (std::size_t j = 0; j < M::joints; ++j) {
     if ((M::outputs_mask >> j & 1U) != 0)
-      list[at++] = {static_cast<canid_t>(fxdyn::canopen::torque_id + j + 1), CAN_SFF_MASK | CAN_EFF_FLAG};
+      list[at++] = {static_cast<canid_t>(fxdyn::canopen::torque_id + j + 1), base | CAN_SFF_MASK};
   }
   return list;
 }

@@ -87,6 +87,8 @@ CanOpenResult CanSocket::open(std::string_view interface, bool fd, std::span<con
 void CanSocket::close() {
   if (socket_ >= 0) ::close(socket_);
   socket_ = -1;
+  next_ = end_ = 0;
+  drained_ = false;
 }
 
 Status CanSocket::send(const canfd_frame& frame, bool fd) {
@@ -102,31 +104,74 @@ Status CanSocket::send(const canfd_frame& frame, bool fd) {
   return errno == EAGAIN || errno == ENOBUFS ? Status::busy : failed();
 }
 
-Status CanSocket::receive(canfd_frame& frame, bool& fd) {
-  for (;;) {
-    iovec part{&frame, sizeof frame};
-    alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(scm_timestamping)) + CMSG_SPACE(sizeof(std::uint32_t))> control;
-    msghdr message{};
-    message.msg_iov = &part;
-    message.msg_iovlen = 1;
-    message.msg_control = control.data();
-    message.msg_controllen = control.size();
-    const ssize_t size = ::recvmsg(socket_, &message, 0);
-    if (size < 0 && errno == EINTR) continue;
-    if (size < 0) return errno == EAGAIN ? Status::busy : failed();
-    if (size != CAN_MTU && size != CANFD_MTU) return Status::failed;
-    for (cmsghdr* part_of = CMSG_FIRSTHDR(&message); part_of != nullptr; part_of = CMSG_NXTHDR(&message, part_of)) {
-      if (part_of->cmsg_level != SOL_SOCKET) continue;
-      if (part_of->cmsg_type == SO_RXQ_OVFL) std::memcpy(&errors_.lost, CMSG_DATA(part_of), sizeof errors_.lost);
-      if (part_of->cmsg_type == SO_TIMESTAMPING) {
+std::size_t CanSocket::send(std::span<const can_frame> frames) {
+  if (errors_.state == CanState::bus_off) return 0;
+  std::array<iovec, batch> parts;
+  std::array<mmsghdr, batch> messages{};
+  const std::size_t count = std::min(frames.size(), batch);
+  for (std::size_t i = 0; i < count; ++i) {
+    parts[i] = {const_cast<can_frame*>(&frames[i]), sizeof frames[i]};  // sendmmsg only reads it
+    messages[i].msg_hdr.msg_iov = &parts[i];
+    messages[i].msg_hdr.msg_iovlen = 1;
+  }
+  const int sent = ::sendmmsg(socket_, messages.data(), static_cast<unsigned>(count), 0);
+  return sent > 0 ? static_cast<std::size_t>(sent) : 0;
+}
+
+Status CanSocket::fetch() {
+  if (std::exchange(drained_, false)) return Status::busy;
+  constexpr std::size_t control_bytes = CMSG_SPACE(sizeof(scm_timestamping)) + CMSG_SPACE(sizeof(std::uint32_t));
+  alignas(cmsghdr) std::array<std::array<char, control_bytes>, batch> control;
+  std::array<iovec, batch> parts;
+  std::array<mmsghdr, batch> messages{};
+  for (std::size_t i = 0; i < batch; ++i) {
+    parts[i] = {&received_[i].frame, sizeof received_[i].frame};
+    messages[i].msg_hdr.msg_iov = &parts[i];
+    messages[i].msg_hdr.msg_iovlen = 1;
+    messages[i].msg_hdr.msg_control = control[i].data();
+    messages[i].msg_hdr.msg_controllen = control_bytes;
+  }
+  int count = 0;
+  do {
+    count = ::recvmmsg(socket_, messages.data(), batch, MSG_DONTWAIT, nullptr);
+  } while (count < 0 && errno == EINTR);
+  if (count < 0) return errno == EAGAIN ? Status::busy : failed();
+  next_ = 0;
+  end_ = static_cast<std::size_t>(count);
+  drained_ = end_ < batch;
+  for (std::size_t i = 0; i < end_; ++i) {
+    received_[i].size = messages[i].msg_len;
+    received_[i].lost = i > 0 ? received_[i - 1].lost : errors_.lost;
+    msghdr& message = messages[i].msg_hdr;
+    for (cmsghdr* part = CMSG_FIRSTHDR(&message); part != nullptr; part = CMSG_NXTHDR(&message, part)) {
+      if (part->cmsg_level != SOL_SOCKET) continue;
+      if (part->cmsg_type == SO_RXQ_OVFL) std::memcpy(&received_[i].lost, CMSG_DATA(part), sizeof received_[i].lost);
+      if (part->cmsg_type == SO_TIMESTAMPING) {
         scm_timestamping times;
-        std::memcpy(&times, CMSG_DATA(part_of), sizeof times);
-        received_ns_ = times.ts[0].tv_sec * 1'000'000'000LL + times.ts[0].tv_nsec;
+        std::memcpy(&times, CMSG_DATA(part), sizeof times);
+        received_[i].ns = times.ts[0].tv_sec * 1'000'000'000LL + times.ts[0].tv_nsec;
       }
     }
-    fd = size == CANFD_MTU;
-    if ((frame.can_id & CAN_ERR_FLAG) == 0) return Status::ok;
-    read_error_frame(frame);
+  }
+  return Status::ok;
+}
+
+Status CanSocket::receive(canfd_frame& frame, bool& fd) {
+  for (;;) {
+    if (next_ == end_) {
+      if (const Status status = fetch(); status != Status::ok) return status;
+    }
+    const Received& received = received_[next_++];
+    if (received.size != CAN_MTU && received.size != CANFD_MTU) return Status::failed;
+    errors_.lost = received.lost;
+    received_ns_ = received.ns;
+    if ((received.frame.can_id & CAN_ERR_FLAG) != 0) {
+      read_error_frame(received.frame);
+      continue;
+    }
+    frame = received.frame;
+    fd = received.size == CANFD_MTU;
+    return Status::ok;
   }
 }
 

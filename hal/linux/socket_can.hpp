@@ -3,6 +3,8 @@
 #include <linux/can.h>
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -48,6 +50,9 @@ class CanSocket {
   [[nodiscard]] CanOpenResult open(std::string_view interface, bool fd, std::span<const can_filter> filters = {});
   void close();
   Status send(const canfd_frame& frame, bool fd);
+  /// Several classic frames with one system call: how many went. Fewer: as send() of the next one would say.
+  std::size_t send(std::span<const can_frame> frames);
+  /// Takes up to `batch` frames from the kernel at once.
   Status receive(canfd_frame& frame, bool& fd);
   /// From the error frames that receive() has met.
   CanErrors errors();
@@ -66,7 +71,18 @@ class CanSocket {
  private:
   Status failed();
   void read_error_frame(const canfd_frame& frame);
+  Status fetch();
 
+  static constexpr std::size_t batch = 16;
+  struct Received {
+    canfd_frame frame;
+    std::size_t size;
+    std::int64_t ns;
+    std::uint32_t lost;
+  };
+  std::array<Received, batch> received_;
+  std::size_t next_ = 0, end_ = 0;  ///< of received_
+  bool drained_ = false;            ///< the kernel had no more
   int socket_ = -1;
   int restart_error_ = 0, failure_ = 0;
   std::int64_t restarted_ns_ = 0;

@@ -3,6 +3,9 @@
 #include <poll.h>
 #include <time.h>
 
+#include <algorithm>
+#include <array>
+
 namespace fxdyn::can {
 namespace {
 
@@ -40,6 +43,21 @@ void SocketBus::send(const Frame& frame) {
     const timespec pause{0, 100'000};
     ::nanosleep(&pause, nullptr);
   }
+}
+
+void SocketBus::send_all(std::span<const Frame> frames) {
+  std::array<can_frame, 16> classic{};
+  std::size_t count = 0;
+  while (count < std::min(frames.size(), classic.size()) && !frames[count].fd && !frames[count].extended &&
+         !frames[count].remote) {
+    const Frame& frame = frames[count];
+    classic[count].can_id = frame.id;
+    classic[count].len = frame.size;
+    std::copy_n(frame.data.begin(), frame.size, classic[count].data);
+    ++count;
+  }
+  const std::size_t sent = socket_.hal::linux::CanSocket::send(std::span{classic}.first(count));
+  for (const Frame& frame : frames.subspan(sent)) send(frame);
 }
 
 bool SocketBus::receive(Frame& frame, Duration timeout) {

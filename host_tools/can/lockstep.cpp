@@ -33,17 +33,21 @@ Lockstep::Lockstep(Master& master, Options options)
   }
 }
 
-void Lockstep::send_setpoints(std::span<const WireSetpoint> setpoints) {
+void Lockstep::send_setpoints_and_sync(std::span<const WireSetpoint> setpoints) {
+  frames_.clear();
   if (options_.fd) {
-    Frame frame{.id = canopen::setpoint_id + 1, .fd = true, .size = fd_length(WireSetpoint::bytes * setpoints.size())};
+    Frame& frame = frames_.emplace_back(
+        Frame{.id = canopen::setpoint_id + 1, .fd = true, .size = fd_length(WireSetpoint::bytes * setpoints.size())});
     for (std::size_t j = 0; j < setpoints.size(); ++j) setpoints[j].store(&frame.data[WireSetpoint::bytes * j]);
-    return master_.bus().send(frame);
+  } else {
+    for (std::size_t j = 0; j < setpoints.size(); ++j) {
+      Frame& frame = frames_.emplace_back(
+          Frame{.id = canopen::setpoint_id + 1 + static_cast<std::uint32_t>(j), .size = WireSetpoint::bytes});
+      setpoints[j].store(frame.data.data());
+    }
   }
-  for (std::size_t j = 0; j < setpoints.size(); ++j) {
-    Frame frame{.id = canopen::setpoint_id + 1 + static_cast<std::uint32_t>(j), .size = WireSetpoint::bytes};
-    setpoints[j].store(frame.data.data());
-    master_.bus().send(frame);
-  }
+  frames_.push_back({.id = canopen::sync_id});
+  master_.bus().send_all(frames_);
 }
 
 /// True: the frame is a torque. Of several joints in one FD frame, the node's own is the first.
@@ -76,9 +80,8 @@ const std::vector<std::optional<WireTorque>>& Lockstep::tick(std::span<const Wir
   std::fill(torques_.begin(), torques_.end(), std::nullopt);
   const Duration begin = bus.now();
   if (!begin_) begin_ = begin;
-  send_setpoints(setpoints);
   waiting_ = options_.expect.size();
-  master_.sync();
+  send_setpoints_and_sync(setpoints);
   const Duration end = bus.now() + options_.timeout;
   while (waiting_ > 0) {
     const Duration left = end - bus.now();

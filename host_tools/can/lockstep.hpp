@@ -50,12 +50,13 @@ class Lockstep {
   const Statistics& statistics() const { return statistics_; }
 
  private:
-  void send_setpoints(std::span<const WireSetpoint> setpoints);
+  void send_setpoints_and_sync(std::span<const WireSetpoint> setpoints);
   bool take(const Frame& frame);
 
   Master& master_;
   Options options_;
   std::vector<std::optional<WireTorque>> torques_;
+  std::vector<Frame> frames_;  ///< of a tick
   std::size_t waiting_ = 0;
   std::optional<Duration> begin_;
   Statistics statistics_;

@@ -42,9 +42,9 @@ shares=(-virtfs "local,path=/,mount_tag=host,security_model=none,readonly=on,mul
 
 # -accel tcg: /dev/kvm may be there and hang.
 code=0
-timeout --kill-after=5 "${FXDYN_GUEST_TIMEOUT:-120}" qemu-system-x86_64 -accel tcg -cpu max -m "${FXDYN_GUEST_MEMORY:-512M}" \
+timeout --kill-after=5 "${FXDYN_GUEST_TIMEOUT:-120}" qemu-system-x86_64 -accel tcg -cpu qemu64 -m "${FXDYN_GUEST_MEMORY:-512M}" \
   -smp "${FXDYN_GUEST_CPUS:-1}" -no-reboot -nodefaults -display none -kernel "$guest/vmlinux" -initrd "$work/initrd" \
-  -append "console=ttyS1 ${FXDYN_GUEST_DEBUG:-quiet} panic=-1 mitigations=off no_timer_check" "${shares[@]}" \
+  -append "console=ttyS1 ${FXDYN_GUEST_DEBUG:-quiet} panic=-1 mitigations=off no_timer_check tsc=reliable" "${shares[@]}" \
   -device isa-debug-exit,iobase=0xf4,iosize=1 -serial "file:$work/console" -serial "file:$work/kernel" "${qemu[@]}" || code=$?
 cat "$work/console"; [ -z "${FXDYN_GUEST_DEBUG:-}" ] || cat "$work/kernel" >&2
 if [ $((code & 1)) -eq 1 ] && [ $code -ne 137 ] && [ $code -lt 251 ]; then exit $((code >> 1)); fi
