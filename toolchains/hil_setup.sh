@@ -52,7 +52,7 @@ make -s -C "/usr/src/$headers" M="$PWD/gpio-sim" modules >gpio-sim/log 2>&1 || {
   exit 1
 }
 
-# The initramfs: busybox, the modules with those they depend on, and guest_init.sh as /init.
+# The initramfs: busybox, the modules and those they depend on. tests/hil/guest.sh adds /init.
 modules=(virtio_pci virtio_console 9p 9pnet_virtio overlay can can_raw can_dev vcan slcan kvaser_pci configfs)
 mkdir -p initramfs/{bin,dev,proc,sys,root,lib/modules}
 cp /bin/busybox initramfs/bin/
@@ -66,7 +66,6 @@ while read -r file; do
 done <modules.list >initramfs/lib/modules/order
 cp gpio-sim/gpio-sim.ko initramfs/lib/modules/
 echo gpio-sim.ko >>initramfs/lib/modules/order
-install -m 755 "$here/guest_init.sh" initramfs/init
 (cd initramfs && find . | cpio --quiet -o -H newc) | gzip -1 >initramfs.gz
 truncate -s %4 initramfs.gz  # where guest.sh's archive may begin
 rm -rf image initramfs modules.list

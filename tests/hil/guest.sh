@@ -22,7 +22,7 @@ shift
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-# The command goes into a second archive behind the initramfs, which the kernel unpacks over the first.
+# The command and the first process go into a second archive behind the initramfs, which the kernel unpacks over the first.
 printf '%s' "$output" >"$work/output-directory"
 {
   printf 'cd %q || exit 126\n' "$PWD"
@@ -34,7 +34,8 @@ printf '%s' "$output" >"$work/output-directory"
 } >"$work/command"
 {
   cat "$guest/initramfs.gz"
-  (cd "$work" && printf 'command\noutput-directory\n' | cpio --quiet -o -H newc)
+  install -m 755 "$root/tests/hil/guest_init.sh" "$work/init"
+  (cd "$work" && printf 'init\ncommand\noutput-directory\n' | cpio --quiet -o -H newc)
 } >"$work/initrd"
 
 shares=(-virtfs "local,path=/,mount_tag=host,security_model=none,readonly=on,multidevs=remap")

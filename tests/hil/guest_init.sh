@@ -19,10 +19,10 @@ share host /host ro,cache=loose || leave 126
 $b mount -t tmpfs none /changes
 $b mkdir /changes/upper /changes/work
 $b mount -t overlay -o lowerdir=/host,upperdir=/changes/upper,workdir=/changes/work none /root || leave 126
-for directory in dev proc sys; do $b mount -o bind /$directory /root/$directory; done
 $b mkdir -p /dev/pts
 $b mount -t devpts none /dev/pts
 $b mount -t configfs none /sys/kernel/config
+for directory in dev proc sys; do $b mount -o rbind /$directory /root/$directory; done
 output=$($b cat /output-directory)
 if [ -n "$output" ]; then share output "/root$output" rw,cache=none || leave 126; fi
 $b cp /command /root/run/fxdyn-command
