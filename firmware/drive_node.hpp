@@ -189,7 +189,7 @@ class DriveNode {
   static constexpr bool can_fd = Frame::most_bytes >= 64 && WireSetpoint::bytes * joints <= 64;
   static constexpr std::size_t most_frames = 64;  ///< of one poll, so that a flood does not starve the rest
   static constexpr std::uint32_t all_joints = joints == 32 ? 0xFFFF'FFFF : (1U << joints) - 1;
-  static constexpr std::uint32_t longest_gap = 0xFFFF;  ///< stale ticks that are counted in a row
+  static constexpr std::uint32_t longest_gap = 0x00FF'FFFF;  ///< stale ticks that are counted in a row
 
   /// Frames that wait to be sent, one place each, most urgent first. A newer one takes the older one's place.
   static constexpr std::size_t emergency_place = 0, torque_place = 1, sdo_place = torque_place + outputs,
@@ -453,7 +453,7 @@ class DriveNode {
       statuses_[o] = status;
       zero = zero && raw == 0;
     }
-    if (zero && !fresh && !hold) forget();
+    if (zero && stale_ > configuration_.tolerated + configuration_.ramp_ticks) forget();
     put_torques();
     static_cast<void>(hardware_.tick_busy.set(false));
     flush();
@@ -500,7 +500,8 @@ class DriveNode {
     return on;
   }
 
-  /// The torque has come to rest without setpoints: the next ones begin anew.
+  /// As long without setpoints as the longest ramp takes: the next ones begin anew. A time and not just a torque of
+  /// zero, so that drives of one joint each forget when a drive of all does.
   void forget() {
     model_state_ = {};
     has_last_ = false;

@@ -84,7 +84,7 @@ TEST(DriveNodesTogether, LookLikeOneNode) {
   std::uint32_t left_out = 0;
   for (std::size_t k = 0; k < 2000; ++k) {
     const auto setpoints = test::motion(k);
-    const std::uint32_t missing = random() % 20;
+    const std::size_t missing = random() % 20;
     left_out += missing < 6 ? 1 : 0;
     for (std::size_t j = 0; j < 6; ++j) {
       if (j == missing) continue;
