@@ -13,9 +13,9 @@
 #include "tests/golden/tables.hpp"
 #include "tests/hil/motion.hpp"
 
-// Faults on a node's bus, thousands of each kind, while motion is streamed to it. The injector works out what the node has to
-// count; after every fault the node's counters are compared with that. Nothing here knows whether the node is in memory
-// or behind a real bus.
+// Faults on a node's bus, thousands of each kind, while motion is streamed to it. The injector works out what the node
+// has to count; after every fault the node's counters are compared with that. Nothing here knows whether the node is in
+// memory or behind a real bus.
 
 namespace fxdyn::hil {
 
