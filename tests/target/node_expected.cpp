@@ -2,7 +2,10 @@
 // bus, the six setpoints and the six torques (per mille and mN*m, little endian), in hexadecimal. A line "reset" where
 // the model starts at rest.
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <cstdlib>
 
 #include "firmware/setpoint_codec.hpp"
 #include "tests/golden/tables.hpp"
@@ -18,6 +21,20 @@ void print(const std::uint8_t* bytes, std::size_t size) {
   for (std::size_t i = 0; i < size; ++i) std::printf("%02X", bytes[i]);
 }
 
+/// Whether no joint moves by more than twice its velocity limit allows, from tick to tick of the run.
+bool is_plausible(const std::int32_t* run) {
+  for (std::size_t tick = 1; tick < golden::ticks_per_run; ++tick) {
+    for (std::size_t j = 0; j < Model::joints; ++j) {
+      const auto& limits = tables::parameters.constants[j].limits;
+      const double most = 2 * 0.002 * std::max(-limits.dq_lower.raw, limits.dq_upper.raw) *
+                          std::exp2(Position<Model::Numbers>::bits - Velocity<Model::Numbers>::bits);
+      const std::int32_t* now = run + 3 * (Model::joints * tick + j);
+      if (std::abs(double{1} * now[0] - now[-3 * static_cast<int>(Model::joints)]) > most) return false;
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 int main() {
@@ -28,6 +45,11 @@ int main() {
   const std::int32_t* in = golden::setpoints.data();
   for (std::size_t tick = 0; tick < golden::ticks; ++tick) {
     if (tick % golden::ticks_per_run == 0) {
+      if (!is_plausible(in)) {
+        tick += golden::ticks_per_run - 1;
+        in += 3 * Model::joints * golden::ticks_per_run;
+        continue;
+      }
       state = {};
       std::puts("reset");
     }
