@@ -120,17 +120,21 @@ class DriveNode {
   /// comes or longest_sleep_us have passed.
   bool poll() {
     bool more = true;
-    for (std::size_t handled = 0; more && handled < most_frames; ++handled) {
+    std::size_t handled = 0;
+    for (; more && handled < most_frames; ++handled) {
       hardware_.counter.start();
       more = hardware_.bus.receive(received_) == hal::Status::ok;
       if (more) handle();
       const std::uint32_t cost = hardware_.counter.stop() - empty_measurement_;
       if (more) since_tick_ += cost;
     }
+    hardware_.counter.start();
     serve(hardware_.clock.now_us());
     flush();
+    const std::uint32_t cost = hardware_.counter.stop() - empty_measurement_;
+    if (handled > 1 || more) since_tick_ += cost;  // polls for nothing are no work
     if (!is_supervised()) hardware_.watchdog.feed();
-    return more || (pending_ != 0 && !off_bus_);
+    return more || pending_ != 0;
   }
 
   NmtState state() const { return state_; }
@@ -167,8 +171,10 @@ class DriveNode {
     // every signed object that can be written has 32 bits
     const std::int64_t number =
         is_signed(object.type()) ? std::int64_t{static_cast<std::int32_t>(value)} : std::int64_t{value};
-    if (number < object.entry->lowest) return canopen::Abort::too_low;
-    if (number > object.entry->highest) return canopen::Abort::too_high;
+    const dictionary::Entry& entry = *object.entry;
+    if (number < entry.lowest) return canopen::Abort::too_low;
+    if (number > entry.highest)
+      return entry.lowest == entry.highest ? canopen::Abort::invalid_value : canopen::Abort::too_high;
     return set(object, value);
   }
 
@@ -317,16 +323,20 @@ class DriveNode {
       return errors_.raise(Error::sync_length, received_.size, hardware_.clock.now_us());
     }
     if (state_ != NmtState::operational) return;
-    sync_us_ = hardware_.clock.now_us();
-    overdue_after_us_ = configuration_.period_us + configuration_.period_us / 2;
+    wait_for_sync(configuration_.period_us);
     synchronised_ = true;
     tick(true);
+  }
+  /// The next SYNC is overdue after one and a half periods.
+  void wait_for_sync(std::uint32_t period_us) {
+    sync_us_ = hardware_.clock.now_us();
+    overdue_after_us_ = period_us + period_us / 2;
   }
 
   void handle_setpoint(std::size_t j) {
     if (state_ != NmtState::operational) return;
     const bool together = can_fd && configuration_.fd;
-    const std::size_t size = together ? canopen_fd_size(WireSetpoint::bytes * joints) : WireSetpoint::bytes;
+    const std::size_t size = together ? hal::fd_length(WireSetpoint::bytes * joints) : WireSetpoint::bytes;
     if (received_.remote || received_.size != size || (together && j != 0)) {
       count(Counter::malformed_setpoints);
       return errors_.raise(Error::pdo_length, static_cast<std::uint16_t>(j + 1), hardware_.clock.now_us());
@@ -537,8 +547,7 @@ class DriveNode {
     show_fault();
   }
 
-  /// Bus-off: everything that waits is old when the node comes back, which takes 128 times 11 recessive bits (ISO
-  /// 11898-1, 12.1.4.4), asked for at once.
+  /// Out of bus-off a node comes after 128 times 11 recessive bits (ISO 11898-1, fault confinement), asked for at once.
   void serve_bus(std::uint32_t now) {
     const hal::CanErrors bus = hardware_.bus.errors();
     if (bus.lost != seen_lost_) {
@@ -550,8 +559,6 @@ class DriveNode {
       if (!off_bus_) {
         off_bus_ = true;
         count(Counter::bus_offs);
-        count(Counter::lost_sent, static_cast<std::uint32_t>(std::popcount(pending_)));
-        pending_ = 0;
         communication_failed();
       }
       static_cast<void>(hardware_.bus.restart());  // its state tells what came of it
@@ -602,9 +609,7 @@ class DriveNode {
       sync_us_ += overdue_after_us_;
       if (now - sync_us_ >= configuration_.period_us) sync_us_ = now;  // far behind: no burst of ticks
       overdue_after_us_ = configuration_.period_us;
-      hardware_.counter.start();
       tick(false);
-      since_tick_ += hardware_.counter.stop() - empty_measurement_;
     } else if (state_ != NmtState::operational && now - own_tick_us_ >= tick_us_) {
       own_tick_us_ = now - own_tick_us_ < 2 * tick_us_ ? own_tick_us_ + tick_us_ : now;
       for (std::size_t o = 0; o < outputs; ++o) torques_[o].release(steps_[o]);
@@ -650,7 +655,7 @@ class DriveNode {
   void put_torques() {
     if (can_fd && configuration_.fd) {
       if (!may_send_torque(0)) return;
-      const std::size_t size = canopen_fd_size(WireTorque::bytes * outputs);
+      const std::size_t size = hal::fd_length(WireTorque::bytes * outputs);
       Frame& frame = put(torque_place, configuration_.torque_ids[0] & canopen::cob_identifier, size);
       frame.fd = true;
       std::fill(frame.data.begin(), frame.data.end(), std::uint8_t{0});
@@ -672,7 +677,10 @@ class DriveNode {
   }
 
   void flush() {
-    if (off_bus_) return;
+    if (off_bus_) {  // what waits would be old when the node comes back
+      count(Counter::lost_sent, static_cast<std::uint32_t>(std::popcount(pending_)));
+      pending_ = 0;
+    }
     while (pending_ != 0) {
       const auto place = static_cast<std::size_t>(std::countr_zero(pending_));
       const hal::Status status = hardware_.bus.send(to_send_[place]);
@@ -828,8 +836,11 @@ class DriveNode {
         configuration_.sync_id = value;
         return canopen::Abort::none;
       case V::cycle_period:
-        configuration_.period_us = std::min<std::uint32_t>(value, longest_period_us);
-        return value > longest_period_us ? canopen::Abort::too_high : canopen::Abort::none;
+        if (value > longest_period_us) return canopen::Abort::too_high;
+        if (value != 0 && value < shortest_period_us) return canopen::Abort::too_low;
+        configuration_.period_us = value;
+        wait_for_sync(value);
+        return canopen::Abort::none;
       case V::emergency_inhibit:
         configuration_.emergency_inhibit = value;
         return canopen::Abort::none;
@@ -896,13 +907,8 @@ class DriveNode {
     }
   }
 
-  /// Bytes of the shortest FD frame that holds `size` (ISO 11898-1, DLC).
-  static constexpr std::size_t canopen_fd_size(std::size_t size) {
-    for (const std::size_t length : {8U, 12U, 16U, 20U, 24U, 32U, 48U})
-      if (size <= length) return length;
-    return 64;
-  }
-
+  /// Limits of 0x1006 where it is not 0.
+  static constexpr std::uint32_t shortest_period_us = 200;
   static constexpr std::uint32_t longest_period_us = 10'000'000;
 
   Hardware& hardware_;
