@@ -37,10 +37,15 @@ inline constexpr auto values = [] {
 constexpr std::uint32_t from_hex(std::uint8_t c) { return values[c]; }
 }  // namespace detail
 
+/// Whether SLCAN can carry the frame.
+constexpr bool is_valid(const ClassicFrame& frame) {
+  return !frame.fd && frame.size <= 8 && frame.id <= (frame.extended ? 0x1fff'ffffU : 0x7ffU);
+}
+
 /// Writes the frame's line with its CR to `out`, which must hold longest_line bytes; returns the length, 0 where the
-/// frame is none that SLCAN can carry (CAN FD, too long, identifier too large).
+/// frame is not valid.
 constexpr std::size_t encode(const ClassicFrame& frame, std::span<std::uint8_t> out) {
-  if (frame.fd || frame.size > 8 || frame.id > (frame.extended ? 0x1fff'ffffU : 0x7ffU)) return 0;
+  if (!is_valid(frame)) return 0;
   std::size_t at = 0;
   const char type = frame.remote ? (frame.extended ? 'R' : 'r') : (frame.extended ? 'T' : 't');
   out[at++] = static_cast<std::uint8_t>(type);
@@ -110,19 +115,19 @@ class SlcanBus {
 
   explicit constexpr SlcanBus(Port& port) : port_(port) {}
 
+  /// Queues the frame as it is, like a controller; its text is made when the line takes it, in receive() and idle().
   Status send(const Frame& frame) {
-    const bool room = make_room(slcan::longest_line);
-    if (!open_ || !room) return Status::busy;
-    const std::size_t size = slcan::encode(frame, std::span{out_}.subspan(out_end_));
-    out_end_ += size;
-    flush();
-    return size > 0 ? Status::ok : Status::failed;
+    if (!slcan::is_valid(frame)) return Status::failed;
+    if (!open_ || queued_ == queue_.size()) return Status::busy;
+    queue_[(first_ + queued_++) % queue_.size()] = frame;
+    return Status::ok;
   }
 
   Status receive(Frame& frame) {
     flush();
     for (;;) {
-      while (at_ < end_ && in_[at_] != slcan::carriage_return) ++at_;
+      at_ = static_cast<std::size_t>(std::find(in_.begin() + at_, in_.begin() + end_, slcan::carriage_return) -
+                                     in_.begin());
       if (at_ == end_) {
         if (read_more()) continue;
         flush();  // answers to commands
@@ -144,10 +149,10 @@ class SlcanBus {
 
   CanErrors errors() { return {CanState::active, 0, 0, lost_}; }
   Status restart() { return Status::ok; }
-  /// Nothing waits to be sent: the processor may sleep until a byte arrives.
+  /// Sends what the line takes. True: nothing waits, and the processor may sleep until a byte arrives.
   bool idle() {
     flush();
-    return out_begin_ == out_end_;
+    return queued_ == 0 && out_begin_ == out_end_;
   }
 
  private:
@@ -190,24 +195,22 @@ class SlcanBus {
     }
   }
 
+  /// An answer that finds no room is dropped: whoever asks that fast does not listen.
   void answer(std::string_view text) {
-    if (!make_room(text.size())) return;
+    if (out_.size() - out_end_ < text.size()) return;
     for (const char c : text) out_[out_end_++] = static_cast<std::uint8_t>(c);
   }
 
-  bool make_room(std::size_t size) {
-    if (out_.size() - out_end_ >= size) return true;
-    flush();
-    std::copy(out_.begin() + out_begin_, out_.begin() + out_end_, out_.begin());
-    out_end_ -= out_begin_;
-    out_begin_ = 0;
-    return out_.size() - out_end_ >= size;
-  }
-
   void flush() {
-    if (out_begin_ == out_end_) return;
-    out_begin_ += port_.write(std::span{out_}.subspan(out_begin_, out_end_ - out_begin_));
-    if (out_begin_ == out_end_) out_begin_ = out_end_ = 0;
+    for (;;) {
+      out_begin_ += port_.write(std::span{out_}.subspan(out_begin_, out_end_ - out_begin_));
+      if (out_begin_ < out_end_) return;
+      out_begin_ = out_end_ = 0;
+      if (queued_ == 0) return;
+      out_end_ = slcan::encode(queue_[first_], out_);
+      first_ = (first_ + 1) % queue_.size();
+      --queued_;
+    }
   }
 
   Port& port_;
@@ -216,7 +219,9 @@ class SlcanBus {
   std::uint32_t lost_ = 0;
   std::array<std::uint8_t, 128> in_{};
   std::size_t begin_ = 0, at_ = 0, end_ = 0;  ///< of the line that is looked for, how far, of what has been read
-  std::array<std::uint8_t, 512> out_{};
+  std::array<Frame, 16> queue_{};             ///< a power of two: no division
+  std::size_t first_ = 0, queued_ = 0;
+  std::array<std::uint8_t, 64> out_{};  ///< a line and answers to commands
   std::size_t out_begin_ = 0, out_end_ = 0;
 };
 
