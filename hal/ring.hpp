@@ -1,9 +1,11 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 namespace fxdyn::hal {
 
@@ -20,6 +22,17 @@ class Ring {
     items_[head % size] = item;
     head_.store(head + 1, std::memory_order_release);
     return true;
+  }
+  /// Takes out as many as there are and fit; returns how many.
+  std::size_t pop(std::span<T> items) {
+    const std::uint32_t tail = tail_.load(std::memory_order_relaxed);
+    const std::size_t there = head_.load(std::memory_order_acquire) - tail;
+    const std::size_t count = there < items.size() ? there : items.size();
+    const std::size_t from = tail % size, until_wrap = size - from, first = count < until_wrap ? count : until_wrap;
+    std::copy_n(items_.begin() + from, first, items.begin());
+    std::copy_n(items_.begin(), count - first, items.begin() + static_cast<std::ptrdiff_t>(first));
+    tail_.store(tail + static_cast<std::uint32_t>(count), std::memory_order_release);
+    return count;
   }
   bool pop(T& item) {
     const std::uint32_t tail = tail_.load(std::memory_order_relaxed);

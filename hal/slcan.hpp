@@ -1,9 +1,11 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string_view>
 
 #include "hal/can.hpp"
 #include "hal/serial.hpp"
@@ -20,30 +22,38 @@ inline constexpr std::uint8_t carriage_return = '\r', bell = '\a';
 inline constexpr std::size_t longest_line = 1 + 8 + 1 + 16 + 1;  ///< T, identifier, length, eight bytes, CR
 
 namespace detail {
-constexpr std::uint8_t to_hex(std::uint32_t nibble) {
-  return static_cast<std::uint8_t>(nibble < 10 ? '0' + nibble : 'A' + (nibble - 10));
-}
-/// The digit's value; 16 where it is none.
-constexpr std::uint32_t from_hex(std::uint8_t c) {
-  if (c >= '0' && c <= '9') return c - std::uint32_t{'0'};
-  if (c >= 'A' && c <= 'F') return c - std::uint32_t{'A'} + 10;
-  if (c >= 'a' && c <= 'f') return c - std::uint32_t{'a'} + 10;
-  return 16;
-}
+inline constexpr std::array<std::uint8_t, 16> digits{'0', '1', '2', '3', '4', '5', '6', '7',
+                                                     '8', '9', 'A', 'B', 'C', 'D', 'E', 'F'};
+constexpr std::uint8_t to_hex(std::uint32_t nibble) { return digits[nibble & 0xf]; }
+
+/// Values of hexadecimal digits; 16 of everything else.
+inline constexpr auto values = [] {
+  std::array<std::uint8_t, 256> table{};
+  table.fill(16);
+  for (std::uint8_t i = 0; i < 16; ++i) table[digits[i]] = i;
+  for (std::uint8_t i = 10; i < 16; ++i) table[static_cast<std::size_t>('a' + i - 10)] = i;
+  return table;
+}();
+constexpr std::uint32_t from_hex(std::uint8_t c) { return values[c]; }
 }  // namespace detail
 
+/// Whether SLCAN can carry the frame.
+constexpr bool is_valid(const ClassicFrame& frame) {
+  return !frame.fd && frame.size <= 8 && frame.id <= (frame.extended ? 0x1fff'ffffU : 0x7ffU);
+}
+
 /// Writes the frame's line with its CR to `out`, which must hold longest_line bytes; returns the length, 0 where the
-/// frame is none that SLCAN can carry (CAN FD, too long, identifier too large).
+/// frame is not valid.
 constexpr std::size_t encode(const ClassicFrame& frame, std::span<std::uint8_t> out) {
-  if (frame.fd || frame.size > 8 || frame.id > (frame.extended ? 0x1fff'ffffU : 0x7ffU)) return 0;
+  if (!is_valid(frame)) return 0;
   std::size_t at = 0;
   const char type = frame.remote ? (frame.extended ? 'R' : 'r') : (frame.extended ? 'T' : 't');
   out[at++] = static_cast<std::uint8_t>(type);
-  for (int digit = frame.extended ? 8 : 3; digit-- > 0;) out[at++] = detail::to_hex(frame.id >> (4 * digit) & 0xf);
+  for (int digit = frame.extended ? 8 : 3; digit-- > 0;) out[at++] = detail::to_hex(frame.id >> (4 * digit));
   out[at++] = detail::to_hex(frame.size);
   for (std::size_t i = 0; !frame.remote && i < frame.size; ++i) {
-    out[at++] = detail::to_hex(frame.data[i] >> 4);
-    out[at++] = detail::to_hex(frame.data[i] & 0xfU);
+    out[at++] = detail::to_hex(frame.data[i] >> 4U);
+    out[at++] = detail::to_hex(frame.data[i]);
   }
   out[at++] = carriage_return;
   return at;
@@ -105,68 +115,65 @@ class SlcanBus {
 
   explicit constexpr SlcanBus(Port& port) : port_(port) {}
 
+  /// Queues the frame as it is, like a controller; its text is made when the line takes it, in receive() and idle().
   Status send(const Frame& frame) {
-    flush();
-    std::array<std::uint8_t, slcan::longest_line> line;
-    const std::size_t size = slcan::encode(frame, line);
-    if (size == 0) return Status::failed;
-    if (!open_ || !put(std::span{line}.first(size))) return Status::busy;
-    flush();
+    if (!slcan::is_valid(frame)) return Status::failed;
+    if (!open_ || queued_ == queue_.size()) return Status::busy;
+    queue_[(first_ + queued_++) % queue_.size()] = frame;
     return Status::ok;
   }
 
   Status receive(Frame& frame) {
     flush();
     for (;;) {
-      for (; begin_ < end_;) {
-        const std::uint8_t byte = chunk_[begin_++];
-        if (byte != slcan::carriage_return) {
-          // A line that grows beyond every frame is dropped as a whole: its rest must not pass for a frame.
-          if (size_ <= line_.size()) {
-            if (size_ < line_.size()) line_[size_] = byte;
-            ++size_;
-          }
-          continue;
-        }
-        const bool whole = size_ <= line_.size();
-        const std::span<const std::uint8_t> line = std::span{line_}.first(whole ? size_ : 0);
-        const bool empty = size_ == 0;
-        size_ = 0;
-        if (empty) continue;
-        if (!whole) {
-          ++lost_;
-        } else if (slcan::decode(line, frame)) {
-          if (open_) return Status::ok;
-          put(std::span{&slcan::bell, 1});
-        } else {
-          obey(line);
-        }
+      at_ = static_cast<std::size_t>(std::find(in_.begin() + at_, in_.begin() + end_, slcan::carriage_return) -
+                                     in_.begin());
+      if (at_ == end_) {
+        if (read_more()) continue;
+        flush();  // answers to commands
+        return Status::busy;
       }
-      begin_ = 0;
-      end_ = port_.read(chunk_);
-      if (end_ > 0) continue;
-      flush();  // answers to commands
-      return Status::busy;
+      const std::span<const std::uint8_t> line = std::span{in_}.subspan(begin_, at_ - begin_);
+      begin_ = ++at_;
+      if (skipping_ || line.size() >= slcan::longest_line) {
+        skipping_ = false;
+        ++lost_;
+      } else if (slcan::decode(line, frame)) {
+        if (open_) return Status::ok;
+        answer("\a");
+      } else if (!line.empty()) {
+        obey(line);
+      }
     }
   }
 
   CanErrors errors() { return {CanState::active, 0, 0, lost_}; }
   Status restart() { return Status::ok; }
-  /// Nothing waits to be sent: the processor may sleep until a byte arrives.
+  /// Sends what the line takes. True: nothing waits, and the processor may sleep until a byte arrives.
   bool idle() {
     flush();
-    return used_ == 0;
+    return queued_ == 0 && out_begin_ == out_end_;
   }
 
  private:
+  bool read_more() {
+    if (end_ - begin_ >= slcan::longest_line) {
+      // Beyond every frame: dropped as a whole, its rest must not pass for a line.
+      skipping_ = true;
+      begin_ = end_;
+    }
+    if (begin_ == end_ || end_ == in_.size()) {
+      std::copy(in_.begin() + begin_, in_.begin() + end_, in_.begin());
+      end_ -= begin_;
+      begin_ = 0;
+      at_ = end_;
+    }
+    const std::size_t count = port_.read(std::span{in_}.subspan(end_));
+    end_ += count;
+    return count > 0;
+  }
+
   void obey(std::span<const std::uint8_t> line) {
-    const auto answer = [&](const char* text) {
-      std::size_t size = 0;
-      while (text[size] != 0) ++size;
-      std::array<std::uint8_t, 8> bytes{};
-      for (std::size_t i = 0; i < size; ++i) bytes[i] = static_cast<std::uint8_t>(text[i]);
-      put(std::span{bytes}.first(size));
-    };
     switch (line[0]) {
       case 'O':
         open_ = true;
@@ -188,32 +195,34 @@ class SlcanBus {
     }
   }
 
-  /// Queues the bytes to be sent, all or none.
-  bool put(std::span<const std::uint8_t> bytes) {
-    if (bytes.size() > out_.size() - used_) return false;
-    for (const std::uint8_t byte : bytes) out_[(first_ + used_++) % out_.size()] = byte;
-    return true;
+  /// An answer that finds no room is dropped: whoever asks that fast does not listen.
+  void answer(std::string_view text) {
+    if (out_.size() - out_end_ < text.size()) return;
+    for (const char c : text) out_[out_end_++] = static_cast<std::uint8_t>(c);
   }
 
   void flush() {
-    while (used_ > 0) {
-      const std::size_t until_wrap = out_.size() - first_;
-      const std::size_t count = port_.write(std::span{out_}.subspan(first_, used_ < until_wrap ? used_ : until_wrap));
-      if (count == 0) return;
-      first_ = (first_ + count) % out_.size();
-      used_ -= count;
+    for (;;) {
+      out_begin_ += port_.write(std::span{out_}.subspan(out_begin_, out_end_ - out_begin_));
+      if (out_begin_ < out_end_) return;
+      out_begin_ = out_end_ = 0;
+      if (queued_ == 0) return;
+      out_end_ = slcan::encode(queue_[first_], out_);
+      first_ = (first_ + 1) % queue_.size();
+      --queued_;
     }
   }
 
   Port& port_;
   bool open_ = true;
+  bool skipping_ = false;  ///< a line too long, until its end
   std::uint32_t lost_ = 0;
-  std::array<std::uint8_t, slcan::longest_line - 1> line_{};
-  std::size_t size_ = 0;  ///< of the line so far; beyond line_.size(): too long
-  std::array<std::uint8_t, 32> chunk_{};
-  std::size_t begin_ = 0, end_ = 0;
-  std::array<std::uint8_t, 512> out_{};  ///< a power of two: no division; 18 frames
-  std::size_t first_ = 0, used_ = 0;
+  std::array<std::uint8_t, 128> in_{};
+  std::size_t begin_ = 0, at_ = 0, end_ = 0;  ///< of the line that is looked for, how far, of what has been read
+  std::array<Frame, 16> queue_{};             ///< a power of two: no division
+  std::size_t first_ = 0, queued_ = 0;
+  std::array<std::uint8_t, 64> out_{};  ///< a line and answers to commands
+  std::size_t out_begin_ = 0, out_end_ = 0;
 };
 
 }  // namespace fxdyn::hal

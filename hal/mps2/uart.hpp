@@ -25,11 +25,7 @@ class BasicUart {
     cortex_m::enable_interrupt(registers_, uart0_receive_interrupt);
   }
 
-  std::size_t read(std::span<std::uint8_t> bytes) {
-    std::size_t count = 0;
-    while (count < bytes.size() && ring_.pop(bytes[count])) ++count;
-    return count;
-  }
+  std::size_t read(std::span<std::uint8_t> bytes) { return ring_.pop(bytes); }
 
   std::size_t write(std::span<const std::uint8_t> bytes) {
     std::size_t count = 0;

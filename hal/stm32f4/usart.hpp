@@ -26,11 +26,7 @@ class BasicUsart {
     registers_.write(control, enable | transmit_enable | receive_enable | receive_interrupt_enable);
     cortex_m::enable_interrupt(registers_, usart1_interrupt);
   }
-  std::size_t read(std::span<std::uint8_t> bytes) {
-    std::size_t count = 0;
-    while (count < bytes.size() && ring_.pop(bytes[count])) ++count;
-    return count;
-  }
+  std::size_t read(std::span<std::uint8_t> bytes) { return ring_.pop(bytes); }
   std::size_t write(std::span<const std::uint8_t> bytes) {
     std::size_t count = 0;
     while (count < bytes.size() && (registers_.read(status) & transmit_empty) != 0)

@@ -143,6 +143,7 @@ TEST(SlcanBus, AClosedChannelCarriesNothing) {
   feed(port, "O\rt1230\r");
   EXPECT_EQ(bus.receive(frame), Status::ok);
   EXPECT_EQ(bus.send({.id = 1}), Status::ok);
+  EXPECT_TRUE(bus.idle());
   EXPECT_EQ(said(port), "\rt0010\r");
 }
 
