@@ -50,7 +50,8 @@ class NodeUnderTest {
 
 class FaultCampaign {
  public:
-  FaultCampaign(NodeUnderTest& node, unsigned seed);
+  /// `period`: of the ticks; zero: as fast as the answers come.
+  FaultCampaign(NodeUnderTest& node, unsigned seed, can::Duration period);
 
   /// `events` faults. The rare kinds are as frequent as the others: events / fault_kinds each; `slow_share` thins those
   /// out that restart the node.
@@ -67,7 +68,7 @@ class FaultCampaign {
   struct Tally {
     std::uint64_t injected = 0, counted = 0;  ///< events; those that the node counted as the injector expected
     std::vector<double> recovery_ms;
-    std::uint32_t longest_ticks = 0;
+    std::uint64_t longest_ticks = 0;
   };
 
   void configure();
@@ -95,16 +96,18 @@ class FaultCampaign {
   void good_tick();
   bool is_plausible(const std::vector<WireSetpoint>& setpoints) const;
   void take(const can::Frame& frame);
-  void recover(Fault fault, can::Duration since);
+  void recover(Fault fault, can::Duration since, std::uint64_t ticks_before);
   bool sdo(const std::array<std::uint8_t, 8>& request, std::array<std::uint8_t, 8>& answer);
   Counts read_counters();
   void expect(Counter counter, std::uint32_t times = 1) { expected_[static_cast<std::size_t>(counter)] += times; }
+  std::uint32_t any(std::uint32_t below) { return static_cast<std::uint32_t>(random_() % below); }
   std::size_t any_joint() { return random_() % joints; }
   std::uint8_t any_byte() { return static_cast<std::uint8_t>(random_()); }
 
   NodeUnderTest& node_;
   can::Master master_;
   std::mt19937 random_;
+  can::Duration period_, next_tick_{};
   Motion<Model> motion_;
   std::array<Tally, fault_kinds> tallies_{};
   Counts expected_{}, counted_{};
