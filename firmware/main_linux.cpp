@@ -10,6 +10,7 @@
 #include <sys/mman.h>
 
 #include <array>
+#include <bit>
 #include <cerrno>
 #include <charconv>
 #include <cstdio>
@@ -176,11 +177,13 @@ struct WithOutputs<outputs, fxdyn::RobotModel<N, all, Joints...>> {
   using type = fxdyn::RobotModel<N, outputs, Joints...>;
 };
 
-/// What goes through to the node: all but the torques and SDO answers of the others, half of a bus.
+/// What goes through to the node: all but the torques and SDO answers of the others, half of a bus. Its own stay, since
+/// another node that sends them has to be noticed.
 template <class M>
-auto filters() {
+auto filters(std::uint32_t node) {
   constexpr canid_t base = CAN_EFF_FLAG;  // of frames with 11 bits the mask's function codes, of the others all
-  std::array<can_filter, 8 + M::outputs> list{{{CAN_EFF_FLAG, base},
+  std::array<can_filter, 9 + M::outputs> list{{{CAN_EFF_FLAG, base},
+                                               {fxdyn::canopen::sdo_answer_id + node, base | CAN_SFF_MASK},
                                                {0x000, base | 0x780},  // NMT
                                                {0x080, base | 0x780},  // SYNC, EMCY
                                                {0x100, base | 0x780},  // TIME
@@ -188,7 +191,7 @@ auto filters() {
                                                {0x400, base | 0x700},
                                                {0x500, base | 0x780},
                                                {0x600, base | 0x600}}};  // SDO requests, heartbeats
-  std::size_t at = 8;
+  std::size_t at = 9;
   for (std::size_t j = 0; j < M::joints; ++j) {
     if ((M::outputs_mask >> j & 1U) != 0)
       list[at++] = {static_cast<canid_t>(fxdyn::canopen::torque_id + j + 1), base | CAN_SFF_MASK};
@@ -227,7 +230,9 @@ class Reporter {
 template <class M, class Bus>
 int run(const Options& options) {
   static Bus bus;
-  const auto wanted = filters<M>();
+  const auto first_joint = static_cast<std::uint32_t>(std::countr_zero(M::outputs_mask)) + 1;
+  const std::uint32_t id = options.node != 0 ? options.node : first_joint;
+  const auto wanted = filters<M>(id);
   if (const auto result = bus.open(options.can, wanted); !result) quit(1, os::explain(result, options.can).c_str());
   static Enable enable;
   static Output fault, busy;
@@ -251,7 +256,7 @@ int run(const Options& options) {
   static fxdyn::DriveHardware hardware{bus, clock, counter, watchdog, enable, fault, busy};
   static fxdyn::DriveNode<M, decltype(hardware)> node(
       hardware, {parameters, page.header, valid, options.tables != nullptr, rated},
-      {.id = static_cast<std::uint8_t>(options.node), .serial_number = options.serial_number, .board = "linux"});
+      {.id = static_cast<std::uint8_t>(id), .serial_number = options.serial_number, .board = "linux"});
   std::fprintf(stderr, "fxdyn_node: node %u on %s, %zu of %zu joints, tables %08x%s, costs in %s, watchdog %s\n",
                node.id(), options.can, M::outputs, M::joints, page.header.crc32,
                valid ? "" : " INVALID: stays pre-operational", counter.unit(), watchdog.armed() ? "armed" : "none");

@@ -36,8 +36,10 @@ Duration SocketBus::now() const {
 void SocketBus::send(const Frame& frame) {
   const Duration begin = now();
   for (;;) {
-    const hal::Status status = socket_.send(frame);
+    hal::Status status = socket_.send(frame);
     if (status == hal::Status::ok) return;
+    // The kernel may restart the controller, or have done so already.
+    if (socket_.errors().state == hal::CanState::bus_off) status = socket_.restart();
     if (status == hal::Status::failed || now() - begin > longest_wait_for_room) fail();
     // A full queue of the interface (ENOBUFS) can't be polled for.
     const timespec pause{0, 100'000};

@@ -516,7 +516,7 @@ bool FaultCampaign::report() const {
     std::printf("%-13s %8llu %8llu   %.2f %.2f %.2f (%llu)\n", name_of(static_cast<Fault>(i)),
                 static_cast<unsigned long long>(tallies_[i].injected),
                 static_cast<unsigned long long>(tallies_[i].counted), at(0.5), at(0.99), at(1),
-                tallies_[i].longest_ticks);
+                static_cast<unsigned long long>(tallies_[i].longest_ticks));
     injected += tallies_[i].injected;
     counted += tallies_[i].counted;
   }
