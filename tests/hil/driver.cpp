@@ -61,7 +61,8 @@ std::uint32_t counter(can::Master& master, std::uint8_t node, Counter item) {
 
 void configure(can::Master& master, std::uint8_t node, bool fd) {
   master.command(canopen::NmtCommand::reset_node, node);
-  master.wait_for(node, canopen::NmtState::pre_operational, std::chrono::seconds(10));
+  // The boot-up message: a heartbeat may still be one from before the reset.
+  master.wait_for(node, canopen::NmtState::initialising, std::chrono::seconds(10));
   check_equal(master.read(node, 0x1018, 2), dictionary::product_code, "product code", node);
   check_equal(master.read(node, dictionary::tables, 1), tables::page.header.crc32, "CRC of the tables", node);
   check_equal(master.read(node, dictionary::tables, 3), 1, "tables valid", node);
@@ -101,6 +102,7 @@ std::array<std::uint32_t, dictionary::counters> read_counters(can::Master& maste
 int run(const Options& options) {
   can::SocketBus bus(options.can, options.fd);
   can::Master master(bus);
+  master.sdo_timeout = std::chrono::seconds(5);  // emulators
   for (const std::uint8_t node : options.nodes) {
     configure(master, node, options.fd);
   }

@@ -22,4 +22,4 @@ slcand -o -c -f -s8 -S 115200 -F hvc0 can0 &
 trap 'kill %1' EXIT
 for _ in $(seq 100); do [ -e /sys/class/net/can0 ] && break || sleep 0.1; done
 ip link set can0 txqueuelen 1000 up
-chrt -f 50 "$bin/hil_driver" --name "Cortex-M4 over SLCAN" --can can0 --nodes 1 --ticks "$ticks" --least-rate "$least"
+chrt --fifo 50 "$bin/hil_driver" --name "Cortex-M4 over SLCAN" --can can0 --nodes 1 --ticks "$ticks" --least-rate "$least"
