@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <ostream>
@@ -9,6 +10,7 @@
 #include "firmware/object_dictionary.hpp"
 #include "firmware/setpoint_codec.hpp"
 #include "model/numbers.hpp"
+#include "model/rigid_body.hpp"
 
 // The drive node's object dictionary as files: EDS (CiA 306-1) for CANopen masters, DBC for bus analysers.
 
