@@ -1,7 +1,12 @@
 # Every header that can go into a firmware compiles alone: one generated source file each.
 file(GLOB headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR}
   ${PROJECT_SOURCE_DIR}/model/*.hpp ${PROJECT_SOURCE_DIR}/model/effects/*.hpp
-  ${PROJECT_SOURCE_DIR}/hal/*.hpp ${PROJECT_SOURCE_DIR}/hal/mps2/*.hpp ${PROJECT_SOURCE_DIR}/firmware/*.hpp)
+  ${PROJECT_SOURCE_DIR}/hal/*.hpp ${PROJECT_SOURCE_DIR}/firmware/*.hpp
+  ${PROJECT_SOURCE_DIR}/hal/${FXDYN_BOARD_FAMILY}/*.hpp)
+if(FXDYN_BOARD_FAMILY MATCHES "^stm32")
+  file(GLOB common CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/hal/stm32/*.hpp)
+  list(APPEND headers ${common})
+endif()
 set(sources)
 foreach(header ${headers})
   string(MAKE_C_IDENTIFIER ${header} name)

@@ -23,6 +23,16 @@ struct CanFrame {
 using ClassicFrame = CanFrame<8>;
 using FdFrame = CanFrame<64>;
 
+/// Bytes of the shortest FD frame that holds `bytes`, up to 64: what a DLC can tell (ISO 11898-1).
+constexpr std::size_t fd_length(std::size_t bytes) {
+  constexpr std::size_t lengths[]{12, 16, 20, 24, 32, 48};
+  if (bytes <= 8) return bytes;
+  for (const std::size_t length : lengths) {
+    if (bytes <= length) return length;
+  }
+  return 64;
+}
+
 /// Fault confinement, ISO 11898-1: error active below 128 errors, passive from there on, off the bus above 255 transmit
 /// errors.
 enum class CanState : std::uint8_t { active, passive, bus_off };

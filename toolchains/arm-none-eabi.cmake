@@ -1,13 +1,16 @@
-# Bare-metal Cortex-M. -DFXDYN_CPU=cortex-m4 chooses the processor (one file each next to this one).
+# Bare-metal Arm. -DFXDYN_CPU=cortex-m4 chooses the processor (one file each next to this one).
 set(CMAKE_SYSTEM_NAME Generic)
 set(CMAKE_SYSTEM_PROCESSOR arm)
 set(CMAKE_TRY_COMPILE_PLATFORM_VARIABLES FXDYN_CPU)
 set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
 
 if(NOT FXDYN_CPU OR NOT EXISTS ${CMAKE_CURRENT_LIST_DIR}/${FXDYN_CPU}.cmake)
-  message(FATAL_ERROR "set FXDYN_CPU to cortex-m0, cortex-m3, cortex-m4, cortex-m7 or cortex-m33")
+  message(FATAL_ERROR "set FXDYN_CPU to one of the processors or boards next to this file, e.g. cortex-m4")
 endif()
 include(${CMAKE_CURRENT_LIST_DIR}/${FXDYN_CPU}.cmake)  # FXDYN_CPU_FLAGS, FXDYN_BOARD, FXDYN_LINKER_SCRIPT
+if(NOT FXDYN_BOARD_FAMILY)  # the folder in hal/
+  string(REGEX REPLACE "-.*" "" FXDYN_BOARD_FAMILY ${FXDYN_BOARD})
+endif()
 
 set(CMAKE_C_COMPILER arm-none-eabi-gcc)
 set(CMAKE_CXX_COMPILER arm-none-eabi-g++)

@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "hal/clock.hpp"
+#include "hal/cortex_m/core.hpp"
 #include "hal/mps2/board.hpp"
 
 namespace fxdyn::hal::mps2 {
@@ -13,24 +14,24 @@ namespace fxdyn::hal::mps2 {
 class SysTick {
  public:
   SysTick() {
-    reg(reload) = mask;
-    reg(current) = 0;  // any write clears it
-    reg(control) = processor_clock | enable;
+    MemoryMapped::write(reload, mask);
+    MemoryMapped::write(current, 0);  // any write clears it
+    MemoryMapped::write(control, processor_clock | enable);
   }
   void start() {
-    mask_interrupts();
-    begin_ = reg(current);
+    cortex_m::mask_interrupts();
+    begin_ = MemoryMapped::read(current);
   }
   std::uint32_t stop() {
-    const std::uint32_t ticks = (begin_ - reg(current)) & mask;  // it counts down
-    unmask_interrupts();
+    const std::uint32_t ticks = (begin_ - MemoryMapped::read(current)) & mask;  // it counts down
+    cortex_m::unmask_interrupts();
     return (ticks * tick_ns + instruction_ns / 2) / instruction_ns;
   }
 
  private:
-  static constexpr std::uintptr_t control = 0xe000'e010;  // SYST_CSR
-  static constexpr std::uintptr_t reload = 0xe000'e014;   // SYST_RVR
-  static constexpr std::uintptr_t current = 0xe000'e018;  // SYST_CVR
+  static constexpr Address control = 0xe000'e010;  // SYST_CSR
+  static constexpr Address reload = 0xe000'e014;   // SYST_RVR
+  static constexpr Address current = 0xe000'e018;  // SYST_CVR
   static constexpr std::uint32_t enable = 1U << 0, processor_clock = 1U << 2;
   static constexpr std::uint32_t mask = 0x00ff'ffff;
   static constexpr std::uint32_t tick_ns = 1'000'000'000 / clock_hz;

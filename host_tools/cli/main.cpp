@@ -12,7 +12,7 @@
 #include "host_tools/report/report.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/update/update.hpp"
-#include "host_tools/version.hpp"
+#include "model/version.hpp"
 #include "host_tools/vibration/vibration.hpp"
 
 namespace {

@@ -8,7 +8,7 @@
 #include "host_tools/files.hpp"
 #include "host_tools/model/broad_learning_types.hpp"
 #include "host_tools/model/effects.hpp"
-#include "host_tools/version.hpp"
+#include "model/version.hpp"
 
 namespace fxdyn {
 namespace {

@@ -8,7 +8,7 @@
 #include <limits>
 #include <map>
 
-#include "host_tools/version.hpp"
+#include "model/version.hpp"
 
 namespace fxdyn::campaign {
 namespace {

@@ -1,0 +1,51 @@
+// The drive node on a Cortex-R5F of the Zynq UltraScale+, behind its CAN controller 0: nothing but the wiring. Clocks
+// and pins are the boot loader's.
+//   MIO 13 enable in (low: torque may go out), MIO 14 fault out, MIO 15 tick-busy out
+
+#include FXDYN_TABLES_HEADER
+
+#include "firmware/drive_node.hpp"
+#include "firmware/flash_tables.hpp"
+#include "hal/absent.hpp"
+#include "hal/zynqmp_r5/clock.hpp"
+#include "hal/zynqmp_r5/gpio.hpp"
+#include "hal/zynqmp_r5/xcan.hpp"
+
+namespace {
+namespace board = fxdyn::hal::zynqmp_r5;
+using fxdyn::tables::Model;
+
+constexpr fxdyn::RatedTorques<Model> rated{fxdyn::tables::rated_torque};
+constexpr std::uint32_t bit_rate = 1'000'000;
+constexpr auto timing = fxdyn::hal::bit_timing(board::can_limits, board::can_clock_hz, {.bits_per_second = bit_rate});
+
+#ifdef FXDYN_QEMU
+constexpr auto format = board::FrameFormat::qemu_7;
+using Enable = fxdyn::hal::FixedInput;  // QEMU 7.2 has no GPIO there: an access would be an abort
+using Fault = fxdyn::hal::AbsentOutput;
+using TickBusy = fxdyn::hal::AbsentOutput;
+#else
+constexpr auto format = board::FrameFormat::controller;
+using Enable = board::InputPin<13, false>;
+using Fault = board::OutputPin<14, true>;
+using TickBusy = board::OutputPin<15, true>;
+#endif
+}  // namespace
+
+int main() {
+  const auto tables = fxdyn::tables_in_flash(fxdyn::tables::page);
+  board::MicrosecondClock clock;
+  board::CycleCounter counter;
+  fxdyn::hal::AbsentWatchdog watchdog;  // the system watchdog resets by way of the platform management unit
+  Enable enable;
+  Fault fault;
+  TickBusy tick_busy;
+  board::BasicXcan<format, board::MicrosecondClock> can(clock);
+  if (can.start(timing, bit_rate / 1000) != fxdyn::hal::Status::ok)
+    static_cast<void>(fault.set(true));  // nothing on the bus would tell
+  static fxdyn::DriveHardware hardware{can, clock, counter, watchdog, enable, fault, tick_busy};
+  static fxdyn::DriveNode<Model, decltype(hardware)> node(
+      hardware, {tables.page.parameters, tables.page.header, tables.valid, tables.is_update, rated},
+      {.board = FXDYN_BOARD_NAME});
+  for (;;) static_cast<void>(node.poll());
+}

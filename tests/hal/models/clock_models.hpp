@@ -1,0 +1,147 @@
+#pragma once
+
+#include "tests/hal/models/register_model.hpp"
+
+namespace fxdyn::test {
+
+/// RCC, PWR and flash interface of an STM32, with what must hold at the moment of every write. `Part` says what
+/// differs.
+struct G4 {
+  static constexpr hal::Address rcc = 0x4002'1000, flash = 0x4002'2000, pll = rcc + 0x0c, configuration = rcc + 0x08;
+  static constexpr std::uint32_t crystal_mhz = 24, switch_to_pll = 0b11, hsi = 0b01, latency = 4, full_mhz = 170;
+  static double vco_input(std::uint32_t value) {
+    return ((value & 0b11) == 0b11 ? crystal_mhz : 16.0) / ((value >> 4 & 0xf) + 1);
+  }
+  static double vco(std::uint32_t value) { return vco_input(value) * (value >> 8 & 0x7f); }
+  static double output(std::uint32_t value) {
+    return (value & 1U << 24) != 0 ? vco(value) / (2 * ((value >> 25 & 0b11) + 1)) : 0;
+  }
+  static bool from_crystal(std::uint32_t value) { return (value & 0b11) == 0b11; }
+  static bool in_range(std::uint32_t value) {  // data sheet: input 2.66 to 16 MHz, VCO 96 to 344 MHz
+    return vco_input(value) >= 2.66 && vco_input(value) <= 16 && vco(value) >= 96 && vco(value) <= 344;
+  }
+  static bool half_before_switch(std::uint32_t cfgr) { return (cfgr >> 4 & 0xf) == 0b1000; }
+  static bool buses_slow_enough(std::uint32_t) { return true; }
+};
+struct F4 {
+  static constexpr hal::Address rcc = 0x4002'3800, flash = 0x4002'3c00, pll = rcc + 0x04, configuration = rcc + 0x08;
+  static constexpr std::uint32_t crystal_mhz = 25, switch_to_pll = 0b10, hsi = 0b00, latency = 5, full_mhz = 168;
+  static double vco_input(std::uint32_t value) {
+    return ((value & 1U << 22) != 0 ? crystal_mhz : 16.0) / (value & 0x3f);
+  }
+  static double vco(std::uint32_t value) { return vco_input(value) * (value >> 6 & 0x1ff); }
+  static double output(std::uint32_t value) { return vco(value) / (2 * ((value >> 16 & 0b11) + 1)); }
+  static bool from_crystal(std::uint32_t value) { return (value & 1U << 22) != 0; }
+  static bool in_range(std::uint32_t value) {  // RM0090: input 1 to 2 MHz, VCO 100 to 432 MHz
+    return vco_input(value) >= 1 && vco_input(value) <= 2 && vco(value) >= 100 && vco(value) <= 432;
+  }
+  static bool half_before_switch(std::uint32_t) { return true; }
+  static bool buses_slow_enough(std::uint32_t cfgr) {  // APB1 at most 42 MHz, APB2 84
+    return (cfgr >> 10 & 0b111) >= 0b101 && (cfgr >> 13 & 0b111) >= 0b100;
+  }
+};
+
+template <class Part>
+class RccModel : public RegisterModel {
+ public:
+  bool crystal_starts = true, pll_locks = true;
+  int delay = 20;  ///< reads until a flag follows its bit
+
+  RccModel() { registers_[Part::configuration] = Part::hsi | Part::hsi << 2; }
+  double mhz() {
+    const double system = runs_from_pll() ? Part::output(registers_[Part::pll]) : 16;
+    return (registers_[Part::configuration] & 0x80) != 0 ? system / 2 : system;
+  }
+  bool runs_from_pll() { return (registers_[Part::configuration] & 0b11) == Part::switch_to_pll; }
+
+ protected:
+  std::uint32_t on_read(hal::Address address) override {
+    if (address == Part::rcc) {
+      const std::uint32_t value = registers_[address];
+      hse_ = (value & 1U << 16) == 0 ? 0 : hse_ + 1;
+      pll_ = (value & 1U << 24) == 0 ? 0 : pll_ + 1;
+      return value | (crystal_starts && hse_ > delay ? 1U << 17 : 0) | (pll_ready() ? 1U << 25 : 0) | 1U << 10;
+    }
+    if (address == Part::configuration)
+      return (registers_[address] & ~0b1100U) | (registers_[address] & 0b11) << 2;  // SWS follows SW
+    return registers_[address];
+  }
+  void on_write(hal::Address address, std::uint32_t value) override {
+    if (address == Part::pll) {
+      require((registers_[Part::rcc] & 1U << 24) == 0, "PLL configured while it is on");
+      require(Part::in_range(value), "PLL frequencies out of range");
+      require(!Part::from_crystal(value) || (crystal_starts && hse_ > delay), "PLL from a crystal that does not run");
+    }
+    if (address == Part::configuration && (value & 0b11) == Part::switch_to_pll && !runs_from_pll()) {
+      require(pll_ready(), "switches to a PLL that has not locked");
+      require((registers_[Part::flash] & 0xf) >= Part::latency, "switches with too few wait states");
+      require(Part::half_before_switch(value), "switches above 80 MHz without AHB / 2");
+      require(Part::buses_slow_enough(value), "switches with buses too fast");
+    }
+    if (address == Part::rcc) value &= ~(1U << 10 | 1U << 17 | 1U << 25);  // flags
+    if (address == Part::rcc && runs_from_pll())
+      require((value & 1U << 24) != 0, "switches the PLL off that it runs from");
+    registers_[address] = value;
+  }
+
+ private:
+  bool pll_ready() const { return pll_locks && pll_ > delay; }
+  int hse_ = 0, pll_ = 0;
+};
+
+/// Independent watchdog (RM0440, RM0090): keys, values that take their time, a counter of LSI / 4 or slower.
+class IwdgModel : public RegisterModel {
+ public:
+  static constexpr hal::Address base = 0x4000'3000;
+  bool has_reset = false;
+
+  void pass_ms(double ms) {
+    if (!running_) return;
+    left_ms_ -= ms;
+    has_reset = has_reset || left_ms_ <= 0;
+  }
+  bool running() const { return running_; }
+
+ protected:
+  std::uint32_t on_read(hal::Address address) override {
+    if (address != base + 0x0c) return registers_[address];
+    if (busy_ > 0) --busy_;
+    return busy_ > 0 ? 0b11 : 0;
+  }
+  void on_write(hal::Address address, std::uint32_t value) override {
+    if (address == base) {
+      if (value == 0xcccc) running_ = true, left_ms_ = 512;
+      if (value == 0xaaaa) left_ms_ = period_ms();
+      open_ = value == 0x5555;
+      return;
+    }
+    require(open_, "PR and RLR are locked");
+    require(busy_ == 0 || address != last_, "writes while an update is under way");
+    if (open_) registers_[address] = value;
+    last_ = address;
+    busy_ = 10;
+  }
+
+ private:
+  double period_ms() { return (registers_[base + 0x08] + 1) * 4.0 * (1 << (registers_[base + 0x04] & 0b111)) / 32; }
+  bool running_ = false, open_ = false;
+  double left_ms_ = 0;
+  int busy_ = 0;
+  hal::Address last_ = 0;
+};
+
+/// A few registers without behaviour, for what only sets them.
+class PlainModel : public RegisterModel {
+ public:
+  std::uint32_t& at(hal::Address address) { return registers_[address]; }
+  std::vector<std::pair<hal::Address, std::uint32_t>> writes;
+
+ protected:
+  std::uint32_t on_read(hal::Address address) override { return registers_[address]; }
+  void on_write(hal::Address address, std::uint32_t value) override {
+    registers_[address] = value;
+    writes.emplace_back(address, value);
+  }
+};
+
+}  // namespace fxdyn::test

@@ -1,0 +1,42 @@
+#!/usr/bin/env bash
+# flash_test.sh BUILD_DIR_OF_STM32G474: openocd reads the configurations of the boards without hardware and knows their flash;
+# `flash-tables` programs the right page to the right address and refuses every other one.
+set -euo pipefail
+build=$(realpath "$1")
+root=$(cd "$(dirname "$0")/../.." && pwd)
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+fail() { echo "flash_test: $*" >&2; exit 1; }
+
+for target in stm32g4x stm32f4x; do
+  said=$(openocd -f interface/stlink.cfg -f "target/$target.cfg" -c 'echo [flash list]; shutdown' 2>&1) ||
+    fail "openocd does not read $target: $said"
+  grep -q "name $target.flash driver" <<<"$said" || fail "$target: no flash bank: $said"
+done
+grep -q -- '-f target/stm32g4x.cfg' "$root/toolchains/stm32g474.cmake" || fail "stm32g474 has another configuration"
+
+# The targets' own commands, with a stand-in for openocd that prints what it is told.
+elf=$build/firmware/node-stm32g474.elf
+commands=$(cd "$build" && ninja -t commands flash)
+grep -q "openocd -f interface/stlink.cfg -f target/stm32g4x.cfg -c .*program.*node-stm32g474.elf verify reset exit" <<<"$commands" ||
+  fail "flash runs $commands"
+printf '#!/bin/sh\necho "$@"\n' >"$work/openocd"
+chmod +x "$work/openocd"
+tables() { OPENOCD=$work/openocd "$root/toolchains/flash_tables.sh" arm-none-eabi- "$elf" "$1" -f interface/stlink.cfg 2>&1; }
+
+arm-none-eabi-objcopy -O binary --only-section=.fxdyn_tables "$elf" "$work/tables.bin"
+said=$(tables "$work/tables.bin") || fail "refuses the image's own page: $said"
+[[ $said == *"program {$work/tables.bin} verify reset exit 0x08078000" ]] || fail "programs $said"
+for build_output in bin hex; do [ -s "${elf%.elf}.$build_output" ] || fail "no .$build_output"; done
+# The .bin begins with the stack's end and the entry, in flash.
+[ "$(od -An -t x4 -j 4 -N 4 "${elf%.elf}.bin" | cut -c 2-5)" = 0800 ] || fail "the .bin does not begin with a vector table"
+
+expect_refusal() {  # FILE MESSAGE
+  said=$(tables "$1") && fail "takes $1"
+  [[ $said == *"$2"* ]] || fail "says $said"
+}
+expect_refusal "$work/nothing.bin" "no such file"
+{ printf 'FXD1\1\2\3\4'; tail -c +9 "$work/tables.bin"; } >"$work/other.bin"
+expect_refusal "$work/other.bin" "another model or layout"
+head -c 40000 /dev/zero >"$work/large.bin"
+expect_refusal "$work/large.bin" "the slot has 32768"
