@@ -95,10 +95,13 @@ constexpr std::int16_t to_per_mille(std::int32_t raw, TorqueScale scale) {
 }
 
 /// Thousandths of a raw number, rounded half up and saturated.
-template <int bits>
-constexpr std::int32_t to_milli(std::int32_t raw) {
+constexpr std::int32_t to_milli(std::int32_t raw, int bits) {
   std::uint32_t outside = 0;
   return raw::narrow(std::int64_t{raw} * 1000, bits, outside);
+}
+template <int bits>
+constexpr std::int32_t to_milli(std::int32_t raw) {
+  return to_milli(raw, bits);
 }
 
 /// Rated torques of a robot's joints with their reciprocals, a constant of the image.
