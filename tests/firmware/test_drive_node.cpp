@@ -488,6 +488,38 @@ TEST_F(DriveNodeTest, ATorqueThatNobodyTookGivesWayToTheNext) {
   for (const auto& torque : torques) EXPECT_EQ(torque.tick, 2);
 }
 
+// The session of docs/guide/can-node.md, byte for byte.
+TEST_F(DriveNodeTest, TheSessionByHandOfTheGuide) {
+  bench.poll();
+  EXPECT_EQ(bench.request({0x40, 0x18, 0x10, 0x02, 0, 0, 0, 0}),
+            (Bytes{0x43, 0x18, 0x10, 0x02, 0x46, 0x58, 0x44, 0x31}));
+  EXPECT_EQ(bench.request({0x40, 0x0A, 0x10, 0x00, 0, 0, 0, 0}), (Bytes{0x41, 0x0A, 0x10, 0x00, 5, 0, 0, 0}));
+  EXPECT_EQ(bench.request({0x60, 0, 0, 0, 0, 0, 0, 0}), (Bytes{0x05, '0', '.', '1', '.', '0', 0, 0}));
+  EXPECT_EQ(bench.request({0x23, 0x06, 0x10, 0x00, 0, 0, 0, 0}), (Bytes{0x60, 0x06, 0x10, 0x00, 0, 0, 0, 0}));
+  EXPECT_EQ(bench.request({0x2B, 0x10, 0x20, 0x00, 0, 0, 0, 0}), (Bytes{0x60, 0x10, 0x20, 0x00, 0, 0, 0, 0}));
+  bench.start();
+  for (std::size_t j = 0; j < 6; ++j) bench.send_setpoint(j, {});
+  bench.sync();
+  for (const std::uint8_t status : {0x11, 0x10, 0x12}) {
+    const auto sent = bench.torques();
+    ASSERT_EQ(sent.size(), 6U);
+    for (const auto& torque : sent) {
+      EXPECT_EQ(torque.status, status);
+      if (status == 0x12) {
+        EXPECT_EQ(torque.milli, 0);
+      }
+    }
+    if (status != 0x12) bench.sync();
+  }
+  bench.pass(1'000'000);
+  std::vector<Bytes> told;
+  for (const auto& frame : bench.wire.sent) {
+    if (frame.id == 0x081) told.emplace_back(frame.data.begin(), frame.data.end());
+  }
+  EXPECT_EQ(told, (std::vector<Bytes>{{0x50, 0x82, 0x11, 0x01, 0, 0, 0, 0}}));
+  EXPECT_EQ(bench.request({0x40, 0x01, 0x20, 0x02, 0, 0, 0, 0}), (Bytes{0x43, 0x01, 0x20, 0x02, 2, 0, 0, 0}));
+}
+
 // --- CAN FD ----------------------------------------------------------------------------------------------------------
 
 TEST(DriveNodeFd, OneFrameForAllSetpointsAndOneForAllTorques) {
