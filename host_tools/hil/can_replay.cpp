@@ -18,7 +18,7 @@ using namespace std::chrono_literals;
 
 /// In lockstep a tick takes as long as it takes: SYNC counts as overdue only after this.
 constexpr std::uint32_t patient_period_us = 1'000'000;
-constexpr auto answer_time = 200ms, start_time = 5s;
+constexpr can::Duration answer_time = 200ms, start_time = 5s;
 
 }  // namespace
 

@@ -49,25 +49,28 @@ class Experiment {
   Experiment(const fs::path& project, const fs::path& directory)
       : pipeline_(project, directory), model_(with_tables()), plant_(scenario_plant()) {}
 
-  json with_drive(const Feedforward& drive) {
-    tune();
-    const std::vector<Move> moves = make_moves(model_, model_.tick_s, judged_moves);
-    progress_.stage("vibration: the drive in the loop", moves.size() * 3);
-    set_band(moves);
-    json methods = json::array();
-    methods.push_back(judge("none", "-", "none", nullptr, moves));
-    methods.push_back(judge("model", "fixed", "none", &model_, moves));
-    std::vector<Outcome> outcomes;
-    ClosedLoopSettings settings = settings_;
+  /// @param known vibration.json, whose controller it takes
+  json with_drive(const json& known, const Feedforward& drive) {
+    const json& control = known.at("control");
+    ClosedLoopSettings settings = loop(control.at("bandwidth_hz"), control.at("damping"));
+    band_ = control.at("settling_band");
     settings.drive = drive.torque;
+    const std::vector<Move> moves = make_moves(model_, model_.tick_s, judged_moves);
+    progress_.stage("vibration: the drive in the loop", moves.size());
+    std::vector<Outcome> outcomes;
     for (const Move& move : moves) {
       drive.begin(move.reference);
       outcomes.push_back(play(move, {}, settings));
       progress_.step();
     }
-    methods.push_back(summary("model", "drive", "none", moves, outcomes));
     progress_.done();
-    return {{"schema", "fxdyn.vibration/1"}, {"control", control_json()}, {"methods", methods}};
+    json methods = json::array();
+    for (const json& method : known.at("methods")) {
+      const bool beside = method.at("feedforward") == "none" || method.at("feedforward") == "model";
+      if (beside && method.at("parameters_off") == "none") methods.push_back(method);
+    }
+    methods.push_back(summary("model", "drive", "none", moves, outcomes));
+    return {{"schema", "fxdyn.vibration/1"}, {"control", control}, {"methods", methods}};
   }
 
   json run() {
@@ -118,6 +121,15 @@ class Experiment {
             {"encoder_step", encoder_step},
             {"settling_band", band_},
             {"grid", {{"bandwidth_hz", bandwidths}, {"damping", dampings}}}};
+  }
+
+  static ClosedLoopSettings loop(double bandwidth_hz, double damping) {
+    ClosedLoopSettings s;
+    s.bandwidth_hz = bandwidth_hz;
+    s.damping = damping;
+    s.substeps = 1;
+    s.encoder_step = encoder_step;
+    return s;
   }
 
   void set_band(const std::vector<Move>& moves) {
@@ -181,12 +193,7 @@ class Experiment {
     progress_.stage("vibration: tuning the PD", bandwidths.size() * dampings.size());
     std::vector<double> cost(bandwidths.size() * dampings.size());
     const auto settings = [&](std::size_t i) {
-      ClosedLoopSettings s;
-      s.bandwidth_hz = bandwidths[i / dampings.size()];
-      s.damping = dampings[i % dampings.size()];
-      s.substeps = 1;
-      s.encoder_step = encoder_step;
-      return s;
+      return loop(bandwidths[i / dampings.size()], dampings[i % dampings.size()]);
     };
     parallel_for(cost.size(), [&](std::size_t i) {
       try {
@@ -291,14 +298,18 @@ class Experiment {
 
 }  // namespace
 
-json vibration_with(const fs::path& project, const fs::path& directory, const Feedforward& drive) {
-  return Experiment(project, directory).with_drive(drive);
-}
-
 json vibration(const fs::path& project, const fs::path& directory) {
   const json result = Experiment(project, directory).run();
   write_file(directory / "vibration.json", result.dump(1) + "\n");
   return result;
+}
+
+json vibration_with(const fs::path& project, const fs::path& directory, const Feedforward& drive) {
+  const fs::path file = directory / "vibration.json";
+  json known = fs::exists(file) ? json::parse(read_file(file)) : json();
+  if (known.is_null() || !is_unchanged(known.value("made_from", json()), directory))
+    known = vibration(project, directory);
+  return Experiment(project, directory).with_drive(known, drive);
 }
 
 std::string vibration_table(const json& result) {

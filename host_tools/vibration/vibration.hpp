@@ -39,8 +39,8 @@ struct Feedforward {
   std::function<void(const Reference&)> begin;          ///< the robot at rest at the reference's start
   std::function<Eigen::VectorXd(Eigen::Index)> torque;  ///< at a sample of it [N*m | N]
 };
-/// The same moves under the same controller with this drive in the loop, beside none and the model on the host; writes
-/// nothing.
+/// The same moves with this drive in the loop, beside what DIR/vibration.json says of none and the model on the host,
+/// under its controller. It is made first where it is missing or of something else.
 nlohmann::json vibration_with(const std::filesystem::path& project, const std::filesystem::path& directory,
                               const Feedforward& drive);
 

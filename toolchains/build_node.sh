@@ -1,0 +1,28 @@
+#!/usr/bin/env bash
+# build_node.sh TABLES.hpp OUT_DIR [linux|cortex-m3|cortex-m4|cortex-m7|stm32g474|netduinoplus2|cortex-r5]: builds the drive node with
+# these tables. Leaves it in OUT_DIR: fxdyn_node (linux, the default), else node-<board>.elf, .bin and .hex with their size.json.
+set -euo pipefail
+if [ $# -lt 2 ]; then
+  sed -n '2,3s/^# //p' "$0" >&2
+  exit 2
+fi
+root=$(cd "$(dirname "$0")/.." && pwd)
+[ -f "$1" ] || { echo "build_node: no such file: $1" >&2; exit 2; }
+tables=$(realpath "$1")
+mkdir -p "$2"
+out=$(realpath "$2")
+preset=${3:-linux}
+case $preset in linux | cortex-m3 | cortex-m4 | cortex-m7 | stm32g474 | netduinoplus2 | cortex-r5) ;; *)
+  echo "build_node: no node for '$preset': linux, cortex-m3, cortex-m4, cortex-m7, stm32g474, netduinoplus2 or cortex-r5" >&2
+  exit 2 ;;
+esac
+target=fxdyn_node configure=$preset
+[ "$preset" != linux ] || { target=fxdyn_linux_node configure=host; }
+build=$out/build-$preset log=$out/build-$preset.log
+(cd "$root" && cmake --preset "$configure" -B "$build" -DFXDYN_TABLES="$tables" && cmake --build "$build" --target "$target") \
+  >"$log" 2>&1 || { cat "$log" >&2; exit 1; }
+if [ "$preset" = linux ]; then
+  cp "$build/fxdyn_linux_node" "$out/fxdyn_node"
+else
+  cp "$build"/firmware/node-* "$out/"
+fi
