@@ -1,6 +1,6 @@
 // The drive node as a process: SocketCAN, libgpiod, timers of the kernel. For drives that run Linux, and for tests
-// without hardware. Compiled for one tables.hpp; --joints takes one of its joints, so that several processes make up a
-// robot.
+// without hardware. Compiled for one tables.hpp; --joint takes one of its joints, so that several nodes, each a process
+// or all in one, make up a robot.
 
 #include FXDYN_TABLES_HEADER
 
@@ -9,6 +9,7 @@
 #include <signal.h>
 #include <sys/mman.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cerrno>
@@ -16,8 +17,10 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <memory>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include "firmware/drive_node.hpp"
 #include "hal/linux/clock.hpp"
@@ -33,11 +36,12 @@ using fxdyn::tables::Model;
 constexpr const char* usage =
     R"(usage: fxdyn_node --can IF [options]
   --can IF          SocketCAN interface
-  --joint J         puts out the torque of joint J alone, 1 ..; default: all that the tables are for
-  --node N          node id, 1 .. 127; default: number of the first joint
+  --joint J         puts out the torque of joint J alone, 1 ..; several times: that many nodes, each with a socket of
+                    its own; default: one node with all joints that the tables are for
+  --node N          node id, 1 .. 127, several nodes count on from it; default: number of the (first) joint
   --fd              also CAN FD frames (object 0x2030)
   --tables FILE     tables.bin instead of the tables it was built with
-  --gpio-chip C     chip of these lines: gpiochip0, /dev/gpiochip0 or a label
+  --gpio-chip C     chip of these lines, for one node: gpiochip0, /dev/gpiochip0 or a label
     --enable L      input, default: always enabled
     --fault L       output
     --busy L        output, high while a tick is computed
@@ -49,7 +53,8 @@ constexpr const char* usage =
 
 struct Options {
   const char* can = nullptr;
-  unsigned joint = 0, node = 0, serial_number = 0;
+  std::vector<unsigned> joints;
+  unsigned node = 0, serial_number = 0;
   bool fd = false, active_low = false;
   const char *tables = nullptr, *chip = nullptr, *watchdog = nullptr;
   std::optional<unsigned> enable, fault, busy;
@@ -92,7 +97,7 @@ Options parse(int count, char** arguments) {
     if (name == "--can")
       options.can = value;
     else if (name == "--joint")
-      options.joint = number(option, value, 1, Model::joints);
+      options.joints.push_back(number(option, value, 1, Model::joints));
     else if (name == "--node")
       options.node = number(option, value, 1, fxdyn::canopen::largest_node_id);
     else if (name == "--tables")
@@ -117,6 +122,14 @@ Options parse(int count, char** arguments) {
   if (options.can == nullptr) quit(2, "--can IF is missing: `ip -br link show type can` lists the interfaces");
   if (options.chip == nullptr && (options.enable || options.fault || options.busy))
     quit(2, "--gpio-chip is missing: `gpiodetect` lists the chips");
+  if (options.joints.size() > 1 && options.chip != nullptr)
+    quit(2, "--gpio-chip: lines belong to one node, so to one --joint");
+  if (options.node + options.joints.size() > fxdyn::canopen::largest_node_id + 1)
+    quit(2, "--node: the last node's id would be above 127");
+  for (std::size_t i = 0; i < options.joints.size(); ++i) {
+    if (std::count(options.joints.begin(), options.joints.end(), options.joints[i]) > 1)
+      quit(2, "--joint: the same joint twice");
+  }
   return options;
 }
 
@@ -227,66 +240,111 @@ class Reporter {
   fxdyn::hal::CanState state_ = fxdyn::hal::CanState::active;
 };
 
+/// A node of this process, whatever its model.
+class Node {
+ public:
+  virtual ~Node() = default;
+  virtual bool poll() = 0;  ///< true: there is more to do
+  virtual std::uint32_t idle_us() const = 0;
+  virtual int bus_descriptor() const = 0;
+  virtual int enable_descriptor() const = 0;
+  virtual void take_enable_events() = 0;
+  virtual void report() = 0;
+};
+
 template <class M, class Bus>
-int run(const Options& options) {
-  static Bus bus;
-  const auto first_joint = static_cast<std::uint32_t>(std::countr_zero(M::outputs_mask)) + 1;
-  const std::uint32_t id = options.node != 0 ? options.node : first_joint;
-  const auto wanted = filters<M>(id);
-  if (const auto result = bus.open(options.can, wanted); !result) quit(1, os::explain(result, options.can).c_str());
-  static Enable enable;
-  static Output fault, busy;
-  open_pin(enable.pin, options, options.enable, "fxdyn enable");
-  open_pin(fault.pin, options, options.fault, "fxdyn fault");
-  open_pin(busy.pin, options, options.busy, "fxdyn tick-busy");
-  static os::Watchdog watchdog;
-  if (options.watchdog != nullptr && watchdog.open(options.watchdog, 1) != Status::ok) {
-    quit(1, options.watchdog, ": ", std::strerror(errno));
+class NodeOf final : public Node {
+ public:
+  NodeOf(const Options& options, const fxdyn::TablePage<Model>& page, std::uint32_t id) : reporter_(options) {
+    open(options, id);
+    static_assert(sizeof parameters_ == sizeof page.parameters);
+    std::memcpy(static_cast<void*>(&parameters_), &page.parameters, sizeof parameters_);
+    const bool valid = fxdyn::page_is_valid(page);
+    std::fprintf(stderr, "fxdyn_node: node %u on %s, %zu of %zu joints, tables %08x%s, costs in %s, watchdog %s\n", id,
+                 options.can, M::outputs, M::joints, page.header.crc32, valid ? "" : " INVALID: stays pre-operational",
+                 counter_.unit(), watchdog_.armed() ? "armed" : "none");
+    node_.emplace(hardware_, fxdyn::NodeTables<M>{parameters_, page.header, valid, options.tables != nullptr, rated},
+                  fxdyn::NodeSettings{
+                      .id = static_cast<std::uint8_t>(id), .serial_number = options.serial_number, .board = "linux"});
   }
-  static os::Clock clock;
-  static os::CycleCounter counter;
+  bool poll() override { return node_->poll(); }
+  std::uint32_t idle_us() const override { return node_->idle_us(); }
+  int bus_descriptor() const override { return bus_.descriptor(); }
+  int enable_descriptor() const override { return enable_.pin.descriptor(); }
+  void take_enable_events() override { enable_.pin.events(); }
+  void report() override { reporter_.look(bus_); }
 
-  const fxdyn::TablePage<Model>& page = tables_of(options);
-  const bool valid = fxdyn::page_is_valid(page);
-  static typename M::Parameters parameters;
-  static_assert(sizeof parameters == sizeof page.parameters);
-  std::memcpy(static_cast<void*>(&parameters), &page.parameters, sizeof parameters);
+ private:
+  void open(const Options& options, std::uint32_t id) {
+    if (const auto result = bus_.open(options.can, filters<M>(id)); !result)
+      quit(1, os::explain(result, options.can).c_str());
+    open_pin(enable_.pin, options, options.enable, "fxdyn enable");
+    open_pin(fault_.pin, options, options.fault, "fxdyn fault");
+    open_pin(busy_.pin, options, options.busy, "fxdyn tick-busy");
+    if (options.watchdog != nullptr && watchdog_.open(options.watchdog, 1) != Status::ok)
+      quit(1, options.watchdog, ": ", std::strerror(errno));
+  }
+
   static constexpr fxdyn::RatedTorques<M> rated{fxdyn::tables::rated_torque};
-
-  static fxdyn::DriveHardware hardware{bus, clock, counter, watchdog, enable, fault, busy};
-  static fxdyn::DriveNode<M, decltype(hardware)> node(
-      hardware, {parameters, page.header, valid, options.tables != nullptr, rated},
-      {.id = static_cast<std::uint8_t>(id), .serial_number = options.serial_number, .board = "linux"});
-  std::fprintf(stderr, "fxdyn_node: node %u on %s, %zu of %zu joints, tables %08x%s, costs in %s, watchdog %s\n",
-               node.id(), options.can, M::outputs, M::joints, page.header.crc32,
-               valid ? "" : " INVALID: stays pre-operational", counter.unit(), watchdog.armed() ? "armed" : "none");
-  if (options.realtime != 0) prepare_real_time(options.realtime);
-
-  Reporter reporter(options);
-  std::array<pollfd, 2> inputs{{{bus.descriptor(), POLLIN, 0}, {enable.pin.descriptor(), POLLIN, 0}}};
-  while (stopped == 0) {
-    if (node.poll()) continue;
-    reporter.look(bus);
-    const timespec idle{0, 1000L * node.idle_us()};
-    if (::ppoll(inputs.data(), inputs.size(), &idle, nullptr) > 0 && inputs[1].revents != 0) enable.pin.events();
-  }
-  return 0;
-}
+  Bus bus_;
+  Enable enable_;
+  Output fault_, busy_;
+  os::Watchdog watchdog_;
+  os::Clock clock_;
+  os::CycleCounter counter_;
+  typename M::Parameters parameters_;
+  Reporter reporter_;
+  using Hardware = decltype(fxdyn::DriveHardware{bus_, clock_, counter_, watchdog_, enable_, fault_, busy_});
+  Hardware hardware_{bus_, clock_, counter_, watchdog_, enable_, fault_, busy_};
+  std::optional<fxdyn::DriveNode<M, Hardware>> node_;
+};
 
 template <class M>
-int run(const Options& options) {
-  return options.fd ? run<M, os::SocketCan<fxdyn::hal::FdFrame>>(options)
-                    : run<M, os::SocketCan<fxdyn::hal::ClassicFrame>>(options);
+std::unique_ptr<Node> make_node(const Options& options, const fxdyn::TablePage<Model>& page, std::uint32_t id) {
+  if (options.fd) return std::make_unique<NodeOf<M, os::SocketCan<fxdyn::hal::FdFrame>>>(options, page, id);
+  return std::make_unique<NodeOf<M, os::SocketCan<fxdyn::hal::ClassicFrame>>>(options, page, id);
 }
 
-/// --joint J: the model that puts out joint J alone.
+/// The node that puts out joint `joint` alone.
 template <std::size_t j = 0>
-int run_joint(const Options& options) {
+std::unique_ptr<Node> make_joint_node(const Options& options, const fxdyn::TablePage<Model>& page, unsigned joint,
+                                      std::uint32_t id) {
   if constexpr (j < Model::joints) {
-    if (options.joint == j + 1) return run<typename WithOutputs<1U << j, Model>::type>(options);
-    return run_joint<j + 1>(options);
+    if (joint == j + 1) return make_node<typename WithOutputs<1U << j, Model>::type>(options, page, id);
+    return make_joint_node<j + 1>(options, page, joint, id);
   }
-  return 2;
+  return nullptr;
+}
+
+std::vector<std::unique_ptr<Node>> make_nodes(const Options& options) {
+  std::vector<std::unique_ptr<Node>> nodes;
+  const fxdyn::TablePage<Model>& page = tables_of(options);
+  constexpr auto first_joint = static_cast<std::uint32_t>(std::countr_zero(Model::outputs_mask)) + 1;
+  if (options.joints.empty())
+    nodes.push_back(make_node<Model>(options, page, options.node != 0 ? options.node : first_joint));
+  for (std::uint32_t i = 0; i < options.joints.size(); ++i) {
+    const unsigned joint = options.joints[i];
+    nodes.push_back(make_joint_node(options, page, joint, options.node != 0 ? options.node + i : joint));
+  }
+  return nodes;
+}
+
+/// One wait for all nodes: a SYNC wakes the process once.
+void run(std::vector<std::unique_ptr<Node>>& nodes) {
+  std::vector<pollfd> inputs;
+  for (const auto& node : nodes) inputs.push_back({node->bus_descriptor(), POLLIN, 0});
+  inputs.push_back({nodes[0]->enable_descriptor(), POLLIN, 0});
+  while (stopped == 0) {
+    bool more = false;
+    for (auto& node : nodes) more |= node->poll();
+    if (more) continue;
+    std::uint32_t idle_us = UINT32_MAX;
+    for (auto& node : nodes) idle_us = std::min(idle_us, node->idle_us());
+    nodes[0]->report();  // the others are on the same interface
+    const timespec idle{0, 1000L * idle_us};
+    if (::ppoll(inputs.data(), inputs.size(), &idle, nullptr) > 0 && inputs.back().revents != 0)
+      nodes[0]->take_enable_events();
+  }
 }
 
 }  // namespace
@@ -297,5 +355,8 @@ int main(int count, char** arguments) {
   stop.sa_handler = [](int) { stopped = 1; };
   ::sigaction(SIGINT, &stop, nullptr);
   ::sigaction(SIGTERM, &stop, nullptr);
-  return options.joint == 0 ? run<Model>(options) : run_joint(options);
+  auto nodes = make_nodes(options);
+  if (options.realtime != 0) prepare_real_time(options.realtime);
+  run(nodes);
+  return 0;
 }

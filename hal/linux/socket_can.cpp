@@ -88,7 +88,6 @@ void CanSocket::close() {
   if (socket_ >= 0) ::close(socket_);
   socket_ = -1;
   next_ = end_ = 0;
-  drained_ = false;
 }
 
 Status CanSocket::send(const canfd_frame& frame, bool fd) {
@@ -119,7 +118,6 @@ std::size_t CanSocket::send(std::span<const can_frame> frames) {
 }
 
 Status CanSocket::fetch() {
-  if (std::exchange(drained_, false)) return Status::busy;
   constexpr std::size_t control_bytes = CMSG_SPACE(sizeof(scm_timestamping)) + CMSG_SPACE(sizeof(std::uint32_t));
   alignas(cmsghdr) std::array<std::array<char, control_bytes>, batch> control;
   std::array<iovec, batch> parts;
@@ -138,7 +136,6 @@ Status CanSocket::fetch() {
   if (count < 0) return errno == EAGAIN ? Status::busy : failed();
   next_ = 0;
   end_ = static_cast<std::size_t>(count);
-  drained_ = end_ < batch;
   for (std::size_t i = 0; i < end_; ++i) {
     received_[i].size = messages[i].msg_len;
     received_[i].lost = i > 0 ? received_[i - 1].lost : errors_.lost;

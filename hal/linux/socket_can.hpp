@@ -60,7 +60,7 @@ class CanSocket {
   /// failed without either, and restart_error() is EPERM.
   Status restart();
 
-  int descriptor() const { return socket_; }  ///< to poll for input; -1: closed
+  int descriptor() const { return socket_; }  ///< to poll for input after receive() was busy; -1: closed
   int restart_error() const { return restart_error_; }
   /// errno of the last call that failed: ENETDOWN, ENODEV (unplugged). It is kept until it is asked for.
   int take_failure() { return std::exchange(failure_, 0); }
@@ -82,7 +82,6 @@ class CanSocket {
   };
   std::array<Received, batch> received_;
   std::size_t next_ = 0, end_ = 0;  ///< of received_
-  bool drained_ = false;            ///< the kernel had no more
   int socket_ = -1;
   int restart_error_ = 0, failure_ = 0;
   std::int64_t restarted_ns_ = 0;

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# linux_nodes.sh DIRECTORY [TICKS [LEAST_RATE]]: six node processes with a joint each on one virtual bus, then one with all six,
-# then the same with CAN FD. DIRECTORY has the programs.
+# linux_nodes.sh DIRECTORY [TICKS [LEAST_RATE]]: six nodes with a joint each on one virtual bus, in one process and in six, then one
+# node with all six joints, then the same with CAN FD. DIRECTORY has the programs.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 bin=$1 ticks=${2:-5000} least=${3:-0}
@@ -17,12 +17,17 @@ start() {
   pids+=($!)
 }
 
-for joint in 1 2 3 4 5 6; do start --joint $joint; done
 # SCHED_BATCH: the master is not woken for each torque, but when the nodes sleep.
-chrt --batch 0 "$bin/hil_driver" --name "6 Linux nodes on vcan" --can vcan0 --nodes 6 --ticks "$ticks" --least-rate "$least"
+drive() { chrt --batch 0 "$bin/hil_driver" --can vcan0 "$@"; }
+
+start --joint 1 --joint 2 --joint 3 --joint 4 --joint 5 --joint 6
+drive --name "6 Linux nodes on vcan, one process" --nodes 6 --ticks "$ticks" --least-rate "$least"
+stop_nodes
+for joint in 1 2 3 4 5 6; do start --joint $joint; done
+drive --name "6 Linux nodes on vcan, six processes" --nodes 6 --ticks $((ticks < 1000 ? ticks : 1000))
 stop_nodes
 start
-"$bin/hil_driver" --name "1 Linux node with 6 joints on vcan" --can vcan0 --nodes 1 --ticks "$ticks"
+drive --name "1 Linux node with 6 joints on vcan" --nodes 1 --ticks "$ticks"
 stop_nodes
 start --fd
-"$bin/hil_driver" --name "1 Linux node with 6 joints, CAN FD" --can vcan0 --nodes 1 --ticks "$ticks" --fd 1
+drive --name "1 Linux node with 6 joints, CAN FD" --nodes 1 --ticks "$ticks" --fd 1

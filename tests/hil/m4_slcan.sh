@@ -1,18 +1,20 @@
 #!/usr/bin/env bash
 # m4_slcan.sh DIRECTORY IMAGE [TICKS [LEAST_RATE]]: the Cortex-M4 image on QEMU's MPS2 board, its UART a CAN adapter that speaks
-# SLCAN, at a bus of the guest: slcand there makes can0 of the virtual console hvc0. DIRECTORY has the programs.
+# SLCAN, at a bus of the guest: slcand there makes can0 of the virtual console hvc0. A relay between the two hands on whole frames.
+# DIRECTORY has the programs.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 bin=$1 image=$2 ticks=${3:-5000} least=${4:-0}
 
 if [ "${FXDYN_INSIDE:-0}" = 0 ]; then
-  line=$(mktemp -u)
-  timeout 300 qemu-system-arm -M mps2-an386 -display none -monitor none -chardev "socket,id=line,path=$line,server=on,wait=on" \
-    -serial chardev:line -kernel "$image" &
+  lines=$(mktemp -d)
+  timeout 300 qemu-system-arm -M mps2-an386 -display none -monitor none \
+    -chardev "socket,id=line,path=$lines/board,server=on,wait=on" -serial chardev:line -kernel "$image" &
   board=$!
-  trap 'kill $board 2>/dev/null || true; rm -f "$line"' EXIT
-  for _ in $(seq 100); do [ -S "$line" ] && break || sleep 0.1; done
-  FXDYN_INSIDE=1 "$here/guest.sh" --qemu -device --qemu virtio-serial-pci --qemu -chardev --qemu "socket,id=line,path=$line" \
+  "$bin/slcan_relay" "$lines/host" "$lines/board" &
+  trap 'kill $board 2>/dev/null || true; rm -rf "$lines"' EXIT
+  for _ in $(seq 100); do [ -S "$lines/host" ] && break || sleep 0.1; done
+  FXDYN_INSIDE=1 "$here/guest.sh" --qemu -device --qemu virtio-serial-pci --qemu -chardev --qemu "socket,id=line,path=$lines/host" \
     --qemu -device --qemu virtconsole,chardev=line -- "$here/m4_slcan.sh" "$@"
   exit
 fi

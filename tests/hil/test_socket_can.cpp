@@ -22,8 +22,10 @@ namespace {
 using Classic = SocketCan<ClassicFrame>;
 using Fd = SocketCan<FdFrame>;
 
+/// As descriptor() asks for it: what has been taken from the kernel with an earlier frame is not waited for.
 template <class Bus>
 Status receive_within(Bus& bus, typename Bus::Frame& frame, int milliseconds) {
+  if (const Status status = bus.receive(frame); status != Status::busy) return status;
   pollfd wait{bus.descriptor(), POLLIN, 0};
   ::poll(&wait, 1, milliseconds);
   return bus.receive(frame);
