@@ -41,6 +41,6 @@ int main() {
   static_cast<void>(wake_up.start(node.longest_sleep_us));
   watchdog.start(1'000'000);  // an emulator on a loaded machine stands still for a while
   for (;;) {
-    if (!node.poll() && bus.idle()) uart.wait();
+    if (!node.poll() && bus.idle()) uart.wait_for_line();
   }
 }

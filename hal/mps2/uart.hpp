@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -42,11 +43,27 @@ class BasicUart {
     cortex_m::unmask_interrupts();
   }
 
+  /// Sleeps until a carriage return or another interrupt than this one's has arrived: a processor that is woken
+  /// for the bytes in between has nothing to do with them. Bytes without an end in sight wait for the other interrupt.
+  void wait_for_line() {
+    for (;;) {
+      const std::uint32_t seen = received_.load(std::memory_order_relaxed);
+      cortex_m::mask_interrupts();
+      if (!line_ended_.load(std::memory_order_relaxed)) cortex_m::wait_for_interrupt();
+      cortex_m::unmask_interrupts();
+      if (line_ended_.exchange(false) || received_.load(std::memory_order_relaxed) == seen) return;
+    }
+  }
+
   /// The interrupt is cleared before the data is read: a byte that arrives in between raises it again.
   void on_receive() {
     registers_.write(interrupt_status, receive_interrupt);
     // A full ring drops the byte; the frame that it belongs to is then damaged, which its reader notices.
-    if ((registers_.read(state) & receive_full) != 0) ring_.push(static_cast<std::uint8_t>(registers_.read(data)));
+    if ((registers_.read(state) & receive_full) == 0) return;
+    const auto byte = static_cast<std::uint8_t>(registers_.read(data));
+    ring_.push(byte);
+    received_.store(received_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    if (byte == line_end) line_ended_.store(true, std::memory_order_relaxed);
   }
 
  private:
@@ -59,10 +76,13 @@ class BasicUart {
   static constexpr std::uint32_t transmit_enable = 1U << 0, receive_enable = 1U << 1,
                                  receive_interrupt_enable = 1U << 3;
   static constexpr std::uint32_t receive_interrupt = 1U << 1;
+  static constexpr std::uint8_t line_end = '\r';
   static constexpr std::uint32_t baud_rate = 921'600;
 
   [[no_unique_address]] R registers_;
   Ring<std::uint8_t, 1024> ring_;
+  std::atomic<std::uint32_t> received_{0};  // both written by the interrupt
+  std::atomic<bool> line_ended_{false};
 };
 using Uart = BasicUart<>;
 static_assert(SerialPort<Uart>);
