@@ -37,9 +37,10 @@ class BasicXcan {
   }
 
   Status send(const Frame& frame) {
-    if (waiting_ || state() == CanState::bus_off) return Status::failed;
-    if (frame.fd || frame.size > 8) return Status::failed;
-    if ((registers_.read(status) & transmit_full) != 0) return Status::busy;
+    if (frame.fd || frame.size > 8 || waiting_) return Status::failed;
+    const std::uint32_t now = registers_.read(status);
+    if (state_of(now) == CanState::bus_off) return Status::failed;
+    if ((now & transmit_full) != 0) return Status::busy;
     registers_.write(transmit_fifo + 0x0, identifier(frame));
     registers_.write(transmit_fifo + 0x4, static_cast<std::uint32_t>(frame.size) << 28);
     registers_.write(transmit_fifo + 0x8, word(frame, 0));
@@ -104,9 +105,9 @@ class BasicXcan {
     return wait_for(registers_, status, normal_mode, tries) ? Status::ok : Status::failed;
   }
 
-  CanState state() {
-    if (waiting_) return CanState::bus_off;
-    switch (registers_.read(status) >> 7 & 0b11) {  // ESTAT
+  CanState state() { return waiting_ ? CanState::bus_off : state_of(registers_.read(status)); }
+  static CanState state_of(std::uint32_t status_register) {
+    switch (status_register >> 7 & 0b11) {  // ESTAT
       case 0b10:
         return CanState::bus_off;
       case 0b11:
