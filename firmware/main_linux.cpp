@@ -47,7 +47,7 @@ constexpr const char* usage =
     --busy L        output, high while a tick is computed
   --active-low      all three lines
   --realtime P      SCHED_FIFO with this priority, 1 .. 99, and memory locked
-  --watchdog DEV    /dev/watchdog, 1 s
+  --watchdog DEV    /dev/watchdog, 1 s, for one node
   --serial-number S of object 0x1018
 )";
 
@@ -122,8 +122,8 @@ Options parse(int count, char** arguments) {
   if (options.can == nullptr) quit(2, "--can IF is missing: `ip -br link show type can` lists the interfaces");
   if (options.chip == nullptr && (options.enable || options.fault || options.busy))
     quit(2, "--gpio-chip is missing: `gpiodetect` lists the chips");
-  if (options.joints.size() > 1 && options.chip != nullptr)
-    quit(2, "--gpio-chip: lines belong to one node, so to one --joint");
+  if (options.joints.size() > 1 && (options.chip != nullptr || options.watchdog != nullptr))
+    quit(2, "--gpio-chip and --watchdog are one node's, so go with one --joint");
   if (options.node + options.joints.size() > fxdyn::canopen::largest_node_id + 1)
     quit(2, "--node: the last node's id would be above 127");
   for (std::size_t i = 0; i < options.joints.size(); ++i) {
