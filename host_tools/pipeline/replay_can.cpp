@@ -17,6 +17,9 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using nlohmann::json;
 
+/// Ticks until a torque has come up its ramp, by far.
+constexpr Index lead_in = 250;
+
 /// The log's torque at the ticks, linearly in between.
 VectorXd measured_at(const ProcessedLog& log, const VectorXd& t, Index joint) {
   VectorXd out(t.size());
@@ -43,7 +46,7 @@ json play(CanDrives& drives, const ProcessedLog& log, const IdentifiedModel& mod
   }
   json joints = json::array();
   // The torque comes up by its ramp at the start: not the model's yet.
-  const Index first = std::min<Index>(ticks - 1, 250);
+  const Index first = std::min<Index>(ticks - 1, lead_in);
   for (Index j = 0; j < n; ++j) {
     const VectorXd measured = measured_at(log, states.t.head(ticks), j);
     const auto rms = [&](const VectorXd& x) {
@@ -69,6 +72,8 @@ json in_the_loop(CanDrives& drives, const Pipeline& pipeline) {
   drive.begin = [&](const Reference& next) {
     reference = &next;
     drives.restart();
+    // At rest at the start until the torque has come up its ramp: a drive is switched on before the robot moves.
+    for (Index k = 0; k < lead_in; ++k) drives.tick(next.q.row(0), next.dq.row(0), next.ddq.row(0));
   };
   drive.torque = [&](Index k) {
     const CanDrives::Tick tick = drives.tick(reference->q.row(k), reference->dq.row(k), reference->ddq.row(k));
@@ -86,12 +91,12 @@ json in_the_loop(CanDrives& drives, const Pipeline& pipeline) {
 }  // namespace
 
 CanReplay replay_on_can(Pipeline& pipeline, const CanReplaySettings& settings) {
-  const IdentifiedModel model = pipeline.model();
-  if (!model.formats)
-    throw InputError(fmt::format("{}: no tables of this model there; run `fxdyn export` and flash them",
-                                 pipeline.directory().string()));
   try {
     can::SocketBus bus(settings.interface, settings.fd);
+    const IdentifiedModel model = pipeline.model();
+    if (!model.formats)
+      throw InputError(fmt::format("{}: no tables of this model there; run `fxdyn export` and flash them",
+                                   pipeline.directory().string()));
     CanDrives drives(bus, model, {settings.nodes, settings.fd});
     json document = {{"schema", "fxdyn.can_replay/1"}, {"interface", settings.interface}, {"fd", settings.fd}};
     Progress progress;
