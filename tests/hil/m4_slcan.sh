@@ -8,7 +8,7 @@ bin=$1 image=$2 ticks=${3:-5000} least=${4:-0}
 
 if [ "${FXDYN_INSIDE:-0}" = 0 ]; then
   lines=$(mktemp -d)
-  timeout 300 qemu-system-arm -M mps2-an386 -display none -monitor none \
+  timeout 840 qemu-system-arm -M mps2-an386 -display none -monitor none \
     -chardev "socket,id=line,path=$lines/board,server=on,wait=on" -serial chardev:line -kernel "$image" &
   board=$!
   "$bin/slcan_relay" "$lines/host" "$lines/board" &

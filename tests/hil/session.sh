@@ -7,7 +7,8 @@ here=$(cd "$(dirname "$0")" && pwd)
 "$1/fxdyn_node" --can vcan0 &
 node=$!
 sleep 0.5
-candump -r 8388608 -L vcan0 >"$2/session.log" &
+# in memory first: the shared folder is slow, and candump would drop frames
+candump -r 8388608 -L vcan0 >/tmp/session.log &
 capture=$!
 trap 'kill $node $capture 2>/dev/null; wait' EXIT
 sleep 0.5
@@ -32,10 +33,13 @@ ask 601#4008100000000000 '581#4108100010000000'  # device name: 16 bytes, segmen
 cansend vcan0 601#8008100000000008               # and left: abort
 ask 601#2F18100200000000 '581#8018100202000106'  # read-only
 ask 601#2B10200032000000 '581#6010200000000000'  # ramp of 50 ticks
-ask 000#0101 '701#05' 10                         # operational, said by the next heartbeat
+ask 000#0101 '701#05' 30                         # operational, said by the next heartbeat
 for joint in 1 2 3 4 5 6; do cansend vcan0 20$joint#0000000000000000; done
 ask 080# '181#[0-9A-F]{16}'                      # SYNC -> torque of joint 1
-ask 000#8001 '701#7F' 10
-ask 000#8101 '701#00' 10                         # reset: boot-up
+ask 000#8001 '701#7F' 30
+ask 000#8101 '701#00' 30                         # reset: boot-up
 "$1/hil_driver" --name "captured session" --can vcan0 --nodes 1 --ticks 200
 sleep 0.5
+kill $capture
+wait $capture 2>/dev/null || true
+cp /tmp/session.log "$2/session.log"
