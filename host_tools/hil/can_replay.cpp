@@ -16,9 +16,11 @@ namespace {
 using nlohmann::json;
 using namespace std::chrono_literals;
 
-/// In lockstep a tick takes as long as it takes: SYNC counts as overdue only after this.
-constexpr std::uint32_t patient_period_us = 1'000'000;
-constexpr can::Duration answer_time = 200ms, start_time = 5s;
+/// In lockstep a tick takes as long as it takes: SYNC counts as overdue after one and a half of these, which is later
+/// than the torques are given up, so that a slow host never makes a node's own timer tick in between.
+constexpr std::uint32_t patient_period_us = 4'000'000;
+constexpr can::Duration torque_time = 5s;
+constexpr can::Duration answer_time = 500ms, start_time = 10s;
 
 }  // namespace
 
@@ -118,7 +120,9 @@ void CanDrives::restart() {
   if (lockstep_) lost_ += lockstep_->statistics().missing + lockstep_->statistics().late;
   for (const Node& node : nodes_) {
     master_.command(canopen::NmtCommand::reset_node, node.id);
-    master_.wait_for(node.id, canopen::NmtState::pre_operational, start_time);
+    // The boot-up message: a heartbeat may still be one from before the reset.
+    master_.wait_for(node.id, canopen::NmtState::initialising, start_time);
+    wait_for_zero_torque(node);
     master_.write(node.id, 0x1006, 0, patient_period_us, 4);
     if (fd_) master_.write(node.id, 0x2030, 0, 1, 1);
   }
@@ -133,7 +137,22 @@ void CanDrives::restart() {
   fixed_.reset();
   since_restart_ = 0;
   lockstep_ = std::make_unique<can::Lockstep>(
-      master_, can::Lockstep::Options{.joints = joints_.size(), .expect = {}, .fd = fd_, .timeout = 2s});
+      master_, can::Lockstep::Options{.joints = joints_.size(), .expect = {}, .fd = fd_, .timeout = torque_time});
+}
+
+/// A reset takes the torque to zero by its ramp: what is left of it would be the next run's first torque.
+void CanDrives::wait_for_zero_torque(const Node& node) {
+  const can::Duration end = master_.bus().now() + start_time;
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    if ((node.outputs >> j & 1U) == 0) continue;
+    while (master_.read(node.id, 0x2111, static_cast<std::uint8_t>(j + 1)) != 0) {
+      if (master_.bus().now() > end)
+        throw can::NodeError(
+            fmt::format("node {}: the torque of joint {} does not go to zero after a reset", node.id, j + 1));
+    }
+  }
+  // Less than half a mN m may be left, for one more tick of the node.
+  master_.listen(10ms);
 }
 
 CanDrives::Tick CanDrives::tick(const Eigen::VectorXd& q, const Eigen::VectorXd& dq, const Eigen::VectorXd& ddq) {

@@ -45,7 +45,7 @@ class CanDrives {
   struct Node {
     std::uint8_t id = 0;
     std::uint32_t outputs = 0, crc = 0;
-    std::string board, version;
+    std::string board{}, version{};
   };
   struct Joint {
     std::int32_t velocity = 1, acceleration = 1;  ///< raw, of a share of 32768
@@ -57,6 +57,7 @@ class CanDrives {
   };
 
   void identify(Node& node);
+  void wait_for_zero_torque(const Node& node);
   void check(const Node& node);
 
   can::Master master_;

@@ -9,3 +9,14 @@ ip link set vcan1 mtu 16 up
 for name in can0 can1; do
   ! ip link show "$name" >/dev/null 2>&1 || ip link set "$name" up type can bitrate 1000000
 done
+
+# start_node PROGRAM ARGUMENT..: a node on vcan0, awaited until it is on the bus; its process is $node
+start_node() {
+  local said
+  said=$(mktemp)
+  "$1" --can vcan0 "${@:2}" >"$said" 2>&1 &
+  node=$!
+  for _ in $(seq 600); do ! grep -q ' on vcan0' "$said" || return 0; sleep 0.1; done
+  echo "FAILED: $1 does not start: $(cat "$said")"
+  exit 1
+}

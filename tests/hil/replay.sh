@@ -41,9 +41,8 @@ refused() {
 refused 2 'no interface can9' --can can9
 refused 2 'ip link set vcan2' --can vcan2
 refused 2 'no node answers' --can vcan0
-"$work/node/fxdyn_node" --can vcan0 &
-trap 'kill %1 2>/dev/null || true' EXIT
-sleep 1
+trap 'kill $node 2>/dev/null || true' EXIT
+start_node "$work/node/fxdyn_node"
 "$fxdyn" replay arm.project --out out --can vcan0 --ticks 1500 || fail "replay"
 grep -q '"bit_exact": true' out/can_replay.json || fail "the torques differ"
 "$fxdyn" replay arm.project --out out --can vcan0 --closed-loop || fail "closed loop"
@@ -53,10 +52,8 @@ python3 -c '
 import json
 loop = json.load(open("out/can_replay.json"))["closed_loop"]["methods"][-1]["moves"]["all"]
 assert loop["tracking_motor"] < 0.05, loop' || fail "tracking in the loop"
-kill %1
-wait %1 2>/dev/null || true
-"$work/../fxdyn_node" --can vcan0 &
-trap 'kill %2 2>/dev/null || true' EXIT
-sleep 1
+kill $node
+wait $node 2>/dev/null || true
+start_node "$work/../fxdyn_node"
 refused 2 'a robot of 6 joints' --can vcan0
 exit $failures

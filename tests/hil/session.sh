@@ -4,22 +4,24 @@
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 . "$here/interfaces.sh"
-"$1/fxdyn_node" --can vcan0 &
-node=$!
-sleep 0.5
+start_node "$1/fxdyn_node"
 # in memory first: the shared folder is slow, and candump would drop frames
 candump -r 8388608 -L vcan0 >/tmp/session.log &
 capture=$!
 trap 'kill $node $capture 2>/dev/null; wait' EXIT
 sleep 0.5
 
-# ask FRAME REPLY [FRAMES]: sends a frame and looks for the reply among the next frames under its identifier (1), `.` in it for any digit
+# ask FRAME REPLY [FRAMES]: sends a frame and looks for the reply among the next frames under its identifier (1), `.` in it for any
+# digit. Once more where there was no reply at all: candump may have been slower to start than cansend.
 ask() {
-  candump -L -n "${3:-1}" -T 3000 "vcan0,${2%%#*}:7FF" >/tmp/reply &
-  local listener=$!
-  sleep 0.3
-  cansend vcan0 "$1"
-  wait $listener
+  for listening in 0.3 3; do
+    candump -L -n "${3:-1}" -T 3000 "vcan0,${2%%#*}:7FF" >/tmp/reply &
+    local listener=$!
+    sleep $listening
+    cansend vcan0 "$1"
+    wait $listener
+    [ ! -s /tmp/reply ] || break
+  done
   if ! awk '{print $3}' /tmp/reply | grep -qxE "$2"; then
     echo "FAILED: $1 was answered by $(awk '{print $3}' /tmp/reply | xargs), not $2"
     exit 1
