@@ -139,10 +139,12 @@ class DriveNode {
 
   /// How long nothing is due if no frame comes, longest_sleep_us or more: for systems where waking up is expensive.
   std::uint32_t idle_us() const {
-    constexpr std::uint32_t resolution_us = 5000;  // of heartbeats, inhibit times, time-outs
-    const bool torque_moves =
-        std::any_of(torques_.begin(), torques_.end(), [](const auto& torque) { return torque.value() != 0; });
-    if (off_bus_ || pending_ != 0 || (torque_moves && !is_due_to_tick())) return longest_sleep_us;
+    constexpr std::uint32_t resolution_us = 5000;  // of heartbeats, inhibit times, time-outs, and of seeing enable fall
+    const bool torque_moves = consumer_lost_ != 0 || !is_due_to_tick() || !was_enabled_;
+    if (off_bus_ || pending_ != 0 ||
+        (torque_moves &&
+         std::any_of(torques_.begin(), torques_.end(), [](const auto& torque) { return torque.value() != 0; })))
+      return longest_sleep_us;
     if (!is_due_to_tick()) return resolution_us;
     const std::uint32_t since = hardware_.clock.now_us() - sync_us_;
     return std::clamp(overdue_after_us_ - std::min(since, overdue_after_us_), longest_sleep_us, resolution_us);
@@ -200,6 +202,7 @@ class DriveNode {
   static constexpr bool can_fd = Frame::most_bytes >= 64 && WireSetpoint::bytes * joints <= 64;
   static constexpr std::size_t most_frames = 64;  ///< of one poll, so that a flood does not starve the rest
   static constexpr std::uint32_t all_joints = joints == 32 ? 0xFFFF'FFFF : (1U << joints) - 1;
+  static constexpr std::uint32_t boot_up_retry_us = 10'000;  ///< where the bus refused it
   static constexpr std::uint32_t longest_gap = 0x00FF'FFFF;  ///< stale ticks that are counted in a row
 
   /// Frames that wait to be sent, one place each, most urgent first. A newer one takes the older one's place.
@@ -217,6 +220,7 @@ class DriveNode {
     std::uint32_t ramp_ticks = dictionary::defaults::ramp_ticks;
     std::uint32_t tolerated = dictionary::defaults::tolerated_ticks;
     bool fd = false;
+    bool parity = false;
     std::array<std::uint32_t, dictionary::consumers> consumers{};
     std::array<std::uint32_t, joints> setpoint_ids{};
     std::array<std::uint32_t, outputs> torque_ids{};
@@ -262,15 +266,15 @@ class DriveNode {
     errors_.clear(Error::heartbeat_lost);
     leave_operation();
     state_ = NmtState::initialising;  // until the boot-up message has gone
-    heartbeat_us_ = now;
-    own_tick_us_ = now;
+    heartbeat_us_ = now - boot_up_retry_us;
+    pending_ = 0;  // nothing of before goes out ahead of the boot-up message
+    step_us_ = now;
+    release_after_us_ = tick_us_;
   }
 
   void enter(NmtState state) {
-    if (state_ == NmtState::operational && state != NmtState::operational) {
-      leave_operation();
-      own_tick_us_ = hardware_.clock.now_us();
-    }
+    if (state_ == NmtState::initialising) return;  // it is left by the boot-up message alone
+    if (state_ == NmtState::operational && state != NmtState::operational) leave_operation();
     if (state == NmtState::operational && state_ != NmtState::operational) {
       if (!tables_.valid) {
         errors_.tell(Error::tables, 0);
@@ -285,7 +289,7 @@ class DriveNode {
   void leave_operation() {
     synchronised_ = false;
     has_last_ = false;
-    waiting_mask_ = 0;
+    waiting_mask_ = odd_mask_ = 0;
     stale_ = 0;
     since_tick_ = 0;
     errors_.clear(Error::setpoints_stale);
@@ -361,6 +365,8 @@ class DriveNode {
     if ((waiting_mask_ & bit) != 0) count(Counter::duplicate_setpoints);
     waiting_mask_ |= bit;
     waiting_[j] = WireSetpoint::load(from);
+    const std::uint32_t odd = waiting_[j].is_odd() ? bit : 0;
+    odd_mask_ = (odd_mask_ & ~bit) | odd;
   }
 
   void handle_nmt() {
@@ -441,10 +447,12 @@ class DriveNode {
       if (stale_ > configuration_.tolerated)
         errors_.raise(Error::setpoints_stale, static_cast<std::uint16_t>(missing_joint()), hardware_.clock.now_us());
     }
-    waiting_mask_ = 0;
+    waiting_mask_ = odd_mask_ = 0;
 
     const bool hold = !fresh && stale_ <= configuration_.tolerated;
     const bool allowed = enabled && consumer_lost_ == 0;
+    step_us_ = sync_us_;
+    release_after_us_ = tick_us_ + tick_us_ / 2;
     bool zero = true;
     for (std::size_t o = 0; o < outputs; ++o) {
       TorqueOutput& torque = torques_[o];
@@ -478,6 +486,10 @@ class DriveNode {
       count(Counter::missing_setpoints, static_cast<std::uint32_t>(std::popcount(all_joints & ~waiting_mask_)));
       return false;
     }
+    if (configuration_.parity && odd_mask_ != 0 && odd_mask_ != all_joints) {
+      count(Counter::mixed_setpoints);
+      return false;
+    }
     std::uint32_t implausible = 0;
     if (has_last_) {
       for (std::size_t j = 0; j < joints; ++j) {
@@ -508,8 +520,11 @@ class DriveNode {
   bool is_enabled() {
     bool on = false;  // what it stays where the input can't be read
     static_cast<void>(hardware_.enable.read(on));
-    return on;
+    return was_enabled_ = on;
   }
+
+  /// Whether a torque other than zero may stay.
+  bool is_allowed() { return consumer_lost_ == 0 && is_enabled(); }
 
   /// As long without setpoints as the longest ramp takes: the next ones begin anew. A time and not just a torque of
   /// zero, so that drives of one joint each forget when a drive of all does.
@@ -594,7 +609,8 @@ class DriveNode {
 
   void serve_heartbeats(std::uint32_t now) {
     if (state_ == NmtState::initialising) {
-      if (!is_pending(heartbeat_place)) put_heartbeat();
+      if (off_bus_ || is_pending(heartbeat_place) || now - heartbeat_us_ < boot_up_retry_us) return;
+      put_heartbeat();
       heartbeat_us_ = now;
     } else if (const std::uint32_t period = 1000 * configuration_.heartbeat_ms;
                period != 0 && now - heartbeat_us_ >= period) {
@@ -620,18 +636,21 @@ class DriveNode {
   }
   bool is_supervised() const { return is_due_to_tick() && configuration_.period_us <= supervised_period_us; }
 
-  /// Ticks without SYNC; and where the node is not operational, what is left of the torque goes to zero.
+  /// Ticks without SYNC, at the tables' own rate once SYNC is overdue, so that a slow period makes no slow ramp.
+  /// Between ticks, and where none is due, a torque that may not go out goes to zero at that rate too.
   void serve_own_ticks(std::uint32_t now) {
-    if (is_due_to_tick()) {
-      if (now - sync_us_ < overdue_after_us_) return;
+    if (is_due_to_tick() && now - sync_us_ >= overdue_after_us_) {
       sync_us_ += overdue_after_us_;
-      if (now - sync_us_ >= configuration_.period_us) sync_us_ = now;  // far behind: no burst of ticks
-      overdue_after_us_ = configuration_.period_us;
-      tick(false);
-    } else if (state_ != NmtState::operational && now - own_tick_us_ >= tick_us_) {
-      own_tick_us_ = now - own_tick_us_ < 2 * tick_us_ ? own_tick_us_ + tick_us_ : now;
-      for (std::size_t o = 0; o < outputs; ++o) torques_[o].release(steps_[o]);
+      if (now - sync_us_ >= tick_us_) sync_us_ = now;  // far behind: no burst of ticks
+      overdue_after_us_ = tick_us_;
+      return tick(false);
     }
+    if (now - step_us_ < release_after_us_) return;
+    step_us_ += release_after_us_;
+    if (now - step_us_ >= tick_us_) step_us_ = now;
+    release_after_us_ = tick_us_;
+    if (state_ == NmtState::operational && synchronised_ && is_allowed()) return;
+    for (std::size_t o = 0; o < outputs; ++o) torques_[o].release(steps_[o]);
   }
 
   void serve_emergency(std::uint32_t now) {
@@ -797,6 +816,8 @@ class DriveNode {
         return word(configuration_.step_limits[item]);
       case V::tolerated_ticks:
         return configuration_.tolerated;
+      case V::tick_parity:
+        return configuration_.parity ? 1 : 0;
       case V::fractional_bits:
         return word(std::array{position_bits, velocity_bits, acceleration_bits, torque_bits}[item]);
       case V::velocity_limit:
@@ -876,6 +897,7 @@ class DriveNode {
         configuration_.error_behaviour = value;
         return canopen::Abort::none;
       case V::setpoint_id:
+        if ((value & canopen::cob_no_remote) != 0) return canopen::Abort::invalid_value;  // of torques only
         return set_cob_id(configuration_.setpoint_ids[object.item], value);
       case V::torque_id:
         return set_cob_id(configuration_.torque_ids[output_of(object.item)], value);
@@ -891,6 +913,9 @@ class DriveNode {
         return canopen::Abort::none;
       case V::tolerated_ticks:
         configuration_.tolerated = value;
+        return canopen::Abort::none;
+      case V::tick_parity:
+        configuration_.parity = value != 0;
         return canopen::Abort::none;
       case V::can_fd:
         if (operational) return canopen::Abort::device_state;
@@ -909,11 +934,22 @@ class DriveNode {
     if ((value & ~(canopen::cob_invalid | canopen::cob_no_remote | canopen::cob_identifier)) != 0 ||
         canopen::is_restricted(id))
       return canopen::Abort::invalid_value;
+    if ((value & canopen::cob_invalid) == 0 && is_taken(id, cob_id)) return canopen::Abort::invalid_value;
     const bool exists = (cob_id & canopen::cob_invalid) == 0;
     if (exists && (value & canopen::cob_invalid) == 0 && id != (cob_id & canopen::cob_identifier))
       return canopen::Abort::device_state;
     cob_id = value;
     return canopen::Abort::none;
+  }
+
+  /// Whether SYNC or another PDO than `own` has this identifier.
+  bool is_taken(std::uint32_t id, const std::uint32_t& own) const {
+    const auto has = [&](const std::uint32_t& other) {
+      return &other != &own && (other & canopen::cob_invalid) == 0 && (other & canopen::cob_identifier) == id;
+    };
+    return id == configuration_.sync_id ||
+           std::any_of(configuration_.setpoint_ids.begin(), configuration_.setpoint_ids.end(), has) ||
+           std::any_of(configuration_.torque_ids.begin(), configuration_.torque_ids.end(), has);
   }
 
   /// Torque limit / ticks, rounded up: the ramp is not longer than told.
@@ -947,10 +983,12 @@ class DriveNode {
   std::size_t label_size_ = 0;
 
   std::uint32_t waiting_mask_ = 0;  ///< bit j: waiting_[j] has come since the last SYNC
+  std::uint32_t odd_mask_ = 0;      ///< bit j: it is of an odd tick
   std::array<WireSetpoint, joints> waiting_{}, last_{};
-  bool has_last_ = false, synchronised_ = false;
+  bool has_last_ = false, synchronised_ = false, was_enabled_ = false;
   std::uint32_t stale_ = 0;  ///< stale ticks in a row
-  std::uint32_t tick_count_ = 0, sync_us_ = 0, overdue_after_us_ = 0, own_tick_us_ = 0;
+  std::uint32_t tick_count_ = 0, sync_us_ = 0, overdue_after_us_ = 0;
+  std::uint32_t step_us_ = 0, release_after_us_ = 0;  ///< when the torques last moved, when they are released next
 
   typename Model::State model_state_{};
   typename Model::Setpoints setpoints_{};

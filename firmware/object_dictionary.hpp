@@ -96,6 +96,7 @@ enum class Variable : std::uint8_t {
   ramp_ticks,
   step_limit,
   tolerated_ticks,
+  tick_parity,
   fractional_bits,
   velocity_limit,
   acceleration_limit,
@@ -135,8 +136,9 @@ enum class Counter : std::uint8_t {
   foreign_frames,  ///< identifiers that nothing here wants
   watchdog_resets,
   nmt_resets,
+  mixed_setpoints,  ///< ticks with setpoints of odd and of even ticks (0x2013)
 };
-inline constexpr std::size_t counters = static_cast<std::size_t>(Counter::nmt_resets) + 1;
+inline constexpr std::size_t counters = static_cast<std::size_t>(Counter::mixed_setpoints) + 1;
 
 /// Cost of a tick, in what the board's cycle counter counts: the items of 0x2002.
 enum class Cost : std::uint8_t {
@@ -320,6 +322,7 @@ inline constexpr auto described = [] {
       counter(Counter::foreign_frames, "Foreign frames"),
       counter(Counter::watchdog_resets, "Start-ups after a watchdog reset"),
       counter(Counter::nmt_resets, "Resets by NMT"),
+      counter(Counter::mixed_setpoints, "Ticks with setpoints of two ticks"),
       member(0x2002, 1, u32, ro, V::cost, "Cost of a tick", "Model, last"),
       member(0x2002, 2, u32, ro, V::cost, "Cost of a tick", "Model, most"),
       member(0x2002, 3, u32, ro, V::cost, "Cost of a tick", "Everything, last"),
@@ -333,6 +336,9 @@ inline constexpr auto described = [] {
       within(
           one(0x2012, u8, rw, V::tolerated_ticks, "Stale ticks tolerated", "ticks", number, defaults::tolerated_ticks),
           0, 0xFF),
+      within(one(0x2013, u8, rw, V::tick_parity, "Lowest bit of a setpoint's acceleration is the tick's parity", "",
+                 number, 0),
+             0, 1),
       member(0x2020, 1, u8, fixed, V::fractional_bits, "Fractional bits", "Position"),
       member(0x2020, 2, u8, fixed, V::fractional_bits, "Fractional bits", "Velocity"),
       member(0x2020, 3, u8, fixed, V::fractional_bits, "Fractional bits", "Acceleration"),

@@ -19,6 +19,11 @@ struct WireSetpoint {
   std::int16_t dq = 0, ddq = 0;
   bool operator==(const WireSetpoint&) const = default;
 
+  /// Where object 0x2013 says so, the lowest bit of ddq is the number of the tick, modulo 2: the setpoints of all
+  /// joints of one tick have the same. It costs half a step of ddq and stays part of the number.
+  constexpr bool is_odd() const { return (ddq & 1) != 0; }
+  constexpr void of_tick(bool odd) { ddq = static_cast<std::int16_t>((ddq & ~1) | (odd ? 1 : 0)); }
+
   static constexpr WireSetpoint load(const std::uint8_t* from) {
     return {static_cast<std::int32_t>(canopen::load<4>(from)), static_cast<std::int16_t>(canopen::load<2>(from + 4)),
             static_cast<std::int16_t>(canopen::load<2>(from + 6))};

@@ -179,8 +179,7 @@ std::map<unsigned, Message> parse_dbc(const BusDescription& description) {
   std::istringstream in(out.str());
   std::map<unsigned, Message> messages;
   const std::regex message(R"(BO_ (\d+) (\w+): (\d+) (\w+))");
-  const std::regex signal(
-      R"x( SG_ (\w+) : (\d+)\|(\d+)@1([+-]) \(([^,]+),0\) \[([^|]+)\|([^\]]+)\] "([^"]*)" (\w+))x");
+  const std::regex signal(R"x( SG_ (\w+) : (\d+)\|(\d+)@1([+-]) \(([^,]+),0\) \[([^|]+)\|([^\]]+)\] "([^"]*)" (\w+))x");
   Message* last = nullptr;
   std::string nodes;
   for (std::string line; std::getline(in, line);) {

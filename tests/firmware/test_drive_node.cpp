@@ -41,9 +41,37 @@ TEST_F(DriveNodeTest, BootsUpWhenTheBusIsThere) {
   EXPECT_EQ(bench.node.state(), NmtState::initialising);
   bench.on_wire.bus.down = false;
   bench.on_wire.bus.busy = 3;
-  bench.pass(1000);
+  bench.pass(10'000);
   EXPECT_EQ(bench.heard(0x701), (std::vector<Bytes>{{0x00}}));
   EXPECT_EQ(bench.node.state(), NmtState::pre_operational);
+}
+
+// What waited when the reset came is not sent ahead of the boot-up message, nor taken for it.
+TEST_F(DriveNodeTest, TheBootUpMessageIsTheFirstAfterAReset) {
+  bench.start();
+  bench.on_wire.bus.busy = 1'000'000;
+  bench.clock.advance(200'000);
+  bench.node.poll();  // a heartbeat waits
+  bench.send(0, {0x81, 0x00});
+  bench.send(0, {0x01, 0x00});  // too early
+  bench.node.poll();
+  EXPECT_EQ(bench.node.state(), NmtState::initialising);
+  bench.on_wire.bus.busy = 0;
+  bench.pass(20'000);
+  EXPECT_EQ(bench.node.state(), NmtState::pre_operational);
+  const auto frames = bench.heard();
+  ASSERT_FALSE(frames.empty());
+  EXPECT_EQ(frames[0].id, 0x701U);
+  EXPECT_EQ(frames[0].data[0], 0x00);
+}
+
+// A bus that takes nothing is asked again and again, but each frame that is lost is one.
+TEST_F(DriveNodeTest, LostFramesDoNotRunAwayWhileTheBusIsDown) {
+  bench.on_wire.bus.down = true;
+  bench.pass(1'000'000);
+  EXPECT_EQ(bench.node.state(), NmtState::initialising);
+  EXPECT_GE(bench.counted(Counter::lost_sent), 50U);
+  EXPECT_LE(bench.counted(Counter::lost_sent), 101U);
 }
 
 TEST_F(DriveNodeTest, FollowsNmt) {
@@ -500,7 +528,7 @@ TEST_F(DriveNodeTest, TheSessionByHandOfTheGuide) {
   bench.start();
   for (std::size_t j = 0; j < 6; ++j) bench.send_setpoint(j, {});
   bench.sync();
-  for (const std::uint8_t status : {0x11, 0x10, 0x12}) {
+  for (const int status : {0x11, 0x10, 0x12}) {
     const auto sent = bench.torques();
     ASSERT_EQ(sent.size(), 6U);
     for (const auto& torque : sent) {
