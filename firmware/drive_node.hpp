@@ -65,12 +65,18 @@ struct NodeTables {
   const RatedTorques<Model>& rated;
 };
 
+/// What of a board can fail at start-up: bits of NodeSettings::hardware_failed.
+namespace hardware_part {
+inline constexpr std::uint8_t can = 1 << 0, wake_up_timer = 1 << 1, watchdog = 1 << 2;
+}
+
 /// What only the board knows.
 struct NodeSettings {
   std::uint8_t id = 0;  ///< 1 .. 127; 0: number of the first joint that the node puts out
   std::uint32_t serial_number = 0;
-  std::string_view board = "";  ///< hardware version 0x1009, up to 32 characters
-  bool watchdog_reset = false;  ///< why the processor started
+  std::string_view board = "";       ///< hardware version 0x1009, up to 32 characters
+  bool watchdog_reset = false;       ///< why the processor started
+  std::uint8_t hardware_failed = 0;  ///< parts that did not start: an error that lasts, the fault output with it
 };
 
 /// CANopen node that puts out the feedforward torque of setpoints that come over the bus. It knows neither the board
@@ -107,6 +113,7 @@ class DriveNode {
     }
     seen_lost_ = hardware_.bus.errors().lost;
     reset(now);
+    if (settings_.hardware_failed != 0) errors_.raise(Error::hardware, settings_.hardware_failed, now);
     if (!tables_.valid) errors_.raise(Error::tables, 0, now);
     if (settings_.watchdog_reset) {
       count(Counter::watchdog_resets);
@@ -264,12 +271,40 @@ class DriveNode {
     consumer_seen_ = 0;
     consumer_lost_ = 0;
     errors_.clear(Error::heartbeat_lost);
+    listen();
     leave_operation();
     state_ = NmtState::initialising;  // until the boot-up message has gone
     heartbeat_us_ = now - boot_up_retry_us;
     pending_ = 0;  // nothing of before goes out ahead of the boot-up message
     step_us_ = now;
     release_after_us_ = tick_us_;
+  }
+
+  /// Where the bus has acceptance filters: what handle() wants. Its own identifiers are among them, since another node
+  /// that sends them has to be noticed.
+  void listen() {
+    if constexpr (hal::FilteringCanBus<Bus>) {
+      std::array<hal::IdRange, 6 + joints + outputs> ranges;
+      std::size_t count = 0;
+      const auto add = [&](std::uint32_t first, std::uint32_t last) {
+        if (count > 0 && ranges[count - 1].last + 1 == first)
+          ranges[count - 1].last = last;
+        else
+          ranges[count++] = {first, last};
+      };
+      add(canopen::nmt_id, canopen::nmt_id);
+      add(configuration_.sync_id, configuration_.sync_id);
+      for (const std::uint32_t own : {canopen::emergency_id, canopen::sdo_answer_id, canopen::sdo_request_id})
+        add(own + settings_.id, own + settings_.id);
+      add(canopen::heartbeat_id + 1, canopen::heartbeat_id + canopen::largest_node_id);
+      for (const std::uint32_t cob_id : configuration_.setpoint_ids)
+        if ((cob_id & canopen::cob_invalid) == 0)
+          add(cob_id & canopen::cob_identifier, cob_id & canopen::cob_identifier);
+      for (const std::uint32_t cob_id : configuration_.torque_ids)
+        if ((cob_id & canopen::cob_invalid) == 0)
+          add(cob_id & canopen::cob_identifier, cob_id & canopen::cob_identifier);
+      hardware_.bus.listen({ranges.data(), count});
+    }
   }
 
   void enter(NmtState state) {
@@ -873,6 +908,7 @@ class DriveNode {
         if (operational) return canopen::Abort::device_state;
         if (value > canopen::cob_identifier || canopen::is_restricted(value)) return canopen::Abort::invalid_value;
         configuration_.sync_id = value;
+        listen();
         return canopen::Abort::none;
       case V::cycle_period:
         if (value > longest_period_us) return canopen::Abort::too_high;
@@ -939,6 +975,7 @@ class DriveNode {
     if (exists && (value & canopen::cob_invalid) == 0 && id != (cob_id & canopen::cob_identifier))
       return canopen::Abort::device_state;
     cob_id = value;
+    listen();
     return canopen::Abort::none;
   }
 

@@ -9,6 +9,7 @@ namespace fxdyn {
 
 /// What can be wrong with a node, in the order in which it is told.
 enum class Error : std::uint8_t {
+  hardware,
   tables,
   watchdog_reset,
   id_collision,
@@ -26,7 +27,8 @@ struct ErrorKind {
   std::uint8_t register_ = 0;  ///< bits of the error register 0x1001: 0 generic, 4 communication
   bool event = false;          ///< has no end of its own: counts as gone when it has not happened for a while
 };
-inline constexpr std::array<ErrorKind, 10> error_kinds{{{0x6320, 0x01, false},
+inline constexpr std::array<ErrorKind, 11> error_kinds{{{0x5000, 0x01, false},
+                                                        {0x6320, 0x01, false},
                                                         {0x6010, 0x01, true},
                                                         {0x8150, 0x11, true},
                                                         {0x8130, 0x11, false},

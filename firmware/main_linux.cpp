@@ -19,6 +19,7 @@
 #include <fstream>
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -61,9 +62,13 @@ struct Options {
   int realtime = 0;
 };
 
+/// The way out, to main() and through every destructor: a watchdog that is left armed would reset the machine.
+struct Quit {
+  int code;
+};
 [[noreturn]] void quit(int code, const char* what, const char* why = "", const char* more = "") {
   std::fprintf(stderr, "fxdyn_node: %s%s%s\n", what, why, more);
-  std::exit(code);
+  throw Quit{code};
 }
 
 unsigned number(const char* option, const char* text, unsigned lowest, unsigned highest) {
@@ -81,7 +86,7 @@ Options parse(int count, char** arguments) {
     const std::string_view name = arguments[i];
     if (name == "--help") {
       std::fputs(usage, stdout);
-      std::exit(0);
+      throw Quit{0};
     }
     if (name == "--fd") {
       options.fd = true;
@@ -159,6 +164,19 @@ void open_pin(Pin& pin, const Options& options, const std::optional<unsigned>& l
   quit(1, options.chip, (std::string(", line ") + std::to_string(*line)).c_str(), remedy);
 }
 
+std::string remedy_of_watchdog(int number) {
+  const char* remedy =
+      number == EACCES || number == EPERM ? ": run it with sudo"
+      : number == EBUSY
+          ? ": taken by another program: `sudo fuser -v /dev/watchdog*` says which; systemd lets go of it "
+            "with RuntimeWatchdogSec=off in /etc/systemd/system.conf"
+      : number == ENOENT || number == ENODEV || number == ENXIO
+          ? ": no such watchdog: `wdctl` lists them; one in software: sudo modprobe softdog"
+          : ": no watchdog that can be set to 1 s: `wdctl` says what it can do; one in software: sudo "
+            "modprobe softdog";
+  return std::strerror(number) + std::string(remedy);
+}
+
 constinit fxdyn::TablePage<Model> loaded_page{};
 
 /// The tables to compute with: those of a file where there is one, whether they are valid or not, since the node has to
@@ -177,7 +195,10 @@ void prepare_real_time(int priority) {
     quit(1, "--realtime: ", std::strerror(errno),
          ": run it with sudo, or setcap cap_sys_nice,cap_ipc_lock+ep on the program");
   }
-  if (::mlockall(MCL_CURRENT | MCL_FUTURE) != 0) quit(1, "--realtime: memory can't be locked: ", std::strerror(errno));
+  if (::mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
+    quit(1, "--realtime: memory can't be locked: ", std::strerror(errno),
+         ": run it with sudo, or setcap cap_sys_nice,cap_ipc_lock+ep on the program, or ulimit -l unlimited before it");
+  }
 }
 
 volatile sig_atomic_t stopped = 0;
@@ -190,27 +211,17 @@ struct WithOutputs<outputs, fxdyn::RobotModel<N, all, Joints...>> {
   using type = fxdyn::RobotModel<N, outputs, Joints...>;
 };
 
-/// What goes through to the node: all but the torques and SDO answers of the others, half of a bus. Its own stay, since
-/// another node that sends them has to be noticed.
-template <class M>
-auto filters(std::uint32_t node) {
-  constexpr canid_t base = CAN_EFF_FLAG;  // of frames with 11 bits the mask's function codes, of the others all
-  std::array<can_filter, 9 + M::outputs> list{{{CAN_EFF_FLAG, base},
-                                               {fxdyn::canopen::sdo_answer_id + node, base | CAN_SFF_MASK},
-                                               {0x000, base | 0x780},  // NMT
-                                               {0x080, base | 0x780},  // SYNC, EMCY
-                                               {0x100, base | 0x780},  // TIME
-                                               {0x200, base | 0x600},  // setpoints
-                                               {0x400, base | 0x700},
-                                               {0x500, base | 0x780},
-                                               {0x600, base | 0x600}}};  // SDO requests, heartbeats
-  std::size_t at = 9;
-  for (std::size_t j = 0; j < M::joints; ++j) {
-    if ((M::outputs_mask >> j & 1U) != 0)
-      list[at++] = {static_cast<canid_t>(fxdyn::canopen::torque_id + j + 1), base | CAN_SFF_MASK};
-  }
-  return list;
-}
+/// What goes through to the node beside what it asks for itself (DriveNode::listen): all but the torques and SDO
+/// answers of the others, half of a bus. Frames that nobody wants come too, to be counted.
+constexpr canid_t base = CAN_EFF_FLAG;  // of frames with 11 bits the mask's function codes, of the others all
+constexpr std::array<can_filter, 8> filters{{{CAN_EFF_FLAG, base},
+                                             {0x000, base | 0x780},    // NMT
+                                             {0x080, base | 0x780},    // SYNC, EMCY
+                                             {0x100, base | 0x780},    // TIME
+                                             {0x200, base | 0x600},    // setpoints
+                                             {0x400, base | 0x700},    // further PDOs
+                                             {0x500, base | 0x780},    // the same
+                                             {0x600, base | 0x600}}};  // SDO requests, heartbeats
 
 /// Tells when the bus gets worse or better.
 class Reporter {
@@ -256,7 +267,7 @@ template <class M, class Bus>
 class NodeOf final : public Node {
  public:
   NodeOf(const Options& options, const fxdyn::TablePage<Model>& page, std::uint32_t id) : reporter_(options) {
-    open(options, id);
+    open(options);
     static_assert(sizeof parameters_ == sizeof page.parameters);
     std::memcpy(static_cast<void*>(&parameters_), &page.parameters, sizeof parameters_);
     const bool valid = fxdyn::page_is_valid(page);
@@ -275,14 +286,13 @@ class NodeOf final : public Node {
   void report() override { reporter_.look(bus_); }
 
  private:
-  void open(const Options& options, std::uint32_t id) {
-    if (const auto result = bus_.open(options.can, filters<M>(id)); !result)
-      quit(1, os::explain(result, options.can).c_str());
+  void open(const Options& options) {
+    if (const auto result = bus_.open(options.can, filters); !result) quit(1, os::explain(result, options.can).c_str());
     open_pin(enable_.pin, options, options.enable, "fxdyn enable");
     open_pin(fault_.pin, options, options.fault, "fxdyn fault");
     open_pin(busy_.pin, options, options.busy, "fxdyn tick-busy");
     if (options.watchdog != nullptr && watchdog_.open(options.watchdog, 1) != Status::ok)
-      quit(1, options.watchdog, ": ", std::strerror(errno));
+      quit(1, options.watchdog, ": ", remedy_of_watchdog(errno).c_str());
   }
 
   static constexpr fxdyn::RatedTorques<M> rated{fxdyn::tables::rated_torque};
@@ -349,7 +359,7 @@ void run(std::vector<std::unique_ptr<Node>>& nodes) {
 
 }  // namespace
 
-int main(int count, char** arguments) {
+int main(int count, char** arguments) try {
   const Options options = parse(count, arguments);
   struct sigaction stop {};
   stop.sa_handler = [](int) { stopped = 1; };
@@ -359,4 +369,6 @@ int main(int count, char** arguments) {
   if (options.realtime != 0) prepare_real_time(options.realtime);
   run(nodes);
   return 0;
+} catch (const Quit& quit) {
+  return quit.code;
 }

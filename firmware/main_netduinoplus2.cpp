@@ -40,12 +40,14 @@ int main() {
   usart.start(system);
   static fxdyn::hal::SlcanBus bus(usart);
   static fxdyn::DriveHardware hardware{bus, clock, counter, watchdog, enable, fault, tick_busy};
+  const std::uint8_t failed = watchdog.start(50) == fxdyn::hal::Status::ok ? 0 : fxdyn::hardware_part::watchdog;
   // The hardware version (0x1009) says what it runs from: where there is no crystal, a host can see it.
   constexpr std::array<std::string_view, 3> names{FXDYN_BOARD_NAME " HSE", FXDYN_BOARD_NAME " HSI PLL",
                                                   FXDYN_BOARD_NAME " HSI"};
   static fxdyn::DriveNode<Model, decltype(hardware)> node(
       hardware, {tables.page.parameters, tables.page.header, tables.valid, tables.is_update, rated},
-      {.board = names[static_cast<std::size_t>(system.source)], .watchdog_reset = watchdog_reset});
-  static_cast<void>(watchdog.start(50));
+      {.board = names[static_cast<std::size_t>(system.source)],
+       .watchdog_reset = watchdog_reset,
+       .hardware_failed = failed});
   for (;;) static_cast<void>(node.poll());
 }

@@ -42,15 +42,17 @@ int main() {
   MemoryMapped registers;
   stm32::use_alternate_function(registers, board::gpio_a, 11, 9);
   stm32::use_alternate_function(registers, board::gpio_a, 12, 9);
-  if (can.start(system.mhz == 170 ? timing_at_170_mhz : timing_at_16_mhz) != fxdyn::hal::Status::ok)
-    static_cast<void>(fault.set(true));  // nothing on the bus would tell
   static fxdyn::DriveHardware hardware{can, clock, counter, watchdog, enable, fault, tick_busy};
-  static fxdyn::DriveNode<Model, decltype(hardware)> node(
-      hardware, {tables.page.parameters, tables.page.header, tables.valid, tables.is_update, rated},
-      {.board = FXDYN_BOARD_NAME, .watchdog_reset = watchdog_reset});
+  using Node = fxdyn::DriveNode<Model, decltype(hardware)>;
+  using fxdyn::hal::Status;
+  namespace part = fxdyn::hardware_part;
+  std::uint8_t failed = 0;
+  if (can.start(system.mhz == 170 ? timing_at_170_mhz : timing_at_16_mhz) != Status::ok) failed |= part::can;
   wake_up.set_clock(system);
-  static_cast<void>(wake_up.start(node.longest_sleep_us));
-  static_cast<void>(watchdog.start(50));
+  if (wake_up.start(Node::longest_sleep_us) != Status::ok) failed |= part::wake_up_timer;
+  if (watchdog.start(50) != Status::ok) failed |= part::watchdog;
+  static Node node(hardware, {tables.page.parameters, tables.page.header, tables.valid, tables.is_update, rated},
+                   {.board = FXDYN_BOARD_NAME, .watchdog_reset = watchdog_reset, .hardware_failed = failed});
   for (;;) {
     if (!node.poll()) can.wait();
   }

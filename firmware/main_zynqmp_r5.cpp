@@ -9,10 +9,12 @@
 #include "hal/absent.hpp"
 #include "hal/zynqmp_r5/clock.hpp"
 #include "hal/zynqmp_r5/gpio.hpp"
+#include "hal/zynqmp_r5/watchdog.hpp"
 #include "hal/zynqmp_r5/xcan.hpp"
 
 namespace {
 namespace board = fxdyn::hal::zynqmp_r5;
+using fxdyn::hal::Status;
 using fxdyn::tables::Model;
 
 constexpr fxdyn::RatedTorques<Model> rated{fxdyn::tables::rated_torque};
@@ -21,14 +23,19 @@ constexpr auto timing = fxdyn::hal::bit_timing(board::can_limits, board::can_clo
 
 #ifdef FXDYN_QEMU
 constexpr auto format = board::FrameFormat::qemu_7;
-using Enable = fxdyn::hal::FixedInput;  // QEMU 7.2 has no GPIO there: an access would be an abort
+// QEMU 7.2 has neither GPIO nor watchdog there: an access would be an abort.
+using Enable = fxdyn::hal::FixedInput;
 using Fault = fxdyn::hal::AbsentOutput;
 using TickBusy = fxdyn::hal::AbsentOutput;
+struct Watchdog : fxdyn::hal::AbsentWatchdog {
+  Status start(std::uint32_t) { return Status::ok; }
+};
 #else
 constexpr auto format = board::FrameFormat::controller;
 using Enable = board::InputPin<13, false>;
 using Fault = board::OutputPin<14, true>;
 using TickBusy = board::OutputPin<15, true>;
+using Watchdog = board::Watchdog;
 #endif
 }  // namespace
 
@@ -36,16 +43,18 @@ int main() {
   const auto tables = fxdyn::tables_in_flash(fxdyn::tables::page);
   board::MicrosecondClock clock;
   board::CycleCounter counter;
-  fxdyn::hal::AbsentWatchdog watchdog;  // the system watchdog resets by way of the platform management unit
+  Watchdog watchdog;
   Enable enable;
   Fault fault;
   TickBusy tick_busy;
   board::BasicXcan<format, board::MicrosecondClock> can(clock);
-  if (can.start(timing, bit_rate / 1000) != fxdyn::hal::Status::ok)
-    static_cast<void>(fault.set(true));  // nothing on the bus would tell
+  namespace part = fxdyn::hardware_part;
+  std::uint8_t failed = 0;
+  if (can.start(timing, bit_rate / 1000) != Status::ok) failed |= part::can;
+  if (watchdog.start(50) != Status::ok) failed |= part::watchdog;
   static fxdyn::DriveHardware hardware{can, clock, counter, watchdog, enable, fault, tick_busy};
   static fxdyn::DriveNode<Model, decltype(hardware)> node(
       hardware, {tables.page.parameters, tables.page.header, tables.valid, tables.is_update, rated},
-      {.board = FXDYN_BOARD_NAME});
+      {.board = FXDYN_BOARD_NAME, .hardware_failed = failed});
   for (;;) static_cast<void>(node.poll());
 }

@@ -4,6 +4,7 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "hal/status.hpp"
 
@@ -55,6 +56,18 @@ concept CanBus = requires(T& bus, const typename T::Frame& out, typename T::Fram
   { bus.receive(in) } -> std::same_as<Status>;
   { bus.errors() } -> std::same_as<CanErrors>;
   { bus.restart() } -> std::same_as<Status>;
+};
+
+/// Identifiers of 11 bits, both ends included.
+struct IdRange {
+  std::uint32_t first = 0, last = 0;
+};
+
+/// A bus with acceptance filters. listen(): from now on these identifiers come through; what else does is up to the
+/// device, which may be everything. Frames that come while the filters change may be lost.
+template <class T>
+concept FilteringCanBus = CanBus<T> && requires(T& bus, std::span<const IdRange> ranges) {
+  { bus.listen(ranges) } -> std::same_as<void>;
 };
 
 }  // namespace fxdyn::hal

@@ -7,8 +7,8 @@
 
 namespace fxdyn::hal {
 
-/// Measures what a stretch of code costs: processor cycles on hardware, instructions under an emulator. Interrupts stay
-/// out of the count: between start() and stop() they are masked.
+/// Measures what a stretch of code costs: processor cycles on hardware, instructions under an emulator. What interrupts
+/// take meanwhile counts as well: masking them for so long would lose frames and bytes that only they can fetch.
 template <class T>
 concept CycleCounter = requires(T& counter) {
   { counter.start() } -> std::same_as<void>;

@@ -224,5 +224,12 @@ class SlcanBus {
   std::array<std::uint8_t, 64> out_{};  ///< a line and answers to commands
   std::size_t out_begin_ = 0, out_end_ = 0;
 };
+namespace detail {
+struct NoLine {
+  std::size_t read(std::span<std::uint8_t>) { return 0; }
+  std::size_t write(std::span<const std::uint8_t>) { return 0; }
+};
+}  // namespace detail
+static_assert(CanBus<SlcanBus<detail::NoLine>>);
 
 }  // namespace fxdyn::hal

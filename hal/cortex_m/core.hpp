@@ -30,15 +30,8 @@ class BasicCycleCounter {
     registers_.write(cycles, 0);
     set_bits(registers_, control, count_cycles);
   }
-  void start() {
-    mask_interrupts();
-    begin_ = registers_.read(cycles);
-  }
-  std::uint32_t stop() {
-    const std::uint32_t count = registers_.read(cycles) - begin_;
-    unmask_interrupts();
-    return count;
-  }
+  void start() { begin_ = registers_.read(cycles); }
+  std::uint32_t stop() { return registers_.read(cycles) - begin_; }
 
  private:
   static constexpr Address debug_control = 0xe000'edfc;  // DEMCR

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <bit>
 #include <cerrno>
 #include <cstring>
 
@@ -42,11 +43,28 @@ CanOpenError error_of(int number) {
   }
 }
 
+bool set_filters(int socket, const std::vector<can_filter>& filters) {
+  return ::setsockopt(socket, SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(),
+                      static_cast<socklen_t>(filters.size() * sizeof(can_filter))) == 0;
+}
+
 }  // namespace
+
+std::vector<can_filter> filters_of(IdRange range) {
+  std::vector<can_filter> filters;
+  for (std::uint32_t first = range.first; first <= range.last;) {
+    std::uint32_t size = first == 0 ? CAN_SFF_MASK + 1 : 1U << std::countr_zero(first);
+    while (size > range.last - first + 1) size /= 2;
+    filters.push_back({first, CAN_EFF_FLAG | (CAN_SFF_MASK & ~(size - 1))});
+    first += size;
+  }
+  return filters;
+}
 
 CanOpenResult CanSocket::open(std::string_view interface, bool fd, std::span<const can_filter> filters) {
   close();
   interface_ = interface;
+  filters_.assign(filters.begin(), filters.end());
   const auto failed = [this](CanOpenError error, int number) {
     close();
     return CanOpenResult{error, number};
@@ -65,8 +83,7 @@ CanOpenResult CanSocket::open(std::string_view interface, bool fd, std::span<con
   if ((fd && !set(socket_, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, yes)) ||
       !set(socket_, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, every_error) || !set(socket_, SOL_SOCKET, SO_RXQ_OVFL, yes) ||
       !set(socket_, SOL_SOCKET, SO_TIMESTAMPING, timestamps) ||
-      (!filters.empty() && ::setsockopt(socket_, SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(),
-                                        static_cast<socklen_t>(filters.size_bytes())) != 0)) {
+      (!filters_.empty() && !set_filters(socket_, filters_))) {
     return failed(error_of(errno), errno);
   }
   // beyond net.core.rmem_max only with CAP_NET_ADMIN; a smaller buffer works as well
@@ -82,6 +99,16 @@ CanOpenResult CanSocket::open(std::string_view interface, bool fd, std::span<con
   }
   errors_ = {.state = link.state, .transmit = link.transmit_errors, .receive = link.receive_errors, .lost = 0};
   return {};
+}
+
+void CanSocket::listen(std::span<const IdRange> ranges) {
+  if (filters_.empty()) return;
+  std::vector<can_filter> all = filters_;
+  for (const IdRange range : ranges) {
+    const std::vector<can_filter> more = filters_of(range);
+    all.insert(all.end(), more.begin(), more.end());
+  }
+  if (!set_filters(socket_, all)) failure_ = errno;
 }
 
 void CanSocket::close() {

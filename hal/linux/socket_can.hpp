@@ -10,6 +10,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "hal/can.hpp"
 #include "hal/linux/can_link.hpp"
@@ -38,6 +39,9 @@ std::string explain(CanOpenResult result, std::string_view interface);
 /// The same for a controller that is error passive or off the bus; empty where nothing is wrong.
 std::string explain(const CanErrors& errors, std::string_view interface, std::uint32_t bit_rate);
 
+/// Kernel filters for frames with 11 bits whose identifier is in the range: one for each aligned power of two in it.
+std::vector<can_filter> filters_of(IdRange range);
+
 /// Raw socket (linux/can/raw.h) on one interface, non-blocking. Knows of bytes only; SocketCan gives it its frames.
 class CanSocket {
  public:
@@ -48,6 +52,8 @@ class CanSocket {
 
   /// `filters`: what the kernel lets through, everything where empty. `fd`: frames of CAN FD as well.
   [[nodiscard]] CanOpenResult open(std::string_view interface, bool fd, std::span<const can_filter> filters = {});
+  /// Lets these through beside the filters that it was opened with; without any of those everything comes anyway.
+  void listen(std::span<const IdRange> ranges);
   void close();
   Status send(const canfd_frame& frame, bool fd);
   /// Several classic frames with one system call: how many went. Fewer: as send() of the next one would say.
@@ -87,6 +93,7 @@ class CanSocket {
   std::int64_t restarted_ns_ = 0;
   std::int64_t received_ns_ = 0;
   std::string interface_;
+  std::vector<can_filter> filters_;
   CanErrors errors_{};
 };
 
@@ -122,6 +129,6 @@ class SocketCan : public CanSocket {
     return status;
   }
 };
-static_assert(CanBus<SocketCan<ClassicFrame>> && CanBus<SocketCan<FdFrame>>);
+static_assert(FilteringCanBus<SocketCan<ClassicFrame>> && FilteringCanBus<SocketCan<FdFrame>>);
 
 }  // namespace fxdyn::hal::linux

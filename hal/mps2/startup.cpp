@@ -10,7 +10,7 @@ extern "C" [[gnu::weak]] void uart0_receive_handler() { fault_handler(); }
 extern "C" [[gnu::weak]] void timer0_handler() { fault_handler(); }
 
 // The watchdog's first time-out: nothing feeds it here, so that its second one resets.
-extern "C" [[noreturn]] void watchdog_handler() {
+extern "C" [[gnu::weak, noreturn]] void watchdog_handler() {
   for (;;) asm volatile("");
 }
 

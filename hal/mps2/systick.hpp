@@ -11,20 +11,23 @@ namespace fxdyn::hal::mps2 {
 /// Counts instructions under `qemu-system-arm -icount shift=8`: there one instruction takes 256 ns of the emulated time
 /// that SysTick counts, 5 to 6 of its ticks, so the rounded quotient is exact. Longest stretch: 2.6 million
 /// instructions. Registers: Armv7-M Architecture Reference Manual (DDI 0403), B3.3 "The system timer, SysTick".
-class SysTick {
+/// `masks_interrupts`: between start() and stop(), so that the count is the same in every run. For images that only
+/// measure: an emulator's line waits meanwhile, a real one loses bytes.
+template <bool masks_interrupts>
+class BasicSysTick {
  public:
-  SysTick() {
+  BasicSysTick() {
     MemoryMapped::write(reload, mask);
     MemoryMapped::write(current, 0);  // any write clears it
     MemoryMapped::write(control, processor_clock | enable);
   }
   void start() {
-    cortex_m::mask_interrupts();
+    if constexpr (masks_interrupts) cortex_m::mask_interrupts();
     begin_ = MemoryMapped::read(current);
   }
   std::uint32_t stop() {
     const std::uint32_t ticks = (begin_ - MemoryMapped::read(current)) & mask;  // it counts down
-    cortex_m::unmask_interrupts();
+    if constexpr (masks_interrupts) cortex_m::unmask_interrupts();
     return (ticks * tick_ns + instruction_ns / 2) / instruction_ns;
   }
 
@@ -39,6 +42,8 @@ class SysTick {
 
   std::uint32_t begin_ = 0;
 };
-static_assert(CycleCounter<SysTick>);
+using SysTick = BasicSysTick<false>;
+using ExactSysTick = BasicSysTick<true>;
+static_assert(CycleCounter<SysTick> && CycleCounter<ExactSysTick>);
 
 }  // namespace fxdyn::hal::mps2

@@ -24,13 +24,14 @@ stm32::SystemClock start_clock(R registers = {}) {
   if (!crystal) clear_bits(registers, control, hse_on);
 
   // VCO 336 MHz = 1 MHz * 336 or 2 MHz * 168, divided by P = 2; Q = 7 gives 48 MHz.
-  registers.write(pll_configuration, (crystal ? 25U | 336U << 6 | 1U << 22 : 8U | 168U << 6) | 7U << 24);
+  set_field(registers, pll_configuration, 0x3fU | 0x1ffU << 6 | 0b11U << 16 | 1U << 22 | 0xfU << 24,
+            (crystal ? 25U | 336U << 6 | 1U << 22 : 8U | 168U << 6) | 7U << 24);  // M, N, P, source, Q
   set_bits(registers, control, pll_on);
   if (!wait_for(registers, control, pll_ready, stm32::start_up_tries)) {
     clear_bits(registers, control, pll_on | hse_on);
     return {};
   }
-  registers.write(flash, 5U | 1U << 8 | 1U << 9 | 1U << 10);  // ACR: 5 wait states, prefetch, caches
+  set_field(registers, flash, 0b111U, 5U | 1U << 8 | 1U << 9 | 1U << 10);  // ACR: 5 wait states, prefetch, caches
   if (!wait_for(registers, flash, 5, stm32::start_up_tries)) return {};
   // APB1 at most 42 MHz: a quarter; APB2 at most 84: half.
   set_field(registers, configuration, 0b111U << 10 | 0b111U << 13, 0b101U << 10 | 0b100U << 13);
@@ -78,5 +79,7 @@ class BasicMicrosecondClock {
 };
 using MicrosecondClock = BasicMicrosecondClock<>;
 static_assert(Clock<MicrosecondClock>);
+using Timer = PolledTimer<MicrosecondClock>;  ///< the node of this board polls: nothing needs to wake it
+static_assert(TickTimer<Timer>);
 
 }  // namespace fxdyn::hal::stm32f4

@@ -29,7 +29,8 @@ stm32::SystemClock start_clock(R registers = {}) {
   const std::uint32_t source_and_m = crystal ? 0b11U | (6 - 1) << 4 : 0b10U | (4 - 1) << 4;
   clear_bits(registers, control, pll_on);
   if (!wait_for(registers, control, pll_ready, stm32::start_up_tries, true)) return {};
-  registers.write(pll_configuration, source_and_m | 85U << 8 | 1U << 24);  // N, REN
+  set_field(registers, pll_configuration, 0b11U | 0xfU << 4 | 0x7fU << 8 | 0b11U << 25,
+            source_and_m | 85U << 8 | 1U << 24);  // source, M, N, R = 2; REN
   set_bits(registers, control, pll_on);
   if (!wait_for(registers, control, pll_ready, stm32::start_up_tries)) {
     clear_bits(registers, control, pll_on | hse_on);
@@ -38,7 +39,8 @@ stm32::SystemClock start_clock(R registers = {}) {
 
   // Above 150 MHz: range 1 with boost. Flash: 4 wait states (RM0440, table "Number of wait states"), caches, prefetch.
   clear_bits(registers, pwr + 0x80, 1U << 8);  // CR5: R1MODE = 0
-  registers.write(flash, 4U | 1U << 8 | 1U << 9 | 1U << 10);
+  // Only these fields of ACR: DBG_SWEN beside them, set by reset, keeps the debug port open.
+  set_field(registers, flash, 0xfU, 4U | 1U << 8 | 1U << 9 | 1U << 10);
   if (!wait_for(registers, flash, 4, stm32::start_up_tries)) return {};
   // From 16 to 170 MHz by way of 85 for at least 1 us ("system clock switch above 80 MHz").
   set_field(registers, configuration, ahb_mask, half_ahb);

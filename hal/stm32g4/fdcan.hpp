@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <span>
 
 #include "hal/can.hpp"
 #include "hal/can_timing.hpp"
@@ -31,7 +32,8 @@ consteval FdcanTiming fdcan_timing(std::uint32_t clock_hz, std::uint32_t bit_rat
 /// FDCAN1 (RM0440, "FD controller area network (FDCAN)"), classic and FD frames with the bit rate switched. The
 /// message RAM has a fixed layout: per instance 28 standard filters, 8 extended ones, twice 3 received frames, 3
 /// transmit events, 3 frames to send. Three received frames are 0.35 ms at 1 Mbit/s, so the interrupt moves them to a
-/// ring. One instance, whose on_receive() the interrupt handler calls.
+/// ring; the other FIFO stays empty, since the order between setpoints and SYNC counts. Everything is let through until
+/// listen(). One instance, whose on_receive() the interrupt handler calls.
 template <Registers R = MemoryMapped>
 class BasicFdcan {
  public:
@@ -57,15 +59,32 @@ class BasicFdcan {
                                       (d.segment2 - 1) << 4 | (d.jump_width - 1));
     registers_.write(delay_compensation, std::min<std::uint32_t>(d.prescaler * (1 + d.segment1), 0x7fU)
                                              << 8);  // to the sample point
-    registers_.write(filters, 0);  // no filter elements; all that match none go to FIFO 0, which blocks when full
+    // All filter elements of both kinds; what matches none is rejected. FIFO 0 blocks when full.
+    registers_.write(filters, extended_filters << 24 | standard_filters << 16 | 0b10U << 4 | 0b10U << 2);
     registers_.write(transmit_buffers, 0);  // a FIFO: in the order in which they came
     for (Address word = 0; word < message_ram_bytes; word += 4) registers_.write(ram + word, 0);
-    registers_.write(interrupts, all_interrupts);  // none from before
+    registers_.write(ram, accept(0, 0x7ff));
+    registers_.write(ram + extended_offset, 1U << 29);         // EFEC: to FIFO 0, from identifier 0 ..
+    registers_.write(ram + extended_offset + 4, 0x1fff'ffff);  // .. EFT: a range, to the last one
+    registers_.write(interrupts, all_interrupts);              // none from before
     registers_.write(interrupt_enable, new_in_fifo0 | lost_in_fifo0);
     registers_.write(interrupt_lines, 1);   // line 0
     clear_bits(registers_, control, init);  // and with it CCE
     cortex_m::enable_interrupt(registers_, fdcan1_interrupt);
     return wait_for(registers_, control, init, tries, true) ? Status::ok : Status::failed;
+  }
+
+  /// Only these come through, of frames with 29 bits none; everything with 11 bits where the elements don't suffice.
+  /// The message RAM takes filters while the controller runs.
+  void listen(std::span<const IdRange> ranges) {
+    registers_.write(ram + extended_offset, 0);
+    const bool fit = ranges.size() <= standard_filters;
+    for (std::size_t i = 0; i < standard_filters; ++i) {
+      const std::uint32_t element = !fit                ? (i == 0 ? accept(0, 0x7ff) : 0)
+                                    : i < ranges.size() ? accept(ranges[i].first, ranges[i].last)
+                                                        : 0;
+      registers_.write(ram + 4 * static_cast<Address>(i), element);
+    }
   }
 
   Status send(const Frame& frame) {
@@ -155,6 +174,11 @@ class BasicFdcan {
     return -1;
   }
 
+  /// Standard filter element: SFT = 0, a range; SFEC = 1, to FIFO 0.
+  static constexpr std::uint32_t accept(std::uint32_t first, std::uint32_t last) {
+    return 1U << 27 | first << 16 | last;
+  }
+
   bool off_bus() { return (registers_.read(control) & init) != 0 || (registers_.read(protocol_status) & bus_off) != 0; }
   void count_lost() { lost_.store(lost_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed); }
 
@@ -173,8 +197,9 @@ class BasicFdcan {
   static constexpr std::uint32_t passive = 1U << 5, bus_off = 1U << 7;                                           // PSR
   // Message RAM (RM0440, figure "Message RAM configuration")
   static constexpr Address ram = fdcan1_message_ram;
-  static constexpr std::uint32_t element_bytes = 72, receive_offset = 0xb0, transmit_offset = 0x278,
-                                 message_ram_bytes = 0x350;
+  static constexpr std::uint32_t element_bytes = 72, extended_offset = 0x70, receive_offset = 0xb0,
+                                 transmit_offset = 0x278, message_ram_bytes = 0x350;
+  static constexpr std::uint32_t standard_filters = 28, extended_filters = 8;
   static constexpr std::uint32_t tries = 100'000;
 
   [[no_unique_address]] R registers_;
@@ -182,6 +207,6 @@ class BasicFdcan {
   std::atomic<std::uint32_t> lost_{0};  // written by the interrupt
 };
 using Fdcan = BasicFdcan<>;
-static_assert(CanBus<Fdcan>);
+static_assert(FilteringCanBus<Fdcan>);
 
 }  // namespace fxdyn::hal::stm32g4

@@ -29,10 +29,12 @@ class BasicMicrosecondClock {
 };
 using MicrosecondClock = BasicMicrosecondClock<>;
 static_assert(Clock<MicrosecondClock>);
+using Timer = PolledTimer<MicrosecondClock>;  ///< the node of this board polls: nothing needs to wake it
+static_assert(TickTimer<Timer>);
 
 #ifdef __arm__
 /// The performance monitor's cycle counter (Armv7-R Architecture Reference Manual, DDI 0406, "Performance Monitors":
-/// PMCR, PMCNTENSET, PMCCNTR). No interrupt is in use on this board, so none needs to be masked.
+/// PMCR, PMCNTENSET, PMCCNTR). No interrupt is in use on this board.
 class CycleCounter {
  public:
   CycleCounter() {

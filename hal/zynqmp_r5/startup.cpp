@@ -12,7 +12,7 @@ extern "C" {
 extern std::uint32_t fxdyn_data_begin[], fxdyn_data_end[], fxdyn_data_in_flash[];  // NOLINT
 extern std::uint32_t fxdyn_bss_begin[], fxdyn_bss_end[];                           // NOLINT
 
-// A fault stays here, where a debugger finds it.
+// A fault stays here, where a debugger finds it, until the watchdog resets.
 [[noreturn]] void fault_handler() {
   for (;;) asm volatile("");
 }

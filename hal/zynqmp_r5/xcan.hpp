@@ -6,6 +6,7 @@
 #include "hal/can_timing.hpp"
 #include "hal/clock.hpp"
 #include "hal/zynqmp_r5/board.hpp"
+#include "hal/zynqmp_r5/clock.hpp"
 
 namespace fxdyn::hal::zynqmp_r5 {
 
@@ -160,5 +161,7 @@ class BasicXcan {
   std::uint32_t recovery_us_ = 0, since_us_ = 0, lost_ = 0;
   bool waiting_ = false;  ///< off the bus until the recovery time is over
 };
+static_assert(CanBus<BasicXcan<FrameFormat::controller, MicrosecondClock>>);
+static_assert(CanBus<BasicXcan<FrameFormat::qemu_7, MicrosecondClock>>);
 
 }  // namespace fxdyn::hal::zynqmp_r5

@@ -13,11 +13,16 @@
 #include "hal/stm32g4/timer.hpp"
 #include "hal/zynqmp_r5/clock.hpp"
 #include "hal/zynqmp_r5/gpio.hpp"
+#include "hal/zynqmp_r5/watchdog.hpp"
 #include "hal/zynqmp_r5/xcan.hpp"
 #include "tests/hal/models/clock_models.hpp"
 #include "tests/hal/models/fdcan_model.hpp"
 #include "tests/hal/models/serial_models.hpp"
 #include "tests/hal/models/xcan_model.hpp"
+
+extern "C" {
+std::uint32_t fxdyn_kept[1];  // on a target the linker script's
+}
 
 namespace fxdyn::hal {
 namespace {
@@ -127,6 +132,32 @@ TEST_F(FdcanTest, ReceivesEveryKindOfFrame) {
   EXPECT_EQ(frame.size, 8);
   EXPECT_EQ(can.receive(frame), Status::busy);
   EXPECT_EQ(can.errors().lost, 0U);
+}
+
+TEST_F(FdcanTest, ListensToWhatItIsTold) {
+  ASSERT_EQ(can.start(fast_timing), Status::ok);
+  const auto heard = [&](const FdFrame& sent) {
+    FdFrame frame;
+    receive(sent, 0);
+    return can.receive(frame) == Status::ok;
+  };
+  constexpr std::array<IdRange, 3> some{{{0, 0}, {0x201, 0x206}, {0x7f0, 0x7ff}}};
+  can.listen(some);
+  for (std::uint32_t id = 0; id < 0x800; ++id)
+    EXPECT_EQ(heard({.id = id}), id == 0 || (id >= 0x201 && id <= 0x206) || id >= 0x7f0) << id;
+  EXPECT_TRUE(heard({.id = 0x203, .remote = true}));
+  EXPECT_FALSE(heard({.id = 0x203, .extended = true}));
+  can.listen(std::span(some).first(1));
+  EXPECT_TRUE(heard({.id = 0}));
+  EXPECT_FALSE(heard({.id = 0x201}));
+  std::array<IdRange, 29> many;  // one more than there are elements
+  for (std::uint32_t i = 0; i < many.size(); ++i) many[i] = {2 * i, 2 * i};
+  can.listen(std::span(many).first(28));
+  EXPECT_TRUE(heard({.id = 54}));
+  EXPECT_FALSE(heard({.id = 56}));
+  can.listen(many);
+  EXPECT_TRUE(heard({.id = 56}));
+  EXPECT_TRUE(heard({.id = 0x7ff}));
 }
 
 TEST_F(FdcanTest, OverrunsAreCounted) {
@@ -379,6 +410,12 @@ TYPED_TEST(Rcc, WithoutAPllItStaysSlow) {
   }
 }
 
+TEST(Rcc, TheDebugPortOfTheG4StaysOpen) {
+  test::RccModel<test::G4> model;
+  EXPECT_EQ(stm32g4::start_clock(Modelled{&model}).mhz, 170U);
+  EXPECT_EQ(model.read(test::G4::flash), 4U | 0b111U << 8 | 1U << 18) << "wait states, prefetch, caches, DBG_SWEN";
+}
+
 TEST(Rcc, RegistersThatReadAsZeroEndWithTheInternalOscillator) {
   struct Nothing {
     std::uint32_t read(Address) const { return 0; }
@@ -423,6 +460,37 @@ TEST(CmsdkWatchdog, IsUnlockedForEveryWriteAndLockedAfterIt) {
   EXPECT_FALSE(open);
   EXPECT_EQ(model.at(0x4000'8000), 2'500'000U);
   EXPECT_EQ(model.at(0x4000'8008), 0b11U);
+}
+
+TEST(CmsdkWatchdog, ItsResetIsToldOnce) {
+  test::PlainModel model;
+  mps2::BasicWatchdog<Modelled> watchdog{Modelled{&model}};
+  EXPECT_FALSE(watchdog.made_the_reset());
+  watchdog.on_time_out();
+  EXPECT_TRUE(watchdog.made_the_reset());
+  EXPECT_FALSE(watchdog.made_the_reset());
+}
+
+TEST(Swdt, TimesOutUnlessFed) {
+  test::SwdtModel model;
+  zynqmp_r5::BasicWatchdog<Modelled> watchdog{Modelled{&model}};
+  EXPECT_EQ(watchdog.start(0), Status::failed);
+  EXPECT_EQ(watchdog.start(10'738), Status::failed);
+  EXPECT_FALSE(model.running());
+  for (const std::uint32_t timeout_ms : {1U, 50U, 10'737U}) {
+    ASSERT_EQ(watchdog.start(timeout_ms), Status::ok);
+    for (int i = 0; i < 100; ++i) {
+      model.pass_ms(timeout_ms - 0.01);
+      watchdog.feed();
+    }
+    EXPECT_FALSE(model.has_timed_out) << timeout_ms;
+  }
+  ASSERT_EQ(watchdog.start(50), Status::ok);
+  model.pass_ms(50 + 2.63);
+  EXPECT_TRUE(model.has_timed_out);
+  EXPECT_EQ(model.violations, none);
+  model.clocked = false;
+  EXPECT_EQ(watchdog.start(50), Status::failed);
 }
 
 // Timers --------------------------------------------------------------------------------------------------------------

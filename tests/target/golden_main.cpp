@@ -37,7 +37,7 @@ void print(const char* name, std::uint32_t number) {
 }
 
 #ifdef FXDYN_COUNTS_INSTRUCTIONS
-using Counter = fxdyn::hal::mps2::SysTick;
+using Counter = fxdyn::hal::mps2::ExactSysTick;
 #else
 struct Counter {
   void start() {}

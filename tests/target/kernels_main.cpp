@@ -36,7 +36,7 @@ typename M::Parameters& parameters() {
   return copy;
 }
 
-hal::mps2::SysTick* counter;
+hal::mps2::ExactSysTick* counter;
 
 /// `run` is a function of its own that works on memory, so that nothing of it can leave the measured stretch.
 template <class Run>
@@ -150,7 +150,7 @@ std::uint32_t one_joint_mean(std::index_sequence<i...>) {
 }  // namespace
 
 int main() {
-  hal::mps2::SysTick systick;
+  hal::mps2::ExactSysTick systick;
   counter = &systick;
   report("rnea", rnea_of_model<Model>());
   report("rnea_any_links", rnea_of_model<Parts<Model>::Any>());

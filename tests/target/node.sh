@@ -13,14 +13,23 @@ cd "$root"
 mkdir -p "$build"
 targets=(fxdyn_node)
 [ "$board" != zynqmp_r5 ] || targets+=(fxdyn_node_qemu)
+[[ $board != mps2-* ]] || targets+=(fxdyn_node_measured fxdyn_node_cost)
 (cmake --preset "$preset" -B "$build" -DFXDYN_TABLES="$root/tests/golden/tables.hpp" &&
   cmake --build "$build" --target "${targets[@]}") >"$build/node.log" 2>&1 || { cat "$build/node.log" >&2; exit 1; }
 
-instructions=
+instructions= faulty=
 if [ "$board" != stm32g474 ]; then
   said=$("$root/tests/target/node_test.py" "$board" "$build" "$expected")
   echo "$board: $(tr '\n' ',' <<<"$said")"
-  instructions=$(awk '$1 == "everything" { print $2 }' <<<"$said")
+fi
+if [[ $board == mps2-* ]]; then
+  # The tick with its protocol, bus in memory: as a CAN controller hands frames over, and the same number in every run.
+  said=$(timeout 100 qemu-system-arm -M "$board" -icount shift=8 -nographic -monitor none -serial null \
+    -semihosting-config enable=on,target=native -kernel "$build/tests/golden/node_cost-$board.elf" 2>&1 </dev/null) ||
+    { echo "node: $board: node_cost stopped: $said" >&2; exit 1; }
+  echo "$board, bus in memory: $(tr '\n' ',' <<<"$said")"
+  instructions=$(awk '$1 == "most_everything" { print $2 }' <<<"$said")
+  faulty=$(awk '$1 == "most_everything_with_faults" { print $2 }' <<<"$said")
 fi
 size() { sed -E "s/.*\"$1\": ([0-9]+).*/\1/" "$build/firmware/node-$board.size.json"; }
 flash=$(size flash_bytes) ram=$(size ram_bytes) stack=$(size stack_bytes)
@@ -30,16 +39,18 @@ if [ "$what" = append ]; then
   echo "$(date +%F),$board,node,$model,$instructions,$flash,$ram,$stack" >>"$budget"
   exit 0
 fi
-row=$(awk -F, -v board="$board" '$2 == board && $3 == "node" { row = $8 "," $9 "," $10 } END { print row }' "$budget")
+row=$(awk -F, -v board="$board" '$2 == board && $3 == "node" { row = $7 "," $8 "," $9 "," $10 } END { print row }' "$budget")
 [ -n "$row" ] || { echo "node: no row for $board in firmware/budget.csv: tests/target/budget.sh adds them" >&2; exit 1; }
-echo "$board: flash,ram,stack $flash,$ram,$stack (budget $row), instructions $instructions"
-IFS=, read -r may_flash may_ram may_stack <<<"$row"
+echo "$board: instructions,flash,ram,stack $instructions,$flash,$ram,$stack (budget $row), with faults $faulty"
+IFS=, read -r may_instructions may_flash may_ram may_stack <<<"$row"
 within() {  # NAME MEASURED BUDGET
   [ -z "$2" ] || [ "$2" -le "$3" ] || { echo "node: $board: $1 $2, the budget is $3" >&2; return 1; }
 }
-# Not against the row: how many bytes each look at the line finds differs from run to run, and the count with it by some
-# hundreds.
-within "instructions of a tick with its frames" "$instructions" $most_instructions
+# The most of any tick. What the line of text takes beside that (most_everything above) is no tick's: it depends on how many
+# bytes each look at the line finds, and differs from run to run.
+within instructions_per_tick "$instructions" "$may_instructions"
+within "most instructions of a tick" "$instructions" $most_instructions
+within "most instructions of a tick with faults" "$faulty" $most_instructions
 within flash_bytes "$flash" "$may_flash"
 within ram_bytes "$ram" "$may_ram"
 within stack_bytes "$stack" "$may_stack"

@@ -67,7 +67,7 @@ int main() {
   asm volatile("" : "+r"(page));  // the compiler must not compute with the values that it knows
   static MemoryBus bus;
   static CountedClock clock;
-  static fxdyn::hal::mps2::SysTick counter;
+  static fxdyn::hal::mps2::ExactSysTick counter;
   static fxdyn::hal::AbsentWatchdog watchdog;
   static fxdyn::hal::FixedInput enable;
   static fxdyn::hal::AbsentOutput fault, tick_busy;

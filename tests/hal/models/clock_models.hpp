@@ -20,6 +20,9 @@ struct G4 {
   static bool in_range(std::uint32_t value) {  // data sheet: input 2.66 to 16 MHz, VCO 96 to 344 MHz
     return vco_input(value) >= 2.66 && vco_input(value) <= 16 && vco(value) >= 96 && vco(value) <= 344;
   }
+  // RM0440: values after reset, and what of them is a driver's to change.
+  static constexpr std::uint32_t control_reset = 0x0000'0500, pll_reset = 0x0000'1000, flash_reset = 0x0004'0600,
+                                 pll_fields = 0xff73'7ff3, flash_fields = 0x0000'7f0f;
   static bool half_before_switch(std::uint32_t cfgr) { return (cfgr >> 4 & 0xf) == 0b1000; }
   static bool buses_slow_enough(std::uint32_t) { return true; }
 };
@@ -35,6 +38,9 @@ struct F4 {
   static bool in_range(std::uint32_t value) {  // RM0090: input 1 to 2 MHz, VCO 100 to 432 MHz
     return vco_input(value) >= 1 && vco_input(value) <= 2 && vco(value) >= 100 && vco(value) <= 432;
   }
+  // RM0090: the same.
+  static constexpr std::uint32_t control_reset = 0x0000'0083, pll_reset = 0x2400'3010, flash_reset = 0,
+                                 pll_fields = 0x0f43'7fff, flash_fields = 0x0000'1f07;
   static bool half_before_switch(std::uint32_t) { return true; }
   static bool buses_slow_enough(std::uint32_t cfgr) {  // APB1 at most 42 MHz, APB2 84
     return (cfgr >> 10 & 0b111) >= 0b101 && (cfgr >> 13 & 0b111) >= 0b100;
@@ -47,7 +53,12 @@ class RccModel : public RegisterModel {
   bool crystal_starts = true, pll_locks = true;
   int delay = 20;  ///< reads until a flag follows its bit
 
-  RccModel() { registers_[Part::configuration] = Part::hsi | Part::hsi << 2; }
+  RccModel() {
+    registers_[Part::rcc] = Part::control_reset;
+    registers_[Part::configuration] = Part::hsi | Part::hsi << 2;
+    registers_[Part::pll] = Part::pll_reset;
+    registers_[Part::flash] = Part::flash_reset;
+  }
   double mhz() {
     const double system = runs_from_pll() ? Part::output(registers_[Part::pll]) : 16;
     return (registers_[Part::configuration] & 0x80) != 0 ? system / 2 : system;
@@ -67,7 +78,11 @@ class RccModel : public RegisterModel {
     return registers_[address];
   }
   void on_write(hal::Address address, std::uint32_t value) override {
+    if (address == Part::flash)
+      require(((value ^ Part::flash_reset) & ~Part::flash_fields) == 0,
+              "changes FLASH_ACR beside what is the driver's");
     if (address == Part::pll) {
+      require(((value ^ Part::pll_reset) & ~Part::pll_fields) == 0, "changes reserved bits of PLLCFGR");
       require((registers_[Part::rcc] & 1U << 24) == 0, "PLL configured while it is on");
       require(Part::in_range(value), "PLL frequencies out of range");
       require(!Part::from_crystal(value) || (crystal_starts && hse_ > delay), "PLL from a crystal that does not run");
@@ -128,6 +143,56 @@ class IwdgModel : public RegisterModel {
   double left_ms_ = 0;
   int busy_ = 0;
   hal::Address last_ = 0;
+};
+
+/// System watchdog of the Zynq UltraScale+ (UG1087, module SWDT): keys, a counter of 100 MHz / 8, 64, 512 or 4096 that
+/// restarts at 0xNNNFFF.
+class SwdtModel : public RegisterModel {
+ public:
+  static constexpr hal::Address base = 0xff15'0000;
+  bool has_timed_out = false, clocked = true;
+
+  SwdtModel() { registers_[base] = 0x1c2; }
+  bool running() { return (registers_[base] & 0b11) == 0b11; }  // RSTEN, WDEN
+  void pass_ms(double ms) {
+    if (!running()) return;
+    left_ms_ -= ms;
+    has_timed_out = has_timed_out || left_ms_ <= 0;
+  }
+
+ protected:
+  std::uint32_t on_read(hal::Address address) override {
+    require(address == base || address == base + 0x4 || address == base + 0xc, "reads a register that only writes");
+    return clocked ? registers_[address] : 0;
+  }
+  void on_write(hal::Address address, std::uint32_t value) override {
+    if (!clocked) return;
+    switch (address - base) {
+      case 0x0:
+        require(value >> 12 == 0xabc && (value & 0xe08) == 0, "MODE: key or reserved bits");
+        if ((registers_[base] & 1U) == 0) left_ms_ = period_ms();
+        registers_[base] = value & 0xfff;
+        return;
+      case 0x4:
+        require(value >> 14 == 0x248, "CONTROL: key");
+        require((registers_[base] & 1U) == 0, "CONTROL changes under a running watchdog");
+        registers_[address] = value & 0x3fff;
+        return;
+      case 0x8:
+        require(value == 0x1999, "RESTART: key");
+        left_ms_ = period_ms();
+        return;
+      default:
+        require(false, "writes offset " + std::to_string(address - base));
+    }
+  }
+
+ private:
+  double period_ms() {
+    const std::uint32_t control = registers_[base + 0x4];
+    return ((control >> 2) + 1) * 4096.0 * (8 << 3 * (control & 0b11)) / 100'000;
+  }
+  double left_ms_ = 0;
 };
 
 /// A few registers without behaviour, for what only sets them.

@@ -23,7 +23,7 @@ class FdcanModel : public RegisterModel {
 
   /// A frame comes in from the bus. Blocking mode: a full FIFO drops it.
   void arrives(const hal::FdFrame& frame, std::uint32_t code) {
-    if (initialising()) return;
+    if (initialising() || !accepts(frame)) return;
     if (level_ == 3) {
       interrupts_ |= 1U << 2;  // RF0L
       return;
@@ -162,6 +162,28 @@ class FdcanModel : public RegisterModel {
   }
 
  private:
+  /// Filter elements in their order, then what RXGFC says of frames that match none.
+  bool accepts(const hal::FdFrame& frame) {
+    const std::uint32_t global = registers_[base + 0x80];
+    require((global >> 16 & 0x1f) <= 28 && (global >> 24 & 0xf) <= 8, "more filter elements than there are");
+    if (frame.remote && (global >> (frame.extended ? 0 : 1) & 1U) != 0) return false;  // RRFE, RRFS
+    if (frame.extended) {
+      for (hal::Address i = 0; i < (global >> 24 & 0xf); ++i) {
+        const std::uint32_t first = memory_[ram + 0x70 + 8 * i], second = memory_[ram + 0x74 + 8 * i];
+        if (first >> 29 == 0) continue;
+        require(first >> 29 == 1 && second >> 30 == 0, "an element that this model does not know");
+        if (frame.id >= (first & 0x1fff'ffff) && frame.id <= (second & 0x1fff'ffff)) return true;
+      }
+      return (global >> 2 & 0b11) == 0;
+    }
+    for (hal::Address i = 0; i < (global >> 16 & 0x1f); ++i) {
+      const std::uint32_t element = memory_[ram + 4 * i];
+      if ((element >> 27 & 0b111) == 0) continue;
+      require((element >> 27 & 0b111) == 1 && element >> 30 == 0, "an element that this model does not know");
+      if (frame.id >= (element >> 16 & 0x7ff) && frame.id <= (element & 0x7ff)) return true;
+    }
+    return (global >> 4 & 0b11) == 0;
+  }
   bool in_ram(hal::Address address) {
     if (address < ram || address >= ram + 0x2000) {
       require(address >= base && address < base + 0x400, "outside the controller");
