@@ -59,7 +59,7 @@ void FaultCampaign::configure() {
   master_.write(id, 0x2012, 0, dictionary::defaults::tolerated_ticks, 1);
   for (std::size_t j = 0; j < joints; ++j) {
     const auto& limits = tables::parameters.constants[j].limits;
-    const std::int32_t limit = whole(limits.tau_lower.raw, limits.tau_upper.raw);
+    const std::int32_t limit = whole_share(limits.tau_lower.raw, limits.tau_upper.raw);
     step_milli_[j] = to_milli<Torque<Model::Numbers>::bits>(limit / ramp_ticks);
     master_.write(id, 0x2011, static_cast<std::uint8_t>(j + 1), static_cast<std::uint32_t>(step_milli_[j]), 4);
   }
@@ -106,7 +106,7 @@ bool FaultCampaign::is_plausible(const std::vector<WireSetpoint>& setpoints) con
   bool good = true;
   for (std::size_t j = 0; j < joints; ++j) {
     const auto& limits = tables::parameters.constants[j].limits;
-    const std::int64_t per_second = whole(limits.dq_lower.raw, limits.dq_upper.raw);
+    const std::int64_t per_second = whole_share(limits.dq_lower.raw, limits.dq_upper.raw);
     const std::int64_t ticks_per_second = tables::parameters.ticks_per_second.raw;
     const std::int64_t most =
         ((per_second << (Position<N>::bits + 17 - Velocity<N>::bits)) / ticks_per_second + 1) * (stale_ + 1);
@@ -136,7 +136,7 @@ void FaultCampaign::end_tick(std::uint32_t syncs) {
     using N = Model::Numbers;
     for (std::size_t j = 0; j < joints; ++j) {
       const auto& limits = tables::parameters.constants[j].limits;
-      const std::int64_t per_second = whole(limits.dq_lower.raw, limits.dq_upper.raw);
+      const std::int64_t per_second = whole_share(limits.dq_lower.raw, limits.dq_upper.raw);
       const std::int64_t most =
           ((per_second << (Position<N>::bits + 17 - Velocity<N>::bits)) / tables::parameters.ticks_per_second.raw + 1) *
           (stale_ + 1);
