@@ -88,7 +88,7 @@ refused 2 'ip link set vcan2' --can vcan2
 refused 2 'no node answers' --can vcan0
 step "one node"
 start_node "$work/node/fxdyn_node"
-replay --ticks 1000 || fail "replay"
+replay --ticks 500 || fail "replay"
 grep -q '"bit_exact": true' out/can_replay.json || fail "the torques differ"
 step "closed loop"
 replay --closed-loop --moves 1 || fail "closed loop"
@@ -104,7 +104,7 @@ ends_by KILL
 stop_node
 step "two nodes with a joint each"
 start_node "$work/node/fxdyn_node" --joint 1 --joint 2
-replay --ticks 500 || fail "replay to two nodes"
+replay --ticks 300 || fail "replay to two nodes"
 grep -q '"bit_exact": true' out/can_replay.json || fail "the torques of two nodes differ"
 stop_node
 step "a node for another robot"
