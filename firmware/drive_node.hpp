@@ -237,7 +237,7 @@ class DriveNode {
   const auto& limits(std::size_t j) const { return tables_.parameters.constants[j].limits; }
   /// The larger end of a range around zero, at least 1.
   static std::int32_t scale_limit(std::int32_t lower, std::int32_t upper) {
-    return std::max({lower < -0x7FFF'FFFF ? 0x7FFF'FFFF : -lower, upper, std::int32_t{1}});
+    return whole_share(lower, upper);
   }
   std::int32_t velocity_limit(std::size_t j) const {
     return scale_limit(limits(j).dq_lower.raw, limits(j).dq_upper.raw);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -35,6 +36,10 @@ struct WireSetpoint {
   }
 };
 
+/// What a share of 32768 is of, raw: the larger end of a joint's range around zero, at least 1 (objects 0x2021, 0x2022).
+constexpr std::int32_t whole_share(std::int32_t lower, std::int32_t upper) {
+  return std::max({lower < -0x7FFF'FFFF ? 0x7FFF'FFFF : -lower, upper, std::int32_t{1}});
+}
 /// share * limit / 32768, rounded half up.
 constexpr std::int32_t from_share(std::int16_t share, std::int32_t limit) {
   return static_cast<std::int32_t>((std::int64_t{share} * limit + (1 << 14)) >> 15);

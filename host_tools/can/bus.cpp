@@ -73,10 +73,19 @@ bool SocketBus::receive(Frame& frame, Duration timeout) {
   return status == hal::Status::ok;
 }
 
+std::string SocketBus::trouble() {
+  hal::CanErrors errors = socket_.errors();
+  hal::linux::CanLink link;
+  // Error frames tell when the state changes, so what it was before the socket was opened only the controller knows.
+  if (hal::linux::query_link(socket_.interface(), link) == 0 && link.controlled)
+    errors = {link.state, link.transmit_errors, link.receive_errors, errors.lost};
+  return hal::linux::explain(errors, socket_.interface(), link.bit_rate);
+}
+
 void SocketBus::fail() {
   hal::linux::CanLink link;
   const int number = hal::linux::query_link(socket_.interface(), link);
-  std::string why = hal::linux::explain(socket_.errors(), socket_.interface(), link.bit_rate);
+  std::string why = trouble();
   if (number != 0) {
     why = hal::linux::explain({hal::linux::CanOpenError::no_interface, number}, socket_.interface());
   } else if (!link.up) {

@@ -31,6 +31,10 @@ class Bus {
   virtual bool receive(Frame& frame, Duration timeout) = 0;
   virtual Duration now() const = 0;        ///< of a clock that only runs forward
   virtual std::uint32_t lost() const = 0;  ///< received frames that were dropped on the way, as far as known
+  virtual std::string name() const = 0;    ///< as commands take it: can0
+  /// What is wrong with this end of the bus, with the command that puts it right: error passive, off the bus. Empty:
+  /// nothing that is known.
+  virtual std::string trouble() = 0;
 };
 
 /// Throws BusError where the interface can't be opened or goes away.
@@ -44,6 +48,8 @@ class SocketBus final : public Bus {
   bool receive(Frame& frame, Duration timeout) override;
   Duration now() const override;
   std::uint32_t lost() const override { return lost_; }
+  std::string name() const override { return socket_.interface(); }
+  std::string trouble() override;
 
  private:
   [[noreturn]] void fail();

@@ -4,18 +4,6 @@
 #include <cmath>
 
 namespace fxdyn::can {
-namespace {
-
-/// The shortest length of a CAN FD frame that holds so many bytes (ISO 11898-1, DLC).
-std::uint8_t fd_length(std::size_t bytes) {
-  for (const unsigned length : {8U, 12U, 16U, 20U, 24U, 32U, 48U}) {
-    if (bytes <= length) return static_cast<std::uint8_t>(length);
-  }
-  return 64;
-}
-
-}  // namespace
-
 Duration RoundTrips::quantile(double share) const {
   if (times_.empty()) return {};
   auto times = times_;
@@ -37,7 +25,9 @@ void Lockstep::send_setpoints_and_sync(std::span<const WireSetpoint> setpoints) 
   frames_.clear();
   if (options_.fd) {
     Frame& frame = frames_.emplace_back(
-        Frame{.id = canopen::setpoint_id + 1, .fd = true, .size = fd_length(WireSetpoint::bytes * setpoints.size())});
+        Frame{.id = canopen::setpoint_id + 1,
+              .fd = true,
+              .size = static_cast<std::uint8_t>(hal::fd_length(WireSetpoint::bytes * setpoints.size()))});
     for (std::size_t j = 0; j < setpoints.size(); ++j) setpoints[j].store(&frame.data[WireSetpoint::bytes * j]);
   } else {
     for (std::size_t j = 0; j < setpoints.size(); ++j) {

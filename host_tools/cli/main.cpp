@@ -123,6 +123,8 @@ int run(int argc, char** argv) {
       ->add_flag("--closed-loop", can_replay.closed_loop,
                  "no log: move the scenario's robot with the torque that comes over the bus")
       ->needs(can_option);
+  replay_verb->add_option("--moves", can_replay.most_moves, "of the closed loop, the first ones alone (default: all)")
+      ->needs(can_option);
   replay_verb->add_option("--ticks", ticks, "at most this many ticks of each log")->capture_default_str();
 
   UpdateSettings new_session;

@@ -11,6 +11,7 @@
 #include "firmware/setpoint_codec.hpp"
 #include "model/numbers.hpp"
 #include "model/rigid_body.hpp"
+#include "model/version.hpp"
 
 // The drive node's object dictionary as files: EDS (CiA 306-1) for CANopen masters, DBC for bus analysers.
 
@@ -27,6 +28,7 @@ struct BusDescription {
   std::vector<Joint> joints;
   std::uint32_t outputs = 0;  ///< bit i: the node puts out the torque of joint i+1
   std::string software;       ///< version
+  std::uint32_t revision = version_number;
 
   dictionary::Extent extent() const { return {joints.size(), outputs}; }
 };
@@ -40,10 +42,11 @@ BusDescription describe(const typename Model::Parameters& parameters,
   description.software = software;
   for (std::size_t j = 0; j < Model::joints; ++j) {
     const auto& limits = parameters.constants[j].limits;
-    description.joints.push_back({std::ldexp(1.0, -Position<N>::bits),
-                                  std::ldexp(limits.dq_upper.raw, -Velocity<N>::bits),
-                                  std::ldexp(limits.ddq_upper.raw, -Acceleration<N>::bits), 1e-3 * rated_torque[j],
-                                  parameters.geometry[j].type == JointType::prismatic});
+    description.joints.push_back(
+        {std::ldexp(1.0, -Position<N>::bits),
+         std::ldexp(whole_share(limits.dq_lower.raw, limits.dq_upper.raw), -Velocity<N>::bits),
+         std::ldexp(whole_share(limits.ddq_lower.raw, limits.ddq_upper.raw), -Acceleration<N>::bits),
+         1e-3 * rated_torque[j], parameters.geometry[j].type == JointType::prismatic});
   }
   return description;
 }

@@ -24,6 +24,7 @@ struct SubIndex {
   Access access = Access::constant;
   std::string value;  ///< default
   bool mappable = false;
+  bool is_received = false;  ///< a received PDO writes it
   bool has_limits = false;
   std::int64_t lowest = 0, highest = 0;
 };
@@ -32,6 +33,14 @@ struct IndexedObject {
   ObjectType type = ObjectType::variable;
   std::map<int, SubIndex> subs;
 };
+
+/// Whether a setpoint's mapping names this object.
+bool is_setpoint(std::uint16_t index) {
+  for (std::size_t place = 1; place <= 3; ++place) {
+    if (dictionary::mapping(false, place, 0) >> 16 == index) return true;
+  }
+  return false;
+}
 
 std::string with_unit(const Described& described) {
   std::string name = described.name;
@@ -80,6 +89,7 @@ std::map<int, IndexedObject> objects_of(const BusDescription& description) {
                      entry.access,
                      default_value(described, offset, i),
                      described.mappable,
+                     described.mappable && is_setpoint(entry.index),
                      false,
                      0,
                      0};
@@ -103,13 +113,16 @@ std::map<int, IndexedObject> objects_of(const BusDescription& description) {
   return objects;
 }
 
-const char* access_text(Access access) {
-  return access == Access::constant ? "const" : (access == Access::read ? "ro" : "rw");
+/// An object that a received PDO writes is `rww` (read and write, process output), the only type that CiA 306 has for
+/// it, although SDO can't write it here.
+const char* access_text(const SubIndex& sub) {
+  if (sub.is_received) return "rww";
+  return sub.access == Access::constant ? "const" : (sub.access == Access::read ? "ro" : "rw");
 }
 
 void write_variable(const SubIndex& sub, std::ostream& out) {
   fmt::print(out, "ParameterName={}\nObjectType=0x7\nDataType=0x{:04X}\nAccessType={}\n", sub.name,
-             static_cast<int>(sub.type), access_text(sub.access));
+             static_cast<int>(sub.type), access_text(sub));
   if (sub.has_limits) fmt::print(out, "LowLimit={}\nHighLimit={}\n", sub.lowest, sub.highest);
   fmt::print(out, "DefaultValue={}\nPDOMapping={}\n\n", sub.value, sub.mappable ? 1 : 0);
 }
@@ -120,6 +133,9 @@ void write_list(const char* section, const std::vector<int>& indices, std::ostre
   out << "\n";
 }
 
+// No clock: the same dictionary gives the same file.
+constexpr const char *creation_time = "12:00AM", *creation_date = "01-01-2026";
+
 }  // namespace
 
 void write_eds(const BusDescription& description, const std::string& file_name, std::ostream& out) {
@@ -129,10 +145,13 @@ void write_eds(const BusDescription& description, const std::string& file_name, 
   fmt::print(
       out,
       "[FileInfo]\nFileName={}\nFileVersion=1\nFileRevision=0\nEDSVersion=4.0\nDescription=Torque feedforward of "
-      "{} of {} joints\nCreationTime=12:00AM\nCreationDate=01-01-2026\nCreatedBy=fxdyn {}\n\n",
-      file_name, outputs, description.joints.size(), description.software);
+      "{} of {} joints\nCreationTime={}\nCreationDate={}\nCreatedBy=fxdyn {}\nModificationTime={}\n"
+      "ModificationDate={}\nModifiedBy=fxdyn {}\n\n",
+      file_name, outputs, description.joints.size(), creation_time, creation_date, description.software, creation_time,
+      creation_date, description.software);
   out << "[DeviceInfo]\nVendorName=\nVendorNumber=0x0\nProductName=" << dictionary::device_name;
-  fmt::print(out, "\nProductNumber=0x{:08X}\n", dictionary::product_code);
+  fmt::print(out, "\nProductNumber=0x{:08X}\nRevisionNumber=0x{:08X}\nOrderCode={}\n", dictionary::product_code,
+             description.revision, dictionary::device_name);
   for (const int rate : {10, 20, 50, 125, 250, 500, 800, 1000})
     fmt::print(out, "BaudRate_{}={}\n", rate, rate == 1000 ? 1 : 0);
   fmt::print(out,

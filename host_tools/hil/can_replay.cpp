@@ -6,8 +6,10 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "firmware/object_dictionary.hpp"
+#include "host_tools/can/guard.hpp"
 #include "host_tools/error.hpp"
 
 namespace fxdyn {
@@ -25,7 +27,7 @@ constexpr can::Duration answer_time = 500ms, start_time = 10s;
 }  // namespace
 
 CanDrives::CanDrives(can::Bus& bus, const IdentifiedModel& model, const Settings& settings)
-    : master_(bus), model_(model), fixed_(model, *model.formats), fd_(settings.fd) {
+    : master_(bus), model_(model), fixed_(model, *model.formats), fd_(settings.fd), heartbeat_of_(settings.master) {
   const std::size_t n = model.robot.size();
   std::vector<std::uint8_t> ids = settings.nodes;
   if (ids.empty()) {
@@ -41,33 +43,27 @@ CanDrives::CanDrives(can::Bus& bus, const IdentifiedModel& model, const Settings
     } catch (const can::SdoAbort&) {
       // It is there.
     } catch (const can::NodeError&) {
-      if (!settings.nodes.empty())
-        throw InputError(fmt::format(
-            "node {} does not answer: is it powered, is its id {} (rotary switch or image), is its bit rate the bus's?",
-            id, id));
+      if (!settings.nodes.empty()) no_answer(fmt::format("node {} does not answer", id));
       continue;
     }
     identify(node);
     check(node);
     if ((driven & node.outputs) != 0)
-      throw InputError(
-          fmt::format("node {} puts out a joint that another node puts out: give each drive its own image "
-                      "([target] joints, DIR/joint_N/tables.hpp)",
-                      id));
+      throw InputError(fmt::format(
+          "node {} puts out a joint that another node puts out: give each drive an image of its own "
+          "([target] joints in the project, then toolchains/build_node.sh DIR/joint_N/tables.hpp OUT BOARD)",
+          id));
     driven |= node.outputs;
     nodes_.push_back(std::move(node));
   }
   master_.sdo_timeout = patience;
-  if (nodes_.empty())
-    throw InputError(
-        fmt::format("no node answers to SDO (ids {}): check power, termination and bit rate; `candump <interface>` "
-                    "shows heartbeats "
-                    "0x701 ..; other ids: --nodes",
-                    fmt::join(ids, ", ")));
+  if (nodes_.empty()) no_answer(fmt::format("no node answers to SDO (ids {})", fmt::join(ids, ", ")));
   for (std::size_t j = 0; j < n; ++j) {
     if ((driven >> j & 1U) == 0)
-      throw InputError(fmt::format("no node puts out joint {} ({}): is its drive on the bus? other ids: --nodes", j + 1,
-                                   model.robot.joints[j].name));
+      throw InputError(
+          fmt::format("no node puts out joint {} ({}): is its drive on the bus? `candump {},700:780` shows "
+                      "who is; other ids: --nodes",
+                      j + 1, model.robot.joints[j].name, bus.name()));
   }
   joints_.resize(n);
   for (std::size_t j = 0; j < n; ++j) {
@@ -84,10 +80,40 @@ CanDrives::CanDrives(can::Bus& bus, const IdentifiedModel& model, const Settings
   }
 }
 
+CanDrives::~CanDrives() {
+  try {
+    stop();
+  } catch (const std::exception&) {
+    // The bus is gone: the nodes see that themselves.
+  }
+}
+
+void CanDrives::stop() {
+  if (!std::exchange(runs_, false)) return;
+  for (const Node& node : nodes_) master_.command(canopen::NmtCommand::enter_pre_operational, node.id);
+}
+
+std::vector<std::uint8_t> CanDrives::nodes() const {
+  std::vector<std::uint8_t> ids;
+  for (const Node& node : nodes_) ids.push_back(node.id);
+  return ids;
+}
+
+/// An error passive controller hears nobody, since it runs at another bit rate or is alone.
+void CanDrives::no_answer(const std::string& who) {
+  can::Bus& bus = master_.bus();
+  if (const std::string trouble = bus.trouble(); !trouble.empty()) throw InputError(who + ": " + trouble);
+  throw InputError(
+      fmt::format("{}: check power, termination, bit rate (`ip -details link show {}`) and id (`candump {},700:780` "
+                  "shows who is there; --nodes takes other ids)",
+                  who, bus.name(), bus.name()));
+}
+
 void CanDrives::identify(Node& node) {
   if (master_.read(node.id, 0x1018, 2) != dictionary::product_code)
     throw InputError(
-        fmt::format("node {} is no fxdyn drive node (product code {:08x})", node.id, master_.read(node.id, 0x1018, 2)));
+        fmt::format("node {} is no fxdyn drive node (product code {:08x}): name those that are with --nodes", node.id,
+                    master_.read(node.id, 0x1018, 2)));
   node.board = master_.read_text(node.id, 0x1009, 0);
   node.version = master_.read_text(node.id, 0x100A, 0);
   node.crc = master_.read(node.id, dictionary::tables, 1);
@@ -95,35 +121,42 @@ void CanDrives::identify(Node& node) {
 }
 
 void CanDrives::check(const Node& node) {
+  // what programs image and tables, and what programs tables alone
+  constexpr const char* image =
+      "cmake --build --preset BOARD --target flash with -DFXDYN_TABLES=DIR/tables.hpp (Linux: "
+      "toolchains/build_node.sh DIR/tables.hpp OUT)";
+  constexpr const char* page =
+      "cmake --build --preset BOARD --target flash-tables (Linux: fxdyn_node --tables DIR/tables.bin)";
   const std::uint32_t layout = master_.read(node.id, dictionary::tables, 2);
   const std::uint32_t all = all_joints(model_);
   if (master_.read(node.id, dictionary::tables, 3) == 0)
-    throw InputError(fmt::format("node {}: its tables are damaged (CRC): flash them again (flash-tables)", node.id));
-  if (master_.read(node.id, dictionary::tables, 4) != model_.robot.size() || (node.outputs & ~all) != 0)
+    throw InputError(fmt::format("node {}: its tables are damaged (CRC): flash them again, {}", node.id, page));
+  if (const std::uint32_t joints = master_.read(node.id, dictionary::tables, 4);
+      joints != model_.robot.size() || (node.outputs & ~all) != 0)
+    throw InputError(fmt::format("node {}: its image is for a robot of {} joints, the model has {}: {}", node.id,
+                                 joints, model_.robot.size(), image));
+  // Its page may be that of its own joints, or the whole robot's of which it puts out some (fxdyn_node --joint).
+  const FixedModel own(model_, *model_.formats, node.outputs), whole(model_, *model_.formats, all);
+  const bool is_own = layout == own.layout_hash();
+  if (!is_own && layout != whole.layout_hash())
+    throw InputError(fmt::format("node {}: its image was built for another model (layout {:08x}, expected {:08x}): {}",
+                                 node.id, layout, own.layout_hash(), image));
+  if (const std::uint32_t crc = (is_own ? own : whole).crc(); node.crc != crc)
     throw InputError(
-        fmt::format("node {}: its image is for a robot of {} joints, the model has {}: build it from these "
-                    "tables",
-                    node.id, master_.read(node.id, dictionary::tables, 4), model_.robot.size()));
-  const FixedModel expected(model_, *model_.formats, node.outputs);
-  if (layout != expected.layout_hash())
-    throw InputError(fmt::format(
-        "node {}: its image was built for another model (layout {:08x}, expected {:08x}): build and flash it "
-        "from these tables",
-        node.id, layout, expected.layout_hash()));
-  if (node.crc != expected.crc())
-    throw InputError(fmt::format(
-        "node {}: holds other tables (CRC {:08x}, expected {:08x}): flash DIR/tables.bin with the target flash-tables",
-        node.id, node.crc, expected.crc()));
+        fmt::format("node {}: holds other tables (CRC {:08x}, expected {:08x}): {}", node.id, node.crc, crc, page));
 }
 
 void CanDrives::restart() {
   if (lockstep_) lost_ += lockstep_->statistics().missing + lockstep_->statistics().late;
+  runs_ = true;
   for (const Node& node : nodes_) {
     master_.command(canopen::NmtCommand::reset_node, node.id);
     // The boot-up message: a heartbeat may still be one from before the reset.
     master_.wait_for(node.id, canopen::NmtState::initialising, start_time);
     wait_for_zero_torque(node);
     master_.write(node.id, 0x1006, 0, patient_period_us, 4);
+    if (heartbeat_of_ != 0)
+      master_.write(node.id, 0x1016, 1, std::uint32_t{heartbeat_of_} << 16 | can::Guard::consumer_ms, 4);
     if (fd_) master_.write(node.id, 0x2030, 0, 1, 1);
   }
   const auto ramp = static_cast<std::int32_t>(master_.read(nodes_.front().id, 0x2010, 0));
@@ -132,8 +165,10 @@ void CanDrives::restart() {
     joint.steps = {.ramp = ramp > 0 ? (limit - 1) / ramp + 1 : limit, .following = limit};
     joint.output = {};
   }
-  master_.command(canopen::NmtCommand::start);
-  for (const Node& node : nodes_) master_.wait_for(node.id, canopen::NmtState::operational, start_time);
+  for (const Node& node : nodes_) {
+    master_.command(canopen::NmtCommand::start, node.id);
+    master_.wait_for(node.id, canopen::NmtState::operational, start_time);
+  }
   fixed_.reset();
   since_restart_ = 0;
   lockstep_ = std::make_unique<can::Lockstep>(

@@ -21,14 +21,23 @@ class CanDrives {
   struct Settings {
     std::vector<std::uint8_t> nodes;  ///< node ids; empty: whoever answers of 1 .. number of joints
     bool fd = false;
+    std::uint8_t master = 0;  ///< id whose heartbeat the nodes watch (can::Guard); 0: none
   };
 
   /// Finds the nodes, reads who they are, and configures them over SDO.
   /// @throws InputError: nobody answers, other tables (CRC, layout), a joint that no node or two put out
   CanDrives(can::Bus& bus, const IdentifiedModel& model, const Settings& settings);
 
-  /// Resets and starts all nodes: the robot at rest, torque zero.
+  /// Stops the nodes that run, whatever the reason to leave.
+  ~CanDrives();
+  CanDrives(const CanDrives&) = delete;
+  CanDrives& operator=(const CanDrives&) = delete;
+
+  /// Resets and starts the nodes, no others on the bus: the robot at rest, torque zero.
   void restart();
+  /// Takes them to pre-operational, where the torque goes to zero by its ramp.
+  void stop();
+  std::vector<std::uint8_t> nodes() const;
 
   struct Tick {
     std::vector<double> torque;  ///< of every joint, what its node said [N*m | N]; NaN: nothing came
@@ -59,11 +68,14 @@ class CanDrives {
   void identify(Node& node);
   void wait_for_zero_torque(const Node& node);
   void check(const Node& node);
+  [[noreturn]] void no_answer(const std::string& who);
 
   can::Master master_;
   const IdentifiedModel& model_;
   FixedModel fixed_;
   bool fd_;
+  std::uint8_t heartbeat_of_;
+  bool runs_ = false;
   std::vector<Node> nodes_;
   std::vector<Joint> joints_;
   std::unique_ptr<can::Lockstep> lockstep_;

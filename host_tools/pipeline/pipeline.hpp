@@ -84,6 +84,7 @@ struct CanReplaySettings {
   bool fd = false;
   bool closed_loop = false;  ///< no log: the vibration experiment with the torque of the bus
   Eigen::Index most_ticks = 20000;
+  std::size_t most_moves = 0;  ///< of the closed loop; 0: all
 };
 struct CanReplay {
   bool same = false;  ///< every torque frame byte for byte, none lost

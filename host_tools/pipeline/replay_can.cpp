@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "host_tools/can/guard.hpp"
 #include "host_tools/error.hpp"
 #include "host_tools/files.hpp"
 #include "host_tools/hil/can_replay.hpp"
@@ -19,6 +21,13 @@ using nlohmann::json;
 
 /// Ticks until a torque has come up its ramp, by far.
 constexpr Index lead_in = 250;
+
+/// The highest node id that is no drive's, for the host's heartbeat.
+std::uint8_t free_id(const std::vector<std::uint8_t>& nodes) {
+  std::uint8_t id = canopen::largest_node_id;
+  while (id > 1 && std::find(nodes.begin(), nodes.end(), id) != nodes.end()) --id;
+  return id;
+}
 
 /// The log's torque at the ticks, linearly in between.
 VectorXd measured_at(const ProcessedLog& log, const VectorXd& t, Index joint) {
@@ -44,6 +53,7 @@ json play(CanDrives& drives, const ProcessedLog& log, const IdentifiedModel& mod
     for (Index j = 0; j < n; ++j) torque(k, j) = tick.torque[static_cast<std::size_t>(j)];
     if (k % 500 == 499) progress.step();
   }
+  drives.stop();
   json joints = json::array();
   // The torque comes up by its ramp at the start: not the model's yet.
   const Index first = std::min<Index>(ticks - 1, lead_in);
@@ -65,10 +75,11 @@ json play(CanDrives& drives, const ProcessedLog& log, const IdentifiedModel& mod
 }
 
 /// The vibration experiment with the torque that comes over the bus while the plant moves.
-json in_the_loop(CanDrives& drives, const Pipeline& pipeline) {
+json in_the_loop(CanDrives& drives, const Pipeline& pipeline, std::size_t most_moves) {
   const std::size_t n = pipeline.project().robot.size();
   const Reference* reference = nullptr;
   Feedforward drive;
+  drive.most_moves = most_moves;
   drive.begin = [&](const Reference& next) {
     reference = &next;
     drives.restart();
@@ -93,15 +104,18 @@ json in_the_loop(CanDrives& drives, const Pipeline& pipeline) {
 CanReplay replay_on_can(Pipeline& pipeline, const CanReplaySettings& settings) {
   try {
     can::SocketBus bus(settings.interface, settings.fd);
+    const std::uint8_t master = free_id(settings.nodes);
+    can::Guard guard(settings.interface, master);
     const IdentifiedModel model = pipeline.model();
     if (!model.formats)
       throw InputError(fmt::format("{}: no tables of this model there; run `fxdyn export` and flash them",
                                    pipeline.directory().string()));
-    CanDrives drives(bus, model, {settings.nodes, settings.fd});
+    CanDrives drives(bus, model, {settings.nodes, settings.fd, master});
+    guard.stop_by_signals(drives.nodes());
     json document = {{"schema", "fxdyn.can_replay/1"}, {"interface", settings.interface}, {"fd", settings.fd}};
     Progress progress;
     if (settings.closed_loop) {
-      document["closed_loop"] = in_the_loop(drives, pipeline);
+      document["closed_loop"] = in_the_loop(drives, pipeline, settings.most_moves);
     } else {
       std::vector<ProcessedLog> logs;
       for (const Role role : {Role::test, Role::validate, Role::train}) {
@@ -117,6 +131,7 @@ CanReplay replay_on_can(Pipeline& pipeline, const CanReplaySettings& settings) {
       progress.done();
       document["logs"] = played;
     }
+    drives.stop();
     document.update(drives.report());
     const bool same = document.at("equal_ticks") == document.at("ticks") && document.at("frames_lost") == 0;
     document["bit_exact"] = same;

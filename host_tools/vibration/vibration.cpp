@@ -56,7 +56,9 @@ class Experiment {
     ClosedLoopSettings settings = loop(control.at("bandwidth_hz"), control.at("damping"));
     band_ = control.at("settling_band");
     settings.drive = drive.torque;
-    const std::vector<Move> moves = make_moves(model_, model_.tick_s, judged_moves);
+    std::vector<Move> moves = make_moves(model_, model_.tick_s, judged_moves);
+    if (drive.most_moves > 0 && drive.most_moves < moves.size())
+      moves.erase(moves.begin() + static_cast<std::ptrdiff_t>(drive.most_moves), moves.end());
     progress_.stage("vibration: the drive in the loop", moves.size());
     std::vector<Outcome> outcomes;
     for (const Move& move : moves) {
@@ -265,7 +267,10 @@ class Experiment {
                   {"settling_s", sum.settling_s / count},
                   {"roughness", sum.roughness / count}};
     };
-    for (const char* kind : {"all", "point_to_point", "reversals", "slow"}) kinds[kind] = mean(kind);
+    kinds["all"] = mean("all");
+    for (const Move& move : moves) {
+      if (!kinds.contains(move.kind)) kinds[move.kind] = mean(move.kind);
+    }
     return {{"feedforward", name}, {"numbers", numbers}, {"parameters_off", wrong}, {"moves", kinds}};
   }
 

@@ -38,6 +38,7 @@ nlohmann::json vibration(const std::filesystem::path& project, const std::filesy
 struct Feedforward {
   std::function<void(const Reference&)> begin;          ///< the robot at rest at the reference's start
   std::function<Eigen::VectorXd(Eigen::Index)> torque;  ///< at a sample of it [N*m | N]
+  std::size_t most_moves = 0;                           ///< the first ones alone; 0: all
 };
 /// The same moves with this drive in the loop, beside what DIR/vibration.json says of none and the model on the host,
 /// under its controller. It is made first where it is missing or of something else.

@@ -113,7 +113,11 @@ TEST(Eds, SaysWhatTheNodeSays) {
     dictionary::Object object;
     ASSERT_EQ(bench.node.find(static_cast<std::uint16_t>(index), sub, object), canopen::Abort::none) << title;
     EXPECT_EQ(std::stoi(section.at("DataType"), nullptr, 0), static_cast<int>(object.type())) << title;
-    EXPECT_EQ(section.at("AccessType") == "rw", object.writable()) << title;
+    const bool is_setpoint = index >= 0x2100 && index <= 0x2102 && sub != 0;
+    if (is_setpoint)
+      EXPECT_EQ(section.at("AccessType"), "rww") << title;
+    else
+      EXPECT_EQ(section.at("AccessType") == "rw", object.writable()) << title;
     EXPECT_EQ(section.contains("LowLimit"), object.writable() && object.type() != dictionary::Type::visible_string)
         << title;
     const std::string& value = section.at("DefaultValue");
@@ -134,11 +138,41 @@ TEST(Eds, MappedObjectsExistAndMayBeMapped) {
         const auto value = number(eds.at(hex(base + joint) + "sub" + std::to_string(place)).at("DefaultValue"), 1);
         const Section& mapped = eds.at(hex(static_cast<int>(value >> 16)) + "sub" + std::to_string(value >> 8 & 0xFF));
         EXPECT_EQ(mapped.at("PDOMapping"), "1");
+        // What a PDO writes must not be read-only, and what it reads is not written by one.
+        EXPECT_EQ(mapped.at("AccessType"), base == 0x1600 ? "rww" : "ro");
         bits += static_cast<int>(value & 0xFF);
       }
       EXPECT_EQ(bits, 64);
     }
   }
+}
+
+// CiA 306-1, sections FileInfo and DeviceInfo: every key, and what the identity object says too.
+TEST(Eds, HasWhatFileAndDeviceInfoNeed) {
+  const auto eds = parse_eds(robot());
+  for (const char* key : {"FileName", "FileVersion", "FileRevision", "EDSVersion", "Description", "CreationTime",
+                          "CreationDate", "CreatedBy", "ModificationTime", "ModificationDate", "ModifiedBy"}) {
+    ASSERT_TRUE(eds.at("FileInfo").contains(key)) << key;
+    EXPECT_FALSE(eds.at("FileInfo").at(key).empty()) << key;
+  }
+  const std::regex date("[0-9]{2}-[0-9]{2}-[0-9]{4}"), time("[0-9]{2}:[0-9]{2}(AM|PM)");
+  EXPECT_TRUE(std::regex_match(eds.at("FileInfo").at("ModificationDate"), date));
+  EXPECT_TRUE(std::regex_match(eds.at("FileInfo").at("ModificationTime"), time));
+  for (const char* key : {"VendorName", "VendorNumber", "ProductName", "ProductNumber", "RevisionNumber", "OrderCode",
+                          "SimpleBootUpMaster", "SimpleBootUpSlave", "Granularity", "DynamicChannelsSupported",
+                          "GroupMessaging", "LSS_Supported"})
+    EXPECT_TRUE(eds.at("DeviceInfo").contains(key)) << key;
+  Bench<> bench;
+  bench.poll();
+  EXPECT_EQ(bench.read(0x1018, 2), number(eds.at("DeviceInfo").at("ProductNumber"), 1));
+  EXPECT_EQ(bench.read(0x1018, 3), number(eds.at("DeviceInfo").at("RevisionNumber"), 1));
+  EXPECT_FALSE(eds.at("DeviceInfo").at("OrderCode").empty());
+}
+
+TEST(Eds, ErrorBehaviourIsAnArray) {
+  const auto eds = parse_eds(robot());
+  EXPECT_EQ(eds.at("1029").at("ObjectType"), "0x8");
+  EXPECT_EQ(eds.at("1018").at("ObjectType"), "0x9");
 }
 
 TEST(Eds, ANodeOfOneJointSendsOnePdo) {
@@ -217,6 +251,21 @@ TEST(Dbc, SignalsFitTheirMessagesAndDoNotOverlap) {
       taken |= mask;
     }
   }
+}
+
+// Limits that differ by direction: 32768 is the larger one, for the node and for the file.
+TEST(Dbc, ScalesAsTheNodeDoesWhereLimitsDiffer) {
+  auto parameters = tables::page.parameters;
+  auto& limits = parameters.constants[1].limits;
+  limits.dq_lower.raw = -3 * (limits.dq_upper.raw / 2);
+  limits.ddq_lower.raw = -2 * (limits.ddq_upper.raw / 3);
+  Bench<> bench({.board = "bench"}, true, parameters);
+  bench.poll();
+  const auto dbc = parse_dbc(describe<test::Robot>(parameters, tables::rated_torque, version));
+  const Message& setpoint = dbc.at(canopen::setpoint_id + 2);
+  EXPECT_DOUBLE_EQ(setpoint.signals.at("Velocity").factor, std::ldexp(bench.read(0x2021, 2), -25 - 15));
+  EXPECT_DOUBLE_EQ(setpoint.signals.at("Acceleration").factor, std::ldexp(bench.read(0x2022, 2), -22 - 15));
+  EXPECT_NE(bench.read(0x2021, 2), static_cast<std::uint32_t>(limits.dq_upper.raw));
 }
 
 // A session on the bus, read with the DBC, gives the numbers that were meant.

@@ -74,10 +74,10 @@ void configure(can::Master& master, std::uint8_t node, bool fd) {
     const auto& limits = tables::parameters.constants[j].limits;
     const auto sub = static_cast<std::uint8_t>(j + 1);
     check_equal(master.read(node, 0x2021, sub),
-                static_cast<std::uint32_t>(hil::whole(limits.dq_lower.raw, limits.dq_upper.raw)), "velocity of 32768",
+                static_cast<std::uint32_t>(whole_share(limits.dq_lower.raw, limits.dq_upper.raw)), "velocity of 32768",
                 node);
     check_equal(master.read(node, 0x2022, sub),
-                static_cast<std::uint32_t>(hil::whole(limits.ddq_lower.raw, limits.ddq_upper.raw)),
+                static_cast<std::uint32_t>(whole_share(limits.ddq_lower.raw, limits.ddq_upper.raw)),
                 "acceleration of 32768", node);
     check_equal(master.read(node, 0x2040, sub), static_cast<std::uint32_t>(tables::rated_torque[j]), "rated torque",
                 node);

@@ -27,10 +27,11 @@ class MemoryNode final : public hil::NodeUnderTest, public can::Bus {
     host_ = std::make_unique<hal::fake::CanController<Frame>>(*wire_);
     controller_ = std::make_unique<hal::fake::CanController<Frame>>(*wire_);
     hardware_ = std::make_unique<Hardware>(Hardware{*controller_, clock_, counter_, watchdog_, enable_, fault_, busy_});
-    auto header = tables::page.header;
-    if (!good_tables) header.crc32 ^= 1;
+    page_ = tables::page;
+    if (!good_tables) corrupt(page_);
     node_ = std::make_unique<Node>(
-        *hardware_, NodeTables<Model>{tables::parameters, header, good_tables, false, rated_}, NodeSettings{.id = 1});
+        *hardware_, NodeTables<Model>{page_.parameters, page_.header, page_is_valid(page_), false, rated_},
+        NodeSettings{.id = 1});
     poll();
   }
 
@@ -50,6 +51,8 @@ class MemoryNode final : public hil::NodeUnderTest, public can::Bus {
   }
   can::Duration now() const override { return std::chrono::microseconds(clock_.elapsed_us()); }
   std::uint32_t lost() const override { return host_->errors().lost; }
+  std::string name() const override { return "memory"; }
+  std::string trouble() override { return {}; }
 
  private:
   using Hardware = DriveHardware<hal::fake::CanController<Frame>, hal::fake::Clock, hal::fake::CycleCounter,
@@ -63,6 +66,14 @@ class MemoryNode final : public hil::NodeUnderTest, public can::Bus {
       }
     }
   }
+  /// One bit of it, another one each time.
+  void corrupt(TablePage<Model>& page) {
+    corrupt_bit_ = (corrupt_bit_ + 7919) % (8 * sizeof page);
+    auto* bytes = reinterpret_cast<unsigned char*>(&page);
+    bytes[corrupt_bit_ / 8] = static_cast<unsigned char>(bytes[corrupt_bit_ / 8] ^ 1U << corrupt_bit_ % 8);
+  }
+  TablePage<Model> page_{};
+  std::size_t corrupt_bit_ = 0;
   static constexpr RatedTorques<Model> rated_{tables::rated_torque};
   hal::fake::Clock clock_;
   hal::fake::CycleCounter counter_;

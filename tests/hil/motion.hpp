@@ -14,9 +14,6 @@
 
 namespace fxdyn::hil {
 
-/// What a node takes as the whole of a share, as it says in 0x2021 and 0x2022.
-inline std::int32_t whole(std::int32_t lower, std::int32_t upper) { return std::max({-lower, upper, std::int32_t{1}}); }
-
 /// Setpoints within the joints' limits for as many ticks as one likes, the same for the same seed. Half a second of
 /// smooth motion and half a second of random velocities and accelerations along a random walk in turn: what a robot
 /// does, and what drives the arithmetic into its corners.
@@ -46,7 +43,7 @@ class Motion {
   }
   /// [raw position per tick]
   double fastest(std::size_t j) const {
-    return whole(limits(j).dq_lower.raw, limits(j).dq_upper.raw) / velocity * radian * tick_s_;
+    return whole_share(limits(j).dq_lower.raw, limits(j).dq_upper.raw) / velocity * radian * tick_s_;
   }
   double draw(double from, double to) { return std::uniform_real_distribution<double>(from, to)(random_); }
 
@@ -83,7 +80,7 @@ class Expected {
       : parameters_(parameters), rated_(rated) {
     static_assert(Model::outputs == Model::joints);
     for (std::size_t j = 0; j < Model::joints; ++j) {
-      const std::int32_t limit = whole(limits(j).tau_lower.raw, limits(j).tau_upper.raw);
+      const std::int32_t limit = whole_share(limits(j).tau_lower.raw, limits(j).tau_upper.raw);
       steps_[j] = {.ramp = (limit - 1) / ramp_ticks + 1, .following = limit};
     }
   }
@@ -94,8 +91,8 @@ class Expected {
     for (std::size_t j = 0; j < Model::joints; ++j) {
       const auto i = static_cast<int>(j);
       input.q[i].raw = setpoints[j].q;
-      input.dq[i].raw = from_share(setpoints[j].dq, whole(limits(j).dq_lower.raw, limits(j).dq_upper.raw));
-      input.ddq[i].raw = from_share(setpoints[j].ddq, whole(limits(j).ddq_lower.raw, limits(j).ddq_upper.raw));
+      input.dq[i].raw = from_share(setpoints[j].dq, whole_share(limits(j).dq_lower.raw, limits(j).dq_upper.raw));
+      input.ddq[i].raw = from_share(setpoints[j].ddq, whole_share(limits(j).ddq_lower.raw, limits(j).ddq_upper.raw));
     }
     Saturations saturations;
     const auto model = Model::tick(parameters_, state_, input, saturations);
