@@ -157,6 +157,7 @@ void CanDrives::restart() {
     master_.write(node.id, 0x1006, 0, patient_period_us, 4);
     if (heartbeat_of_ != 0)
       master_.write(node.id, 0x1016, 1, std::uint32_t{heartbeat_of_} << 16 | can::Guard::consumer_ms, 4);
+    master_.write(node.id, 0x2013, 0, 1, 1);
     if (fd_) master_.write(node.id, 0x2030, 0, 1, 1);
   }
   const auto ramp = static_cast<std::int32_t>(master_.read(nodes_.front().id, 0x2010, 0));
@@ -200,6 +201,7 @@ CanDrives::Tick CanDrives::tick(const Eigen::VectorXd& q, const Eigen::VectorXd&
     wire[j] = {to_raw(q[i], formats[Quantity::position]),
                to_share(to_raw(dq[i], formats[Quantity::velocity]), joint.velocity),
                to_share(to_raw(ddq[i], formats[Quantity::acceleration]), joint.acceleration)};
+    wire[j].of_tick(since_restart_ % 2 != 0);
     words.insert(words.end(),
                  {wire[j].q, from_share(wire[j].dq, joint.velocity), from_share(wire[j].ddq, joint.acceleration)});
   }

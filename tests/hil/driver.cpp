@@ -90,6 +90,7 @@ void configure(can::Master& master, std::uint8_t node, bool fd) {
   }
   // Lockstep waits as long as it takes: an overdue SYNC is no fault here.
   master.write(node, 0x1006, 0, 4'000'000, 4);
+  master.write(node, 0x2013, 0, 1, 1);  // parity of the tick
   if (fd) master.write(node, 0x2030, 0, 1, 1);
 }
 

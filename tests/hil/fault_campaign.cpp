@@ -20,11 +20,6 @@ constexpr std::uint32_t most_recovery_ticks = 4 * ramp_ticks;
 /// What SYNC's period is told to be where the test has no business with it: it may take its time.
 constexpr std::uint32_t patient_us = 1'000'000;
 
-// WHEN THE NODE REFUSES MIXED TICKS, SET THIS: a setpoint that comes twice, or after the SYNC of its tick, then makes
-// the tick that it gets into stale. Until then such a tick is fresh, computed from what came last, and `late_lost`
-// shows the node computing with one joint's setpoint of the tick before.
-constexpr bool node_refuses_mixed_ticks = false;
-
 using Counts = std::array<std::uint32_t, dictionary::counters>;
 /// What grows without any fault.
 Counts faults_alone(Counts counts) {
@@ -81,6 +76,7 @@ void FaultCampaign::configure() {
   master_.write(id, 0x1029, 1, 1, 1);
   master_.write(id, 0x2010, 0, ramp_ticks, 2);
   master_.write(id, 0x2012, 0, dictionary::defaults::tolerated_ticks, 1);
+  master_.write(id, 0x2013, 0, 1, 1);  // the motion's setpoints carry the tick's parity
   for (std::size_t j = 0; j < joints; ++j) {
     const auto& limits = tables::parameters.constants[j].limits;
     const std::int32_t limit = whole_share(limits.tau_lower.raw, limits.tau_upper.raw);
@@ -103,7 +99,6 @@ void FaultCampaign::start() {
 /// The node forgets what it was told, its model starts anew, and its torque goes to zero without a frame.
 void FaultCampaign::left_operation() {
   waiting_ = 0;
-  mixed_ = false;
   stale_ = 0;
   has_last_ = false;
   state_ = {};
@@ -112,14 +107,11 @@ void FaultCampaign::left_operation() {
 
 void FaultCampaign::send(const can::Frame& frame) { node_.bus().send(frame); }
 
-/// `is_late`: its tick is over.
-void FaultCampaign::send_setpoint(std::size_t j, const WireSetpoint& setpoint, bool is_late) {
+void FaultCampaign::send_setpoint(std::size_t j, const WireSetpoint& setpoint) {
   can::Frame frame{.id = canopen::setpoint_id + 1 + static_cast<std::uint32_t>(j), .size = WireSetpoint::bytes};
   setpoint.store(frame.data.data());
   send(frame);
-  const bool is_second = (waiting_ >> j & 1U) != 0;
-  if (is_second) expect(Counter::duplicate_setpoints);
-  mixed_ = mixed_ || is_late || is_second;
+  if ((waiting_ >> j & 1U) != 0) expect(Counter::duplicate_setpoints);
   waiting_ |= 1U << j;
   arrived_.resize(joints);
   arrived_[j] = setpoint;
@@ -153,7 +145,11 @@ bool FaultCampaign::accept() {
     expect(Counter::missing_setpoints, static_cast<std::uint32_t>(std::popcount(all & ~waiting_)));
     return false;
   }
-  if (node_refuses_mixed_ticks && mixed_) return false;
+  const bool odd = arrived_[0].is_odd();
+  if (std::any_of(arrived_.begin(), arrived_.end(), [&](const auto& setpoint) { return setpoint.is_odd() != odd; })) {
+    expect(Counter::mixed_setpoints);
+    return false;
+  }
   const std::uint32_t implausible = implausible_setpoints();
   expect(Counter::implausible_setpoints, implausible);
   return implausible == 0;
@@ -200,7 +196,6 @@ void FaultCampaign::end_tick(bool sync) {
   else
     stale_tick();
   waiting_ = 0;
-  mixed_ = false;
   can::Frame frame;
   const can::Duration end = node_.bus().now() + answer_time;
   while (tick_frames_ < joints && node_.bus().now() < end) {
@@ -396,7 +391,7 @@ void FaultCampaign::reorder() {
     if (j != which) send_setpoint(j, setpoints_[j]);
   }
   end_tick(true);
-  send_setpoint(which, setpoints_[which], true);
+  send_setpoint(which, setpoints_[which]);
 }
 
 void FaultCampaign::delay() {
@@ -407,10 +402,10 @@ void FaultCampaign::delay() {
   }
   end_tick(true);
   for (std::size_t ticks = random_() % 3; ticks > 0; --ticks) good_tick();
-  send_setpoint(which, late, true);  // the next tick's comes behind it
+  send_setpoint(which, late);  // the next tick's comes behind it
 }
 
-/// The late one completes a tick that is not its own, and nothing in the frames says so but their order.
+/// The late one completes a tick that is not its own, and nothing in the frames says so but their parity.
 void FaultCampaign::late_lost() {
   const std::size_t which = any_joint();
   const WireSetpoint late = setpoints_[which];
@@ -419,7 +414,7 @@ void FaultCampaign::late_lost() {
   }
   end_tick(true);
   setpoints_ = motion_.next();
-  send_setpoint(which, late, true);
+  send_setpoint(which, late);
   for (std::size_t j = 0; j < joints; ++j) {
     if (j != which) send_setpoint(j, setpoints_[j]);
   }
@@ -563,7 +558,6 @@ void FaultCampaign::sync_lost() {
   expect(Counter::overdue_syncs, own_ticks);
   if (own_ticks > 0) {
     waiting_ = 0;
-    mixed_ = false;
   }
   // In memory time is exact; a process may be kept waiting, and does what is due when it runs again.
   const std::int64_t least = period_.count() > 0 ? std::min<std::int64_t>(away / own_period_ - 1, most) : 0;

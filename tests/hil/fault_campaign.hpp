@@ -97,7 +97,7 @@ class FaultCampaign {
 
   // Frames of a tick.
   void send(const can::Frame& frame);
-  void send_setpoint(std::size_t j, const WireSetpoint& setpoint, bool is_late = false);
+  void send_setpoint(std::size_t j, const WireSetpoint& setpoint);
   void send_all();
   void end_tick(bool sync);
   bool accept();
@@ -129,7 +129,6 @@ class FaultCampaign {
   // The injector's picture of the node.
   std::vector<WireSetpoint> setpoints_;  ///< of this tick
   std::uint32_t waiting_ = 0;            ///< joints whose setpoint has come since the last SYNC
-  bool mixed_ = false;                   ///< among them is one twice, or one of an earlier tick
   std::vector<WireSetpoint> arrived_, last_;
   bool has_last_ = false;
   std::uint32_t stale_ = 0;

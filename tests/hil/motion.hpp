@@ -16,7 +16,7 @@ namespace fxdyn::hil {
 
 /// Setpoints within the joints' limits for as many ticks as one likes, the same for the same seed. Half a second of
 /// smooth motion and half a second of random velocities and accelerations along a random walk in turn: what a robot
-/// does, and what drives the arithmetic into its corners.
+/// does, and what drives the arithmetic into its corners. They carry the tick's parity (object 0x2013).
 template <class Model>
 class Motion {
  public:
@@ -29,6 +29,7 @@ class Motion {
     std::vector<WireSetpoint> setpoints(Model::joints);
     const bool rough = count_ / 250 % 2 == 1;
     for (std::size_t j = 0; j < Model::joints; ++j) setpoints[j] = rough ? rough_step(j) : smooth_step(j);
+    for (WireSetpoint& setpoint : setpoints) setpoint.of_tick(count_ % 2 != 0);
     ++count_;
     return setpoints;
   }
