@@ -36,7 +36,7 @@ struct WireSetpoint {
   }
 };
 
-/// What a share of 32768 is of, raw: the larger end of a joint's range around zero, at least 1 (objects 0x2021, 0x2022).
+/// What a share of 32768 is of, raw: the larger end of a range around zero, at least 1 (objects 0x2021, 0x2022).
 constexpr std::int32_t whole_share(std::int32_t lower, std::int32_t upper) {
   return std::max({lower < -0x7FFF'FFFF ? 0x7FFF'FFFF : -lower, upper, std::int32_t{1}});
 }

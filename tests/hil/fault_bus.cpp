@@ -86,7 +86,6 @@ int main(int count, char** arguments) {
   if (count < 3) return 2;
   try {
     ProcessNode node(arguments[1]);
-    ::usleep(500'000);
     hil::FaultCampaign campaign(node, count > 3 ? static_cast<unsigned>(std::strtoul(arguments[3], nullptr, 10)) : 1,
                                 {});
     campaign.run(std::strtoull(arguments[2], nullptr, 10), 0.05);

@@ -15,6 +15,7 @@ constexpr double tick_s = 0.002;
 /// What the node may change a torque by in a tick: the ramp's slope for every step (objects 0x2010 and 0x2011).
 constexpr std::int32_t ramp_ticks = 50;
 constexpr can::Duration answer_time = std::chrono::seconds(3);
+constexpr can::Duration start_time = std::chrono::seconds(30);  // of a process on a busy machine
 constexpr can::Duration quiet = std::chrono::milliseconds(3);
 constexpr std::uint32_t most_recovery_ticks = 4 * ramp_ticks;
 /// What SYNC's period is told to be where the test has no business with it: it may take its time.
@@ -50,6 +51,7 @@ FaultCampaign::FaultCampaign(NodeUnderTest& node, unsigned seed, can::Duration p
 }
 
 void FaultCampaign::run(std::uint64_t events, double slow_share) {
+  master_.wait_for(id, NmtState::pre_operational, start_time);
   configure();
   expected_ = read_counters();
   start();
@@ -588,7 +590,7 @@ void FaultCampaign::reset() {
 void FaultCampaign::wrong_tables() {
   master_.emergencies.clear();
   node_.restart(false);
-  master_.wait_for(id, NmtState::pre_operational, answer_time);
+  master_.wait_for(id, NmtState::pre_operational, start_time);
   const bool refused = master_.read(id, dictionary::tables, 3) == 0;
   master_.command(NmtCommand::start, id);
   master_.wait_for(id, NmtState::pre_operational, answer_time);
@@ -603,7 +605,7 @@ void FaultCampaign::wrong_tables() {
     ++disagreements_;
   }
   node_.restart(true);
-  master_.wait_for(id, NmtState::pre_operational, answer_time);
+  master_.wait_for(id, NmtState::pre_operational, start_time);
   // From power-on: nothing counted, and a torque of zero, whatever it was before.
   left_operation();
   expected_.fill(0);
