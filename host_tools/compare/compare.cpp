@@ -23,6 +23,7 @@
 #include "host_tools/pipeline/pipeline.hpp"
 #include "host_tools/pipeline/provenance.hpp"
 #include "host_tools/train/ridge.hpp"
+#include "host_tools/train/search.hpp"
 #include "host_tools/train/swarm.hpp"
 #include "host_tools/train/train.hpp"
 
@@ -43,8 +44,8 @@ constexpr double rnea_multiplications = 142;
 /// A test log and what it is judged against.
 struct TestLog {
   ProcessedLog log;
-  MatrixXd reference;             ///< full rate, unfiltered
-  std::optional<fs::path> truth;  ///< truth.json of its scenario
+  MatrixXd reference;                    ///< full rate, unfiltered
+  std::optional<IdentifiedModel> truth;  ///< of its scenario
 };
 
 using Torque = std::function<MatrixXd(const ProcessedLog&)>;
@@ -61,10 +62,17 @@ MatrixXd states(const ProcessedLog& log, std::size_t joint) {
   return x;
 }
 
+/// Methods whose swarms can take long enough to be worth going on with.
+constexpr const char* searched[] = {"bls_pso", "bls_pso_physical"};
+
 class Comparison {
  public:
-  Comparison(const Project& project, const fs::path& directory)
-      : project_(project), directory_(directory), data_(read_gate_data(project_, directory)) {
+  /// @param resumable swarms keep their last generation in `directory`
+  Comparison(const Project& project, const fs::path& directory, bool resumable)
+      : project_(project), directory_(directory), data_(read_gate_data(project_, directory)), resumable_(resumable) {
+    for (const char* name : searched) {
+      if (const auto resume = resume_file(name)) resume->check_inputs();
+    }
     for (const JointFit& joint : initial_joints(project_, data_)) rated_.push_back(joint.rated_torque);
     for (Log& log : read_logs(project_, Role::test, directory)) {
       const fs::path file = log.file;
@@ -76,7 +84,7 @@ class Comparison {
         if (test.reference.rows() != test.log.samples())
           throw InputError(fmt::format("{}: {} samples, its log has {}: simulate again", clean.string(),
                                        test.reference.rows(), test.log.samples()));
-        test.truth = file.parent_path() / "truth.json";
+        test.truth = read_model(file.parent_path() / "truth.json");
       } else {
         against_truth_ = false;
         test.reference = test.log.tau;
@@ -117,6 +125,13 @@ class Comparison {
             {"methods", methods_}};
   }
 
+  /// The outcome is written down.
+  void drop_searches() const {
+    for (const char* name : searched) {
+      if (const auto resume = resume_file(name)) fs::remove(resume->path);
+    }
+  }
+
   /// What the first test log shows of the methods that were run.
   ComparedLog shown() const {
     const TestLog& test = tests_.front();
@@ -139,14 +154,25 @@ class Comparison {
     out.train_t = train->t;
     out.train_q = train->q;
     if (test.truth && learned_) {
-      const IdentifiedModel truth = read_model(*test.truth);
-      out.rigid = filtered(predict(rigid_part(truth), log));
+      out.rigid = filtered(predict(rigid_part(*test.truth), log));
       out.learned_friction = filtered(predict(*learned_, log) - predict(rigid_part(*learned_), log));
     }
     return out;
   }
 
  private:
+  std::optional<ResumeFile> resume_file(const std::string& name) const {
+    if (!resumable_) return {};
+    std::string inputs = project_hash(project_);
+    for (const LogReference& log : data_.references) inputs += log.hash;
+    return ResumeFile{directory_ / ("compare." + name + ".pso.json"), hash_of(inputs + name), hash_of(inputs)};
+  }
+
+  /// Wall time of a search; that of the last of its runs says nothing.
+  static json seconds_of(std::chrono::steady_clock::time_point start, bool went_on) {
+    return went_on ? json(nullptr) : json(seconds_since(start));
+  }
+
   void stage(const std::string& name) { progress_.stage("compare: " + name, 1); }
 
   /// Judges a method. @param model where it is one that firmware could have
@@ -320,7 +346,7 @@ class Comparison {
   }
 
   /// The paper's: what the rigid body leaves, as a function of the state.
-  void state_bls(const std::string& name, bool search) {
+  void state_bls(const std::string& name, bool by_swarm) {
     const std::size_t n = project_.robot.size();
     const auto start = std::chrono::steady_clock::now();
     const IdentifiedModel structure = identify_structure(project_, data_, {}, "ls", progress_);
@@ -329,38 +355,40 @@ class Comparison {
     pso.particles = 12;
     pso.iterations = 15;
     if (project_.train.pso) pso = *project_.train.pso;
-    progress_.stage("compare: " + name, n + 1);
-    std::vector<StateFit> fits(n);
-    parallel_for(n, [&](std::size_t j) {
-      std::vector<MatrixXd> x;
-      std::vector<VectorXd> y;
+    std::vector<std::vector<MatrixXd>> x(n);
+    std::vector<std::vector<VectorXd>> y(n);
+    for (std::size_t j = 0; j < n; ++j) {
       for (std::size_t l = 0; l < data_.logs.size(); ++l) {
-        x.push_back(states(data_.logs[l], j));
-        y.push_back(left(data_.logs[l], rest[l], j));
+        x[j].push_back(states(data_.logs[l], j));
+        y[j].push_back(left(data_.logs[l], rest[l], j));
       }
-      StateBlsShape shape;
-      if (search) {
-        VectorXd lower(6), upper(6);
-        lower << 1, 1, pso.nodes[0], std::log10(pso.ridge[0]), -1, 0;
-        upper << 8, 8, pso.nodes[1], std::log10(pso.ridge[1]), 1, 4;
+    }
+    std::vector<StateBlsShape> shapes(n);
+    const auto resume = by_swarm ? resume_file(name) : std::nullopt;
+    const bool went_on = resume && fs::exists(resume->path);
+    if (by_swarm) {
+      VectorXd lower(6), upper(6);
+      lower << 1, 1, pso.nodes[0], std::log10(pso.ridge[0]), -1, 0;
+      upper << 8, 8, pso.nodes[1], std::log10(pso.ridge[1]), 1, 4;
+      std::vector<Swarm> swarms;
+      for (std::size_t j = 0; j < n; ++j) {
         SwarmSettings settings;
         settings.particles = pso.particles;
         settings.iterations = pso.iterations;
         settings.stall = pso.stall;
         settings.seed = project_.train.seed * 1000 + j;
-        Swarm swarm(lower, upper, settings);
-        while (!swarm.finished()) {
-          VectorXd values(pso.particles);
-          for (Index p = 0; p < values.size(); ++p)
-            values[p] = fit_state(shape_at(swarm.positions().col(p)), j, x, y).judged;
-          swarm.tell(values);
-        }
-        shape = shape_at(swarm.best());
+        swarms.emplace_back(lower, upper, settings);
       }
-      fits[j] = fit_state(shape, j, x, y);
-      progress_.step();
-    });
-    const double spent = seconds_since(start);
+      progress_.stage("compare: " + name + ", by particle swarm", n * (static_cast<std::size_t>(pso.iterations) + 1));
+      search(
+          swarms, [&](std::size_t j, const VectorXd& at) { return fit_state(shape_at(at), j, x[j], y[j]).judged; },
+          progress_, resume);
+      for (std::size_t j = 0; j < n; ++j) shapes[j] = shape_at(swarms[j].best());
+    }
+    stage(name);
+    std::vector<StateFit> fits(n);
+    parallel_for(n, [&](std::size_t j) { fits[j] = fit_state(shapes[j], j, x[j], y[j]); });
+    const json spent = seconds_of(start, went_on);
     double macs = multiplications(structure);
     for (const StateFit& fit : fits) macs += static_cast<double>(fit.net->multiplications());
     last_ = structure;
@@ -375,18 +403,20 @@ class Comparison {
         macs, spent, nullptr);
   }
 
-  void physical_bls(const std::string& name, bool search) {
+  void physical_bls(const std::string& name, bool by_swarm) {
     const auto start = std::chrono::steady_clock::now();
     const Project project = with_structure(project_, coulomb_and_viscous, "wls");
     GateData data = data_;
     const auto fitter = identify(project, data, progress_);
     TrainSettings settings = project_.train;
     settings.inputs = PhysicalInputs::name;
-    if (!search) settings.pso.reset();
-    if (search && !settings.pso) settings.pso = PsoSettings{.particles = 12, .iterations = 15};
-    train(*fitter, settings, progress_);
+    if (!by_swarm) settings.pso.reset();
+    if (by_swarm && !settings.pso) settings.pso = PsoSettings{.particles = 12, .iterations = 15};
+    const auto resume = by_swarm ? resume_file(name) : std::nullopt;
+    const bool went_on = resume && fs::exists(resume->path);
+    train(*fitter, settings, progress_, resume);
     last_ = learned_ = finish_model(*fitter, project, data).model;
-    const double spent = seconds_since(start);
+    const json spent = seconds_of(start, went_on);
     stage(name);
     add_model(name, spent);
   }
@@ -401,9 +431,9 @@ class Comparison {
     stage("oracle");
     const auto torque = [&](const ProcessedLog& log) {
       const auto test = std::find_if(tests_.begin(), tests_.end(), [&](const TestLog& t) { return &t.log == &log; });
-      return predict(read_model(*test->truth), log);
+      return predict(*test->truth, log);
     };
-    add("oracle", torque, multiplications(read_model(*tests_.front().truth)), 0, nullptr);
+    add("oracle", torque, multiplications(*tests_.front().truth), 0, nullptr);
   }
 
   /// The measurement itself against the truth.
@@ -416,6 +446,7 @@ class Comparison {
   Project project_;
   fs::path directory_;
   GateData data_;
+  bool resumable_;
   std::vector<double> rated_;  ///< [N*m | N]
   std::vector<TestLog> tests_;
   bool against_truth_ = true;
@@ -428,15 +459,16 @@ class Comparison {
 }  // namespace
 
 json compare_methods(const Project& project, const fs::path& directory, const std::vector<std::string>& methods) {
-  return Comparison(project, directory).run(methods);
+  return Comparison(project, directory, false).run(methods);
 }
 
 json compare(const fs::path& project, const fs::path& directory) {
-  Comparison comparison(read_project(project), directory);
+  Comparison comparison(read_project(project), directory, true);
   const json result = comparison.run({"rigid_ls", "friction_ls", "rls", "mlp", "bls_default", "bls_pso",
                                       "bls_pso_physical", "lugre", "named_bls", "oracle", "noise_floor"});
   write_comparison_plots(comparison.shown(), directory);
   write_file(directory / "compare.json", result.dump(1) + "\n");
+  comparison.drop_searches();
   return result;
 }
 

@@ -17,13 +17,15 @@ namespace fxdyn {
 ///   percent_rated        rmse, % of rated torque
 ///   smoothness           RMS of d(torque)/dt over that of the reference's, mean over the joints: 1 is as smooth
 ///   macs_per_tick        multiplications of one tick, all joints; the rigid body counts as the PUMA's, 142 a joint
-///   train_s              wall time from the logs to the model; named_bls: of diagnose and train when they last ran in
-///                        DIR, null where that is not known
+///   train_s              wall time from the logs to the model, null where a killed run's search went on; named_bls: of
+///                        diagnose and train when they last ran in DIR, null where that is not known
 ///   fixed_error          largest |fixed - double| on the test logs, share of rated; null: not for firmware
 /// Methods: rigid_ls friction_ls rls mlp bls_default bls_pso bls_pso_physical lugre named_bls oracle noise_floor; the
 /// last two only where the truth is known.
 /// Beside compare.json it draws DIR/plots/compare_*.svg, what the paper's Figs. 5 to 11 show.
-/// @throws DataError: no test log, no validate log
+/// The swarms keep their last generation in DIR/compare.bls_pso.pso.json and compare.bls_pso_physical.pso.json: a
+/// killed run goes on from there.
+/// @throws DataError: no test log, no validate log, generations of another project or other logs
 nlohmann::json compare(const std::filesystem::path& project, const std::filesystem::path& directory);
 
 /// Some of these methods, and bls_physical: bls_pso_physical with a small grid in place of the swarm. Writes nothing.

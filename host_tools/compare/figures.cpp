@@ -23,7 +23,10 @@ constexpr const char* learned = "bls_pso_physical";
 struct Method {
   const char *name, *title, *colour;
 };
-constexpr Method paper_methods[] = {{"rls", "RLS", "#e4572e"}, {"mlp", "MLP", "#2e6fb7"}, {learned, "BLS", "#2a9d4a"}};
+constexpr Method paper_methods[] = {{"rls", "RLS", "#e4572e"},
+                                    {"mlp", "MLP", "#2e6fb7"},
+                                    {"bls_pso", "BLS-PSO on q, dq, ddq (the paper's)", "#8e5ea2"},
+                                    {learned, "BLS-PSO with memory (ours)", "#2a9d4a"}};
 
 std::string time_label(const ComparedLog& log) { return fmt::format("time [s] in {}", log.log); }
 
@@ -60,8 +63,8 @@ std::string trajectories(const ComparedLog& log) {
   static constexpr const char* colours[] = {"#2e6fb7", "#e4572e", "#2a9d4a", "#8e5ea2", "#b8860b", "#444444"};
   Chart chart{"time [s]", "q [rad | m]", {}};
   for (Index j = 0; j < log.train_q.cols(); ++j) {
-    chart.curves.push_back({log.train_t, log.train_q.col(j), colours[j % 6], 1.4,
-                            log.robot->joints[static_cast<std::size_t>(j)].name});
+    chart.curves.push_back(
+        {log.train_t, log.train_q.col(j), colours[j % 6], 1.4, log.robot->joints[static_cast<std::size_t>(j)].name});
   }
   return draw({chart}, 1);
 }
@@ -107,8 +110,8 @@ void write_comparison_plots(const ComparedLog& log, const std::filesystem::path&
     VectorXd mean = VectorXd::Zero(log.t.size());
     for (Index j = 0; j < log.reference.cols(); ++j) {
       const VectorXd error = found->second.col(j) - log.reference.col(j);
-      mean += smoothed(error, log.t) * (100 / log.rated[static_cast<std::size_t>(j)] /
-                                        static_cast<double>(log.reference.cols()));
+      mean += smoothed(error, log.t) *
+              (100 / log.rated[static_cast<std::size_t>(j)] / static_cast<double>(log.reference.cols()));
     }
     errors.curves.push_back({log.t, mean, method.colour, 1.5, method.title});
   }

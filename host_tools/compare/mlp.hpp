@@ -24,14 +24,15 @@ class Mlp {
   /// Multiplications of one evaluation.
   Eigen::Index multiplications() const { return hidden_ * (mean_.size() + 1); }
   double judged() const { return judged_; }  ///< mean square error where it was stopped
+  /// What training minimises, at weights w (in the order of w_) on scaled rows, and its gradient.
+  double loss(const Eigen::VectorXd& w, const Eigen::MatrixXd& x, const Eigen::VectorXd& y,
+              Eigen::VectorXd& gradient) const;
 
  private:
   Eigen::MatrixXd scaled(const Eigen::MatrixXd& x) const;
   /// Hidden activations of scaled inputs.
   Eigen::MatrixXd hidden(const Eigen::VectorXd& w, const Eigen::MatrixXd& x) const;
   Eigen::VectorXd evaluate(const Eigen::VectorXd& w, const Eigen::MatrixXd& x) const;
-  double loss(const Eigen::VectorXd& w, const Eigen::MatrixXd& x, const Eigen::VectorXd& y,
-              Eigen::VectorXd& gradient) const;
 
   Eigen::Index hidden_;
   Eigen::RowVectorXd mean_, inverse_std_;

@@ -11,8 +11,8 @@
 #include <numbers>
 
 #include "host_tools/error.hpp"
-#include "host_tools/log/log_file.hpp"
 #include "host_tools/files.hpp"
+#include "host_tools/log/log_file.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/toml.hpp"
@@ -53,6 +53,27 @@ auto between(int lowest, int highest) {
     if (number > highest) value.place().fail(fmt::format("expected {} .. {}", lowest, highest));
     return number;
   };
+}
+
+constexpr const char* same_bytes = "the same content under another name";
+
+/// Whether the windows of two logs have a moment in common.
+bool share_time(const LogEntry& a, const LogEntry& b) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  return std::max(a.from_s.value_or(-infinity), b.from_s.value_or(-infinity)) <
+         std::min(a.to_s.value_or(infinity), b.to_s.value_or(infinity));
+}
+
+/// Files that are missing are complained of where they are read.
+bool same_content(const fs::path& a, const fs::path& b) {
+  std::error_code missing;
+  const auto size = fs::file_size(a, missing);
+  return !missing && size == fs::file_size(b, missing) && !missing && read_file(a) == read_file(b);
+}
+
+InputError overlap(const Project& project, const LogEntry& a, const LogEntry& b, const char* how) {
+  return InputError(fmt::format("{}:{}: overlaps the log in line {} ({}); separate them by from_s and to_s",
+                                project.file.string(), b.line, a.line, how));
 }
 
 class ProjectReader {
@@ -351,31 +372,17 @@ class ProjectReader {
     project_.logs.push_back(entry);
   }
 
-  /// Another name for the same data would let it judge what it has fitted.
-  static bool is_copy(const LogEntry& a, const LogEntry& b) {
-    if (a.scenario || b.scenario || a.file == b.file) return false;
-    std::error_code missing;  // complained of where the log is read
-    const auto size = fs::file_size(a.file, missing);
-    return !missing && size == fs::file_size(b.file, missing) && !missing && read_file(a.file) == read_file(b.file);
-  }
-
   void check_logs() const {
     const auto source = [](const LogEntry& e) {
       return e.scenario ? e.scenario->string() + "/" + e.scenario_log : fs::weakly_canonical(e.file).string();
     };
-    constexpr double infinity = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < project_.logs.size(); ++i) {
       for (std::size_t j = 0; j < i; ++j) {
         const LogEntry &a = project_.logs[j], &b = project_.logs[i];
-        const bool copy = is_copy(a, b);
-        if (source(a) != source(b) && !copy) continue;
-        const double from = std::max(a.from_s.value_or(-infinity), b.from_s.value_or(-infinity));
-        const double to = std::min(a.to_s.value_or(infinity), b.to_s.value_or(infinity));
-        if (from < to) {
-          throw InputError(fmt::format("{}:{}: overlaps the log in line {} ({}); separate them by from_s and to_s",
-                                       file_, b.line, a.line,
-                                       copy ? "the same content under another name" : "same file"));
-        }
+        if (!share_time(a, b)) continue;
+        if (source(a) == source(b)) throw overlap(project_, a, b, "same file");
+        // What a scenario makes is known once it was played: check_copies().
+        if (!a.scenario && !b.scenario && same_content(a.file, b.file)) throw overlap(project_, a, b, same_bytes);
       }
     }
   }
@@ -386,21 +393,40 @@ class ProjectReader {
   LogFormat default_format_;
 };
 
+/// Whether a scenario's log was made from what the scenario says now. Of the scenario and its URDF, not the time
+/// stamps: a checkout or a copy changes those.
+bool is_simulated(const LogEntry& entry, const fs::path& directory) {
+  const fs::path file = log_file(entry, directory), hash_file = file.parent_path() / "scenario.hash";
+  return fs::exists(file) && fs::exists(hash_file) && read_file(hash_file) == scenario_hash(*entry.scenario);
+}
+
 /// The log of a scenario; simulated where it is missing or older than the scenario.
 fs::path simulated(const LogEntry& entry, const Project& project, const fs::path& directory) {
   const fs::path file = log_file(entry, directory), folder = file.parent_path();
-  // Of the scenario and its URDF, not the time stamps: a checkout or a copy changes those.
-  const std::string hash = scenario_hash(*entry.scenario);
-  const fs::path hash_file = folder / "scenario.hash";
-  if (!fs::exists(file) || !fs::exists(hash_file) || read_file(hash_file) != hash) {
+  if (!is_simulated(entry, directory)) {
     simulate(*entry.scenario, folder);
-    write_file(hash_file, hash);
+    write_file(folder / "scenario.hash", scenario_hash(*entry.scenario));
   }
   if (!fs::exists(file)) {
     throw InputError(fmt::format("{}:{}: scenario {} has no log '{}'", project.file.string(), entry.line,
                                  entry.scenario->string(), entry.scenario_log));
   }
   return file;
+}
+
+/// Another name for the same data would let it judge what it has fitted: two logs of a scenario with the same seed and
+/// settings, or a scenario's log and a CSV that was made from it. Those that are not simulated yet come later.
+void check_copies(const Project& project, const fs::path& directory) {
+  const auto is_known = [&](const LogEntry& entry) { return !entry.scenario || is_simulated(entry, directory); };
+  for (std::size_t i = 0; i < project.logs.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      const LogEntry &a = project.logs[j], &b = project.logs[i];
+      const fs::path of_a = log_file(a, directory), of_b = log_file(b, directory);
+      const bool files = !a.scenario && !b.scenario, windows = a.scenario && b.scenario && of_a == of_b;
+      if (files || windows || !share_time(a, b) || !same_content(of_a, of_b)) continue;
+      if (is_known(a) && is_known(b)) throw overlap(project, a, b, same_bytes);
+    }
+  }
 }
 
 /// A joint with end stops can't turn far beyond them.
@@ -432,10 +458,15 @@ fs::path log_file(const LogEntry& entry, const fs::path& directory) {
 std::vector<Log> read_logs(const Project& project, Role role, const fs::path& directory) {
   std::vector<bool> revolute;
   for (const Joint& joint : project.robot.joints) revolute.push_back(joint.type == JointType::revolute);
+  std::vector<fs::path> files;  // all of them first: what one scenario makes may be a copy of another log
+  for (const LogEntry& entry : project.logs) {
+    if (entry.role == role) files.push_back(entry.scenario ? simulated(entry, project, directory) : entry.file);
+  }
+  check_copies(project, directory);
   std::vector<Log> logs;
   for (const LogEntry& entry : project.logs) {
     if (entry.role != role) continue;
-    const fs::path file = entry.scenario ? simulated(entry, project, directory) : entry.file;
+    const fs::path& file = files[logs.size()];
     logs.push_back(read_log(file, project.robot.size(), revolute, entry.format, entry.from_s, entry.to_s));
     logs.back().role = role;
     logs.back().load = entry.load;

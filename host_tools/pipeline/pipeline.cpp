@@ -39,19 +39,25 @@ constexpr Eigen::Index random_states = 20'000;
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-/// Settings of the grid that a swarm chooses itself. Sparse features have windows of nodes, which it does not.
-std::string unused_beside_swarm(const TrainSettings& settings) {
-  if (!settings.enabled || !settings.pso) return {};
-  const bool sparse = settings.features == "sparse";
-  std::string out;
-  const auto add = [&](bool given, const char* key) {
-    if (given) out += (out.empty() ? "" : ", ") + std::string(key);
+/// Settings of [train] that the others leave without effect, and why; empty: none. Sparse features have windows of
+/// nodes of their own, whatever searches.
+std::string unused_settings(const TrainSettings& settings) {
+  if (!settings.enabled) return {};
+  const bool sparse = settings.features == "sparse", swarm = settings.pso.has_value();
+  std::string names;
+  const auto add = [&](bool unused, const char* key) {
+    if (unused) names += (names.empty() ? "" : ", ") + std::string(key);
   };
-  add(settings.windows && !sparse, "windows");
-  add(settings.nodes && !sparse, "nodes");
-  add(settings.enhancement.has_value(), "enhancement");
-  add(settings.ridge.has_value(), "ridge");
-  return out;
+  const bool sized = swarm || settings.enhancement;
+  add(settings.windows && !sparse && (sized || !settings.nodes), "windows");
+  add(settings.nodes && !sparse && sized, "nodes");
+  add(settings.enhancement && swarm, "enhancement");
+  add(settings.ridge && swarm, "ridge");
+  if (names.empty()) return {};
+  return fmt::format("train.{}: not used, {}", names,
+                     swarm                  ? "the swarm of [train.pso] chooses within its bounds"
+                     : settings.enhancement ? "enhancement says how many nodes there are"
+                                            : "the number of nodes is searched; give nodes too to set it");
 }
 
 std::string weak_note(const std::vector<WeakParameter>& weak, const Robot& robot) {
@@ -282,9 +288,7 @@ void Pipeline::train() {
     }
   }
   data().notes = diagnosed.notes;
-  if (const std::string unused = unused_beside_swarm(settings); !unused.empty()) {
-    const std::string note =
-        fmt::format("train.{}: not used, the swarm of [train.pso] chooses within its bounds", unused);
+  if (const std::string note = unused_settings(settings); !note.empty()) {
     if (std::find(data().notes.begin(), data().notes.end(), note) == data().notes.end()) data().notes.push_back(note);
   }
   const KeptEffects kept(diagnosed, data().logs);
@@ -307,6 +311,8 @@ void Pipeline::train() {
   if (settings.enabled) {
     // The model holds the hashes of project and logs: all that the outcome depends on.
     resume.identity = hash_of(to_json(diagnosed).dump());
+    // Where the model is the outcome already, a run was stopped between writing it and removing the search.
+    if (settings.pso && diagnosed.stage == "trained") resume.drop_finished();
     const auto outcomes = fxdyn::train(fitter, settings, progress_, resume);
     for (std::size_t j = 0; j < outcomes.size(); ++j) {
       training.push_back({{"joint", project_.robot.joints[j].name},
@@ -315,7 +321,8 @@ void Pipeline::train() {
                           {"held_out_without", outcomes[j].error_without},
                           {"held_out_with", outcomes[j].error_with},
                           {"kept", outcomes[j].kept},
-                          {"evaluations", outcomes[j].evaluations}});
+                          {"evaluations", outcomes[j].evaluations},
+                          {"choice", choice_json(outcomes[j])}});
     }
   }
   progress_.stage("fit, standard deviations, possible bodies", 2);
@@ -357,9 +364,9 @@ void Pipeline::train() {
   json metrics = fit_metrics(fitter, estimate, stages);
   metrics["training"] = training;
   write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
-  fs::remove(resume.path);  // not before the outcome is about to be written: a search can take hours
   write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
   write_information(stored, read_model(directory_ / "model.json"), directory_);
+  fs::remove(resume.path);  // a search can take hours: not before its outcome is written
   note_seconds(directory_, "train", seconds_since(start));
 }
 

@@ -14,7 +14,7 @@ nlohmann::json made_from(const Project& project, const std::filesystem::path& di
 /// Whether all of that is in DIR as it was.
 bool is_unchanged(const nlohmann::json& made_from, const std::filesystem::path& directory);
 
-/// Wall time of the verbs that make DIR's model, in DIR/timing.json: the only file that differs from run to run.
+/// Wall time of the verbs that make DIR's model, in DIR/timing.json: it differs from run to run.
 void note_seconds(const std::filesystem::path& directory, const char* verb, double seconds);
 /// Of diagnose and train together; null where one of them is not known.
 nlohmann::json training_seconds(const std::filesystem::path& directory);

@@ -1,30 +1,25 @@
 #include "host_tools/train/train.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host_tools/error.hpp"
-#include "host_tools/files.hpp"
+#include "host_tools/model/broad_learning_types.hpp"
 #include "host_tools/parallel.hpp"
-#include "host_tools/train/swarm.hpp"
-#include "host_tools/train/tuning.hpp"
 
 namespace fxdyn {
 namespace {
-
-using nlohmann::json;
 
 constexpr double worth_keeping = 0.05;
 constexpr double nearly = 1.05;
 
 struct Choice {
-  JointFit design;
+  JointFit design;  ///< no BLS: none that was tried is quiet
   Judgement judgement;
-  int evaluations = 0;
+  BlsShape shape;
+  int generations = 0, evaluations = 0;
+  bool quiet = true;
 };
 
 /// Presliding distances to choose from, as shares of the joint's range; the state alone has none.
@@ -49,7 +44,6 @@ Choice by_grid(const Fitter& fitter, std::size_t j, const TrainSettings& setting
   const BlsDesigner design_of(fitter, j, settings);
   std::vector<Choice> tried;
   std::optional<std::size_t> best;
-  std::vector<double> distance_of;
   Choice out;
   const auto attempt = [&](const BlsShape& shape, const std::vector<Eigen::Index>& counts) {
     const JointFit largest = design_of(shape);
@@ -61,8 +55,10 @@ Choice by_grid(const Fitter& fitter, std::size_t j, const TrainSettings& setting
         ++out.evaluations;
         if (!is_quiet(judgement, design.rated_torque)) continue;
         design.bls->ridge = ridges[i];
-        tried.push_back({design, judgement});
-        distance_of.push_back(shape.distance);
+        BlsShape candidate = shape;
+        candidate.nodes = counts[s];
+        candidate.ridge = ridges[i];
+        tried.push_back({design, judgement, candidate});
         if (!best || judgement.rmse < tried[*best].judgement.rmse) best = tried.size() - 1;
       }
       progress.step();
@@ -73,7 +69,7 @@ Choice by_grid(const Fitter& fitter, std::size_t j, const TrainSettings& setting
   for (const double share : grid_distances(settings))
     attempt({.activation = settings.activation, .nodes = middling, .distance = share}, {middling});
   if (!best) return out;
-  const double distance = distance_of[*best];
+  const double distance = tried[*best].shape.distance;
   for (const double scale : grid_scales)
     attempt({.activation = settings.activation, .nodes = most, .scale = scale, .distance = distance}, sizes);
   // Of those that are nearly as good, the one with the smallest coefficients: it leans least on its training data.
@@ -86,43 +82,6 @@ Choice by_grid(const Fitter& fitter, std::size_t j, const TrainSettings& setting
   return out;
 }
 
-void save(const ResumeFile& file, const std::vector<Swarm>& swarms) {
-  json state = {
-      {"schema", "fxdyn.pso/1"}, {"identity", file.identity}, {"inputs", file.inputs}, {"swarms", json::array()}};
-  for (const Swarm& swarm : swarms) state["swarms"].push_back(swarm.to_json());
-  write_file(file.path, state.dump() + "\n");
-}
-
-DataError of_another(const ResumeFile& file) {
-  return DataError(fmt::format(
-      "{}: the generations in it are of another project, other logs or other settings; remove it to start anew",
-      file.path.string()));
-}
-
-/// Calls read(state) with what the file holds, if there is one.
-template <class Read>
-void with_state(const ResumeFile& file, Read&& read) {
-  if (!std::filesystem::exists(file.path)) return;
-  try {
-    const json state = json::parse(read_file(file.path));
-    if (state.at("schema") != "fxdyn.pso/1" || state.at("inputs") != file.inputs) throw of_another(file);
-    read(state);
-  } catch (const json::exception&) {
-    throw DataError(
-        fmt::format("{}: not a generation of a search, or cut off; remove it to start anew", file.path.string()));
-  } catch (const InputError&) {
-    throw of_another(file);
-  }
-}
-
-void load(const ResumeFile& file, std::vector<Swarm>& swarms) {
-  with_state(file, [&](const json& state) {
-    if (state.at("identity") != file.identity || state.at("swarms").size() != swarms.size()) throw of_another(file);
-    for (std::size_t j = 0; j < swarms.size(); ++j) swarms[j].from_json(state["swarms"][j]);
-  });
-}
-
-/// All joints, generation by generation: with few joints left the particles still fill all cores.
 std::vector<Choice> by_swarm(const Fitter& fitter, const TrainSettings& settings, Progress& progress,
                              const std::optional<ResumeFile>& resume) {
   const std::size_t n = fitter.joints();
@@ -130,50 +89,46 @@ std::vector<Choice> by_swarm(const Fitter& fitter, const TrainSettings& settings
   std::vector<Swarm> swarms;
   std::vector<BlsFitness> fitness;
   for (std::size_t j = 0; j < n; ++j) {
+    fitness.emplace_back(fitter, j, settings);
     SwarmSettings swarm;
     swarm.particles = pso.particles;
     swarm.iterations = pso.iterations;
     swarm.stall = pso.stall;
     swarm.seed = settings.seed * 1000 + j;
-    fitness.emplace_back(fitter, j, settings);
     swarms.emplace_back(fitness[j].space().lower(), fitness[j].space().upper(), swarm);
   }
-  if (resume) load(*resume, swarms);
-  const auto particles = static_cast<std::size_t>(pso.particles);
-  for (const Swarm& swarm : swarms) {
-    for (int k = 0; k < swarm.generation(); ++k) progress.step();
-  }
-  for (;;) {
-    std::vector<std::size_t> busy;
-    for (std::size_t j = 0; j < n; ++j) {
-      if (!swarms[j].finished()) busy.push_back(j);
-    }
-    if (busy.empty()) break;
-    std::vector<Eigen::VectorXd> values(n, Eigen::VectorXd(pso.particles));
-    parallel_for(busy.size() * particles, [&](std::size_t i) {
-      const std::size_t j = busy[i / particles];
-      const auto p = static_cast<Eigen::Index>(i % particles);
-      values[j][p] = fitness[j](swarms[j].positions().col(p)).value;
-    });
-    for (const std::size_t j : busy) {
-      swarms[j].tell(values[j]);
-      progress.step();
-    }
-    if (resume) save(*resume, swarms);
-  }
+  search(
+      swarms, [&](std::size_t j, const Eigen::VectorXd& x) { return fitness[j](x).value; }, progress, resume);
   std::vector<Choice> chosen(n);
   parallel_for(n, [&](std::size_t j) {
     BlsFitness::Outcome best = fitness[j](swarms[j].best());
-    if (!best.quiet) best.design.bls.reset();
-    chosen[j] = {std::move(best.design), std::move(best.judgement), swarms[j].generation() * pso.particles};
+    const int generations = swarms[j].generation();
+    chosen[j] = {std::move(best.design),
+                 std::move(best.judgement),
+                 best.shape,
+                 generations,
+                 generations * pso.particles,
+                 best.quiet};
   });
   return chosen;
 }
 
 }  // namespace
 
-void ResumeFile::check_inputs() const {
-  with_state(*this, [](const json&) {});
+nlohmann::json choice_json(const TrainOutcome& outcome) {
+  if (!outcome.bls) return nullptr;
+  nlohmann::json out = {{"by", outcome.by},
+                        {"nodes", outcome.shape.nodes},
+                        {"windows", outcome.shape.windows},
+                        {"activation", outcome.shape.activation},
+                        {"inputs", outcome.bls->inputs},
+                        {"ridge", outcome.shape.ridge},
+                        {"scale", outcome.shape.scale},
+                        {"reference_velocity", outcome.bls->reference_velocity},
+                        {"J", outcome.value}};
+  if (outcome.bls->inputs != StateInputs::name) out["distances"] = outcome.bls->distances;
+  if (outcome.by == "pso") out["generations"] = outcome.generations;
+  return out;
 }
 
 std::vector<TrainOutcome> train(Fitter& fitter, const TrainSettings& settings, Progress& progress,
@@ -191,9 +146,18 @@ std::vector<TrainOutcome> train(Fitter& fitter, const TrainSettings& settings, P
   }
   std::vector<TrainOutcome> outcomes(n);
   for (std::size_t j = 0; j < n; ++j) {
-    const bool kept = chosen[j].design.bls && chosen[j].judgement.beats(without[j], worth_keeping);
-    outcomes[j] = {without[j].rmse, chosen[j].judgement.rmse, kept, chosen[j].evaluations};
-    if (kept) fitter.set_design(j, chosen[j].design);
+    const Choice& choice = chosen[j];
+    const bool kept = choice.design.bls && choice.quiet && choice.judgement.beats(without[j], worth_keeping);
+    outcomes[j] = {.error_without = without[j].rmse,
+                   .error_with = choice.judgement.rmse,
+                   .kept = kept,
+                   .by = settings.pso ? "pso" : "grid",
+                   .generations = choice.generations,
+                   .evaluations = choice.evaluations,
+                   .shape = choice.shape,
+                   .value = choice.design.bls ? fitness_of(choice.judgement, choice.design) : 0,
+                   .bls = choice.design.bls};
+    if (kept) fitter.set_design(j, choice.design);
   }
   progress.done();
   return outcomes;

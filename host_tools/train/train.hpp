@@ -1,11 +1,14 @@
 #pragma once
 
-#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "host_tools/identify/fitter.hpp"
 #include "host_tools/progress.hpp"
+#include "host_tools/train/search.hpp"
+#include "host_tools/train/tuning.hpp"
 
 namespace fxdyn {
 
@@ -13,18 +16,16 @@ namespace fxdyn {
 struct TrainOutcome {
   double error_without = 0, error_with = 0;  ///< held-out RMS of the residual [N*m | N]
   bool kept = false;
+  std::string by;       ///< what chose: pso or grid
+  int generations = 0;  ///< of the swarm; grid: 0
   int evaluations = 0;
+  BlsShape shape;                       ///< what was chosen, kept or not
+  double value = 0;                     ///< its J, see train() [of rated torque]
+  std::optional<BroadLearningFit> bls;  ///< the same as scales and weights; none: no candidate was quiet enough
 };
 
-/// Where a search by swarm keeps its last generation, so that a killed run goes on from there. Whoever has written the
-/// outcome down removes it.
-struct ResumeFile {
-  std::filesystem::path path;
-  std::string identity;  ///< of everything that the outcome depends on
-  std::string inputs;    ///< of project and logs, which are known before the work starts
-  /// @throws DataError: there is one, of other inputs
-  void check_inputs() const;
-};
+/// The choice for metrics.json; null where there is none.
+nlohmann::json choice_json(const TrainOutcome& outcome);
 
 /// Fits a BLS on every joint together with the structure (joint least squares, ridge on the BLS's coefficients),
 /// chooses its hyperparameters by the held-out error, and keeps it only where that falls by at least 5 %. The fitter

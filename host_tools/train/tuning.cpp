@@ -142,6 +142,14 @@ bool is_quiet(const Judgement& judgement, double rated_torque) {
   return judgement.coefficient_sum <= largest_sum * rated_torque;
 }
 
+double fitness_of(const Judgement& judgement, const JointFit& design) {
+  const double rated = design.rated_torque;
+  const auto products = static_cast<double>(multiplications(*design.bls));
+  const double value =
+      (judgement.rmse + node_rounding * judgement.coefficient_sum) / rated + price_of_multiplication * products;
+  return is_quiet(judgement, rated) ? value : price_of_noise * value;
+}
+
 BlsFitness::BlsFitness(const Fitter& fitter, std::size_t joint, const TrainSettings& settings)
     : fitter_(&fitter),
       joint_(joint),
@@ -150,14 +158,11 @@ BlsFitness::BlsFitness(const Fitter& fitter, std::size_t joint, const TrainSetti
 
 BlsFitness::Outcome BlsFitness::operator()(const Eigen::VectorXd& x) const {
   Outcome out;
-  out.design = design_of_(space_(x));
+  out.shape = space_(x);
+  out.design = design_of_(out.shape);
   out.judgement = fitter_->held_out_with(joint_, out.design, {out.design.bls->ridge})[0];
-  const double rated = out.design.rated_torque;
-  const auto products = static_cast<double>(multiplications(*out.design.bls));
-  out.quiet = is_quiet(out.judgement, rated);
-  out.value = (out.judgement.rmse + node_rounding * out.judgement.coefficient_sum) / rated +
-              price_of_multiplication * products;
-  if (!out.quiet) out.value *= price_of_noise;
+  out.quiet = is_quiet(out.judgement, out.design.rated_torque);
+  out.value = fitness_of(out.judgement, out.design);
   return out;
 }
 

@@ -64,13 +64,17 @@ class BlsSpace {
 /// Whether fixed point can hold the coefficients: sums of |c| above so many times rated torque would show.
 bool is_quiet(const Judgement& judgement, double rated_torque);
 
-/// What a search of one joint's BLS minimises over BlsSpace: J of train(), ten times that where the coefficients are
-/// not quiet. The fitter must outlive it; any number of threads may ask at once.
+/// J of train(), ten times that where the coefficients are not quiet [of rated torque].
+double fitness_of(const Judgement& judgement, const JointFit& design);
+
+/// What a search of one joint's BLS minimises over BlsSpace: fitness_of(). The fitter must outlive it; any number of
+/// threads may ask at once.
 class BlsFitness {
  public:
   BlsFitness(const Fitter& fitter, std::size_t joint, const TrainSettings& settings);
   const BlsSpace& space() const { return space_; }
   struct Outcome {
+    BlsShape shape;
     JointFit design;
     Judgement judgement;
     bool quiet = false;

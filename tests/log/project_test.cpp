@@ -140,13 +140,16 @@ inputs = "state"
 windows = 2
 nodes = 10
 enhancement = 20
-activation = "tanh"
+activation = "sigmoid"
+features = "sparse"
+wavenumber = 2.5
 ridge = 1e-3
 [train.pso]
-particles = 30
-iterations = 40
-stall = 10
-bounds = { nodes = [5, 40], ridge = [1e-4, 1e-1] }
+particles = 12
+iterations = 20
+stall = 6
+activations = ["tanh", "relu"]
+bounds = { nodes = [5, 30], windows = [2, 3], ridge = [1e-3, 1e-2] }
 [excite]
 period_s = 10.0
 order = 5
@@ -186,6 +189,22 @@ joints = "all"
   EXPECT_FALSE(project.train.enabled);
   EXPECT_EQ(project.train.seed, 7U);
   EXPECT_EQ(*project.train.ridge, 1e-3);
+  EXPECT_EQ(project.train.inputs, "state");
+  EXPECT_EQ(*project.train.windows, 2);
+  EXPECT_EQ(*project.train.nodes, 10);
+  EXPECT_EQ(*project.train.enhancement, 20);
+  EXPECT_EQ(project.train.activation, "sigmoid");
+  EXPECT_EQ(project.train.features, "sparse");
+  EXPECT_EQ(*project.train.wavenumber, 2.5);
+  ASSERT_TRUE(project.train.pso.has_value());
+  const PsoSettings& pso = *project.train.pso;
+  EXPECT_EQ(pso.particles, 12);
+  EXPECT_EQ(pso.iterations, 20);
+  EXPECT_EQ(pso.stall, 6);
+  EXPECT_EQ(pso.activations, (std::vector<std::string>{"tanh", "relu"}));
+  EXPECT_EQ(pso.nodes, (std::array{5.0, 30.0}));
+  EXPECT_EQ(pso.windows, (std::array{2.0, 3.0}));
+  EXPECT_EQ(pso.ridge, (std::array{1e-3, 1e-2}));
   EXPECT_EQ(project.target.board, "stm32g474");
 }
 
@@ -231,6 +250,60 @@ TEST(Project, ALogOfTheSameScenarioIsNotSimulatedAgain) {
   test::write("out/logs/s/scenario.hash", scenario_hash(file.parent_path() / "s.toml"));
   const Project project = read_project(file);
   EXPECT_EQ(read_logs(project, Role::train, directory).at(0).samples(), 100);
+}
+
+/// A scenario of one log for each name, all with the same motion but where a name has another seed.
+void write_scenario(const std::string& name, const std::vector<std::pair<std::string, int>>& logs) {
+  write("swing.urdf",
+        "<robot name=\"swing\"><link name=\"base\"/><link name=\"rod\"><inertial><origin xyz=\"0.2 0 0\"/>"
+        "<mass value=\"2\"/><inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" iyy=\"0.02\" iyz=\"0\" izz=\"0.02\"/>"
+        "</inertial></link><joint name=\"pivot\" type=\"revolute\"><parent link=\"base\"/><child link=\"rod\"/>"
+        "<axis xyz=\"0 1 0\"/><limit lower=\"-2\" upper=\"2\" velocity=\"2\" effort=\"20\"/></joint></robot>");
+  std::string text =
+      "seed = 1\n[sensors]\ntorque_noise = 0.01\n[robot]\nurdf = \"swing.urdf\"\nrated_torque = [20]\n"
+      "acceleration = [8]\n";
+  for (const auto& [name_of, seed] : logs)
+    text += "[[log]]\nname = \"" + name_of + "\"\nduration_s = 4\nperiod_s = 4\nseed = " + std::to_string(seed) + "\n";
+  write(name, text);
+}
+
+std::string scenario_log(const char* scenario, const char* name, const char* role) {
+  return std::string("[[log]]\nscenario = \"") + scenario + "\"\nlog = \"" + name + "\"\nrole = \"" + role + "\"\n";
+}
+
+TEST(Project, TheSameDataMayNotTrainAndValidateUnderTwoNamesOfAScenario) {
+  const std::string swing = "[robot]\nurdf = \"swing.urdf\"\n";
+  const auto out = test::folder() / "copies";
+  write_scenario("twice.toml", {{"a", 5}, {"b", 5}, {"c", 6}});
+  const auto expect_copy = [&](const std::filesystem::path& file) {
+    test::expect_refused(file, {":7:", "overlaps the log in line 3", "same content under another name"}, [&] {
+      const Project project = read_project(file);
+      read_logs(project, Role::train, out);
+      read_logs(project, Role::validate, out);
+    });
+  };
+  // The same seed and settings.
+  expect_copy(write("same_seed.toml",
+                    swing + scenario_log("twice.toml", "a", "train") + scenario_log("twice.toml", "b", "validate")));
+  // What was simulated, beside the scenario that it is from.
+  std::filesystem::create_directories(test::folder() / "played");
+  simulate(test::folder() / "twice.toml", test::folder() / "played");
+  expect_copy(write("csv_beside.toml", swing + scenario_log("twice.toml", "a", "train") +
+                                           "[[log]]\nfile = \"played/b.csv\"\nrole = \"validate\"\n"));
+  // A copy of the scenario under another name.
+  write_scenario("again.toml", {{"other", 5}});
+  expect_copy(write("two_scenarios.toml", swing + scenario_log("twice.toml", "a", "train") +
+                                              scenario_log("again.toml", "other", "validate")));
+  // That log anew with another motion, and the project is a good one.
+  write_scenario("again.toml", {{"other", 7}});
+  const Project good = read_project(test::folder() / "two_scenarios.toml");
+  EXPECT_EQ(read_logs(good, Role::train, out).size(), 1U);
+  EXPECT_EQ(read_logs(good, Role::validate, out).size(), 1U);
+  // Windows of one log that do not overlap are no copies.
+  const Project windows =
+      read_project(write("windows.toml", swing + scenario_log("twice.toml", "a", "train") + "to_s = 2\n" +
+                                             scenario_log("twice.toml", "a", "validate") + "from_s = 2\n"));
+  EXPECT_EQ(read_logs(windows, Role::train, out).size(), 1U);
 }
 
 }  // namespace

@@ -60,6 +60,14 @@ wait $! 2>/dev/null
 cp killed/train.pso.json generation.json
 "$fxdyn" train arm.project --out killed >killed.txt 2>&1 || fail "going on: $(tail -1 killed.txt)"
 cmp -s whole/model.json killed/model.json || fail "a killed run ends elsewhere"
+cmp -s whole/metrics.json killed/metrics.json || fail "a killed run has other figures"
+# Killed between the model and the end of the search: the model is the outcome, the search is done with.
+sed 's/"generation":[0-9]*/"generation":6/g; s/"finished":false/"finished":true/' generation.json >killed/train.pso.json
+"$fxdyn" train arm.project --out killed >killed.txt 2>&1 || fail "a search that was written down: $(tail -1 killed.txt)"
+[ -e killed/train.pso.json ] && fail "a search that was written down is still there"
+cp generation.json killed/train.pso.json
+"$fxdyn" train arm.project --out killed >killed.txt 2>&1
+[ $? -eq 1 ] && tail -1 killed.txt | grep -q 'another project' || fail "an unfinished search of another model: $(tail -1 killed.txt)"
 
 project other.project 2
 "$fxdyn" diagnose other.project --out other >other.txt 2>&1 || fail "diagnose other"
@@ -82,11 +90,52 @@ sed 's/^\[train\]/[train]\nnodes = 7/' arm.project >fixed.project
 "$fxdyn" train fixed.project --out fixed >fixed.txt 2>&1 || fail "nodes beside a swarm: $(tail -1 fixed.txt)"
 grep -q 'train.nodes: not used' fixed/model.json || fail "nodes beside a swarm: no note"
 
-"$fxdyn" compare arm.project --out compared >compared.txt 2>&1 || fail "compare: $(tail -1 compared.txt)"
-for method in rigid_ls friction_ls rls mlp bls_default bls_pso bls_pso_physical lugre named_bls oracle noise_floor; do
-  grep -q "\"name\": \"$method\"" compared/compare.json || fail "compare: no $method"
+sed 's/^\[train\]/[train]\nwindows = 3/; /^\[train.pso\]/,$d' arm.project >windows.project
+"$fxdyn" train windows.project --out windows >windows.txt 2>&1 || fail "windows alone: $(tail -1 windows.txt)"
+grep -q 'train.windows: not used' windows/model.json || fail "windows without nodes: no note"
+
+"$fxdyn" compare arm.project --out begun >begun.txt 2>&1 &
+for _ in $(seq 6000); do
+  [ -e begun/compare.bls_pso_physical.pso.json ] && break
+  sleep 0.01
 done
-grep -q '"against": "truth"' compared/compare.json || fail "compare: not against the truth"
+kill -9 $! 2>/dev/null
+wait $! 2>/dev/null
+[ -e begun/compare.bls_pso.pso.json ] && [ -e begun/compare.bls_pso_physical.pso.json ] || fail "compare: nothing to go on from"
+[ -e begun/compare.json ] && fail "compare: was done before it was killed"
+"$fxdyn" compare arm.project --out compared >compared.txt 2>&1 || fail "compare: $(tail -1 compared.txt)"
+cp begun/compare.bls_pso.pso.json generation.json
+"$fxdyn" compare arm.project --out begun >begun.txt 2>&1 || fail "compare, going on: $(tail -1 begun.txt)"
+ls begun/*.pso.json >/dev/null 2>&1 && fail "compare: searches that are done leave their generations"
+cp -r other others
+cp generation.json others/compare.bls_pso.pso.json
+"$fxdyn" compare other.project --out others >others.txt 2>&1
+[ $? -eq 1 ] && tail -1 others.txt | grep -q 'another project' || fail "compare: generations of another project: $(tail -1 others.txt)"
+python3 - <<'PYTHON' || fail "compare.json"
+import json
+
+whole, begun = (json.load(open(f"{name}/compare.json")) for name in ("compared", "begun"))
+names = "rigid_ls friction_ls rls mlp bls_default bls_pso bls_pso_physical lugre named_bls oracle noise_floor".split()
+assert whole["against"] == "truth"
+assert [m["name"] for m in whole["methods"]] == names
+methods = {m["name"]: m for m in whole["methods"]}
+for name, method in methods.items():
+    for key in ("rmse", "percent_rated", "peak"):
+        assert len(method[key]) == 2 and all(value > 0 for value in method[key]), (name, key, method)
+    assert all(peak > rmse for peak, rmse in zip(method["peak"], method["rmse"])), method
+    assert abs(method["mean_percent_rated"] - sum(method["percent_rated"]) / 2) < 1e-12, method
+    # What could go into firmware has been there.
+    fixed = name in ("rigid_ls", "friction_ls", "rls", "bls_pso_physical", "lugre", "named_bls")
+    assert (method["fixed_error"] is not None) == fixed, method
+    assert not fixed or 0 < method["fixed_error"] < 1e-3, method
+error = {name: method["mean_percent_rated"] for name, method in methods.items()}
+print(error)
+assert error["bls_pso_physical"] <= 0.5 * error["mlp"]
+assert error["bls_pso_physical"] <= 0.25 * error["rls"]
+for name, method in ((m["name"], m) for m in begun["methods"]):
+    assert method["rmse"] == methods[name]["rmse"], name
+    assert (method["train_s"] is None) == (name in ("bls_pso", "bls_pso_physical")), (name, method["train_s"])
+PYTHON
 "$fxdyn" report arm.project --out compared >report.txt 2>&1 || fail "report: $(tail -1 report.txt)"
 grep -q 'Methods compared' compared/report.html || fail "the report lacks the comparison"
 sed -i '$d' compared/logs/arm/c.csv

@@ -1,0 +1,90 @@
+#include "host_tools/compare/state_bls.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "host_tools/random.hpp"
+#include "host_tools/train/ridge.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+MatrixXd states(Index rows, std::uint64_t seed) {
+  Random random(seed);
+  return MatrixXd::NullaryExpr(rows, 3, [&] { return random.uniform(-2, 2); });
+}
+
+StateBlsShape shape_of(const char* activation) {
+  StateBlsShape shape;
+  shape.windows = 2;
+  shape.nodes = 3;
+  shape.enhancement = 7;
+  shape.activation = activation;
+  return shape;
+}
+
+TEST(StateBls, FeaturesAreLinearAndNodesAreTheirActivation) {
+  const MatrixXd x = states(50, 1);
+  const MatrixXd tanh = StateBls(shape_of("tanh"), x, 3).columns(x);
+  ASSERT_EQ(tanh.cols(), 2 * 3 + 7);
+  // Features: affine in x, so their second differences along a line vanish.
+  MatrixXd line(3, 3);
+  line << 0, 0, 0, 1, -1, 2, 2, -2, 4;
+  const MatrixXd z = StateBls(shape_of("tanh"), x, 3).columns(line).leftCols(6);
+  EXPECT_LT((z.row(0) - 2 * z.row(1) + z.row(2)).cwiseAbs().maxCoeff(), 1e-12);
+  // The same seed draws the same weights, so that the activations can be compared.
+  const MatrixXd argument = tanh.rightCols(7).array().atanh();
+  const MatrixXd sigmoid = StateBls(shape_of("sigmoid"), x, 3).columns(x),
+                 relu = StateBls(shape_of("relu"), x, 3).columns(x), sine = StateBls(shape_of("sine"), x, 3).columns(x);
+  for (Index r = 0; r < 50; ++r) {
+    for (Index k = 0; k < 7; ++k) {
+      const double a = argument(r, k);
+      if (std::fabs(a) > 8) continue;  // tanh tells nothing there
+      EXPECT_NEAR(sigmoid(r, 6 + k), 1 / (1 + std::exp(-a)), 1e-6);
+      EXPECT_NEAR(relu(r, 6 + k), std::max(0.0, a), 1e-6);
+      EXPECT_NEAR(sine(r, 6 + k), std::sin(a), 1e-6);
+    }
+  }
+}
+
+TEST(StateBls, LearnsAFunctionOfTheStateAndNotOneOfThePast) {
+  const MatrixXd train = states(2000, 4), test = states(500, 5);
+  StateBlsShape shape;
+  shape.enhancement = 80;
+  const StateBls net(shape, train, 1);
+  const auto error_of = [&](auto&& function) {
+    Moments moments(net.columns(train).cols());
+    moments.add(net.columns(train), function(train));
+    GrowingRidge ridge(moments, 1e-6);
+    const VectorXd expected = function(test), w = ridge.solve(moments.gram.rows());
+    return (net.columns(test) * w - expected).norm() / (expected.array() - expected.mean()).matrix().norm();
+  };
+  EXPECT_LT(error_of([](const MatrixXd& x) { return VectorXd(x.col(1).array().sin() + 0.2 * x.col(0).array()); }),
+            0.05);
+  // What the rows before say: nothing of it is in x.
+  EXPECT_GT(error_of([](const MatrixXd& x) {
+              VectorXd y(x.rows());
+              y << 0, x.col(0).head(x.rows() - 1);
+              return y;
+            }),
+            0.9);
+}
+
+TEST(StateBls, MultiplicationsAreThoseWithTheFeaturesFoldedIn) {
+  const MatrixXd x = states(50, 1);
+  const StateBls net(shape_of("tanh"), x, 3);
+  EXPECT_EQ(net.multiplications(), 3 * 7 + 7 + 3);
+  // Folded: the columns are an affine map of x, and nodes on one.
+  const MatrixXd z = net.columns(x).leftCols(6);
+  MatrixXd affine(50, 4);
+  affine << x, VectorXd::Ones(50);
+  EXPECT_LT((affine * affine.householderQr().solve(z) - z).norm(), 1e-10 * z.norm());
+}
+
+}  // namespace
+}  // namespace fxdyn
