@@ -78,8 +78,15 @@ ended_by_TERM() {
   sleep 0.5
   ! grep -q ' 181#' bus.log || fail "SIGTERM: torques still go out"
 }
-# The node misses the host: EMCY 0x8130, and 127 is who it misses.
-ended_by_KILL() { heard 60 '081#3081117F00.*' || fail "SIGKILL: the node does not miss its host: $(tail -n 3 bus.log)"; }
+# The node misses the host: EMCY 0x8130, and 127 is who it misses. SYNC is not overdue yet, and the torque goes to zero all the same.
+ended_by_KILL() {
+  heard 60 '081#3081117F00.*' || fail "SIGKILL: the node does not miss its host: $(tail -n 3 bus.log)"
+  for _ in $(seq 20); do
+    cansend vcan0 601#4011210100000000
+    ! heard 1 '581#4311210100000000' || return 0
+  done
+  fail "SIGKILL: the torque does not go to zero: $(grep ' 581#' bus.log | tail -n 1)"
+}
 
 trap 'kill $(jobs -p) 2>/dev/null || true' EXIT
 step "bad interfaces, nobody there"
