@@ -14,6 +14,8 @@ fail() {
 }
 
 cp "$arm"/* .
+# gears whose links are measured: the model knows how they bend
+sed -i 's/^encoder_bits = .*/&\nlink_encoders = "all"/' arm.toml
 "$fxdyn" vibration arm.project --out loop >loop.txt 2>&1 || fail "vibration: $(tail -1 loop.txt)"
 python3 - <<'PYTHON' || fail "$(cat loop.txt)"
 import json, sys
@@ -27,6 +29,19 @@ assert model["tracking_motor"] <= 0.5 * rigid["tracking_motor"]
 assert model["residual"] < none["residual"]
 assert model["tracking_motor"] < wrong["tracking_motor"] < none["tracking_motor"]
 assert result["fixed_against_double"]["error_change"] < 0.01
+# motors ahead by what the gears bend: now the links follow, too
+elastic, off = rows["model_elastic", "fixed", "none"], rows["model_elastic", "fixed", "-20 %"]
+print(elastic, off)
+assert elastic["tracking_link"] <= 0.2 * none["tracking_link"]
+assert elastic["tracking_link"] <= 0.5 * rigid["tracking_link"]
+assert elastic["tracking_motor"] <= 0.2 * none["tracking_motor"]
+assert elastic["residual"] <= 0.5 * none["residual"]
+assert elastic["tracking_link"] < off["tracking_link"] < none["tracking_link"]
+assert result["fixed_against_double"]["model_elastic"]["error_change"] < 0.01
+for m in result["methods"]:
+    assert m["reference"] == ("motor" if m["feedforward"] == "model_elastic" else "link"), m
+    ratio = m["moves"]["all"]["tracking_link"] / rigid["tracking_link"]
+    assert abs(m["ratios"]["rigid"]["tracking_link"] - ratio) < 1e-9, m
 PYTHON
 
 "$fxdyn" efficiency arm.project --out data >data.txt 2>&1 || fail "efficiency: $(tail -1 data.txt)"
