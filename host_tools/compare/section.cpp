@@ -123,6 +123,7 @@ std::string vibration_section(const json& vibration) {
     Table table({{"feedforward"},
                  {"computed in"},
                  {"parameters off"},
+                 {"reference of"},
                  {"motor [mrad]", "n"},
                  {"link [mrad]", "n"},
                  {"residual [mrad]", "n"},
@@ -133,6 +134,7 @@ std::string vibration_section(const json& vibration) {
       table.add({{method.at("feedforward").get<std::string>()},
                  {method.at("numbers").get<std::string>()},
                  {method.at("parameters_off").get<std::string>()},
+                 {method.value("reference", "link")},
                  number(move.at("tracking_motor"), 3),
                  number(move.at("tracking_link"), 3),
                  number(move.at("residual"), 3),
@@ -141,8 +143,33 @@ std::string vibration_section(const json& vibration) {
     }
     out += subsection(std::string("Moves: ") + kind) + table.html();
   }
+  Table ratios({{"feedforward"},
+                {"computed in"},
+                {"parameters off"},
+                {"motor / PD alone", "n"},
+                {"link / PD alone", "n"},
+                {"residual / PD alone", "n"},
+                {"motor / rigid", "n"},
+                {"link / rigid", "n"}});
+  for (const json& method : vibration.at("methods")) {
+    const auto ratio = [&](const char* base, const char* key) {
+      const json::json_pointer at(fmt::format("/ratios/{}/{}", base, key));
+      return method.contains(at) ? number(method.at(at), 3) : Cell{"-", "n"};
+    };
+    ratios.add({{method.at("feedforward").get<std::string>()},
+                {method.at("numbers").get<std::string>()},
+                {method.at("parameters_off").get<std::string>()},
+                ratio("none", "tracking_motor"),
+                ratio("none", "tracking_link"),
+                ratio("none", "residual"),
+                ratio("rigid", "tracking_motor"),
+                ratio("rigid", "tracking_link")});
+  }
+  out += subsection("All moves, against the PD alone and the rigid body") + ratios.html();
   return out + paragraph(
-                   "Motor, link: RMS of the position error while it moves. Residual: how far a link is from where it "
+                   "Motor, link: RMS of the position error while it moves, the motor's against what it was asked for, "
+                   "the link's against the links' reference. With the motors' reference they are asked to be ahead by "
+                   "what the model says that the gears bend. Residual: how far a link is from where it "
                    "comes to rest, "
                    "at most, after the stop, mean over the joints. Settling: until every link stays within a quarter "
                    "of what it is "

@@ -17,6 +17,7 @@
 #include "host_tools/random.hpp"
 #include "host_tools/simulate/mujoco_plant.hpp"
 #include "host_tools/simulate/scenario.hpp"
+#include "host_tools/vibration/motor_reference.hpp"
 #include "host_tools/vibration/moves.hpp"
 #include "model/catalogue.hpp"
 
@@ -34,6 +35,8 @@ constexpr std::array<double, 8> bandwidths{4, 8, 16, 24, 32, 48, 64, 96};  // Hz
 constexpr std::array<double, 5> dampings{0.3, 0.5, 0.7, 1, 1.4};
 constexpr double encoder_step = 2 * std::numbers::pi / (1 << 22);
 constexpr double still = 0.25;  ///< of the residual of the PD alone
+/// Feedforward "model" at the model's motor_reference().
+constexpr const char* elastic = "model_elastic";
 constexpr std::uint64_t tuning_moves = 1, judged_moves = 2;
 
 /// What one move comes to.
@@ -43,6 +46,13 @@ struct Outcome {
   double residual = 0;         ///< [rad | m]
   double settling_s = 0, roughness = 0;
   MatrixXd q;  ///< of the motors
+};
+
+/// One row of the result.
+struct Method {
+  std::string name, numbers, off;          ///< feedforward, computed in, parameters off
+  const IdentifiedModel* model = nullptr;  ///< none: PD alone
+  bool motor_side = false;                 ///< the motors' reference is the model's, not the links'
 };
 
 class Experiment {
@@ -56,23 +66,30 @@ class Experiment {
     ClosedLoopSettings settings = loop(control.at("bandwidth_hz"), control.at("damping"));
     band_ = control.at("settling_band");
     settings.drive = drive.torque;
+    std::vector<Method> driven{{"model", "drive", "none", &model_}};
+    if (bends(model_)) driven.push_back({elastic, "drive", "none", &model_, true});
     std::vector<Move> moves = make_moves(model_, model_.tick_s, judged_moves);
-    if (drive.most_moves > 0 && drive.most_moves < moves.size())
-      moves.erase(moves.begin() + static_cast<std::ptrdiff_t>(drive.most_moves), moves.end());
-    progress_.stage("vibration: the drive in the loop", moves.size());
-    std::vector<Outcome> outcomes;
-    for (const Move& move : moves) {
-      drive.begin(move.reference);
-      outcomes.push_back(play(move, {}, settings));
-      progress_.step();
-    }
-    progress_.done();
+    const bool all = drive.most_moves == 0 || drive.most_moves >= moves.size();
+    if (!all) moves.erase(moves.begin() + static_cast<std::ptrdiff_t>(drive.most_moves), moves.end());
+    progress_.stage("vibration: the drive in the loop", moves.size() * driven.size());
     json methods = json::array();
     for (const json& method : known.at("methods")) {
-      const bool beside = method.at("feedforward") == "none" || method.at("feedforward") == "model";
+      const std::string name = method.at("feedforward");
+      const bool beside = name == "none" || name == "model" || name == elastic;
       if (beside && method.at("parameters_off") == "none") methods.push_back(method);
     }
-    methods.push_back(summary("model", "drive", "none", moves, outcomes));
+    for (const Method& method : driven) {
+      std::vector<Outcome> outcomes;
+      for (const Move& move : moves) {
+        const Reference asked = asked_of(method, move);
+        drive.begin(asked);
+        outcomes.push_back(play(move, asked, {}, settings));
+        progress_.step();
+      }
+      methods.push_back(summary(method, moves, outcomes));
+      if (all) add_ratios(methods.back(), known.at("methods"));  // means over the same moves
+    }
+    progress_.done();
     return {{"schema", "fxdyn.vibration/1"}, {"control", control}, {"methods", methods}};
   }
 
@@ -80,10 +97,11 @@ class Experiment {
     tune();
     const std::vector<Move> moves = make_moves(model_, model_.tick_s, judged_moves);
     json methods = json::array();
-    progress_.stage("vibration: feedforward in the loop", moves.size() * 13);
+    const bool bent = bends(model_);
+    progress_.stage("vibration: feedforward in the loop", moves.size() * (bent ? 19 : 13));
     const auto add = [&](const std::string& name, const std::string& numbers, const std::string& error,
                          const IdentifiedModel* model) {
-      methods.push_back(judge(name, numbers, error, model, moves));
+      methods.push_back(judge({name, numbers, error, model, name == elastic}, moves));
     };
     GateData data = read_gate_data(pipeline_.project(), pipeline_.directory());
     Progress quiet;
@@ -95,25 +113,33 @@ class Experiment {
     add("friction", "fixed", "none", &friction);
     add("model", "fixed", "none", &model_);
     add("model", "real", "none", &model_);
-    compare_numbers(moves);
+    json numbers = compare_numbers(moves, false);
+    if (bent) {
+      add(elastic, "fixed", "none", &model_);
+      add(elastic, "real", "none", &model_);
+      numbers[elastic] = compare_numbers(moves, true);
+    }
     for (const double factor : {0.8, 1.2}) {
       const std::string error = factor < 1 ? "-20 %" : "+20 %";
       for (const auto& [name, model] :
            {std::pair("rigid", &rigid), std::pair("friction", &friction), std::pair("model", &std::as_const(model_))}) {
         const IdentifiedModel wrong = scaled(*model, [&] { return factor; });
         add(name, "fixed", error, &wrong);
+        if (model == &model_ && bent) add(elastic, "fixed", error, &wrong);
       }
     }
     Random random(5);
     const IdentifiedModel mixed = scaled(model_, [&] { return random.uniform() < 0.5 ? 0.8 : 1.2; });
     add("model", "fixed", "+-20 %", &mixed);
+    if (bent) add(elastic, "fixed", "+-20 %", &mixed);
     progress_.done();
+    for (json& method : methods) add_ratios(method, json(methods));
     return {{"schema", "fxdyn.vibration/1"},
             {"project_hash", model_.project_hash},
             {"made_from", made_from(pipeline_.project(), pipeline_.directory(), true)},
             {"control", control_json()},
             {"methods", methods},
-            {"fixed_against_double", {{"error_change", error_change_}, {"path_difference", path_difference_}}}};
+            {"fixed_against_double", numbers}};
   }
 
  private:
@@ -136,7 +162,7 @@ class Experiment {
   }
 
   void set_band(const std::vector<Move>& moves) {
-    for (const Move& move : moves) band_ = std::max(band_, still * play(move, {}, settings_).residual);
+    for (const Move& move : moves) band_ = std::max(band_, still * play(move, move.reference, {}, settings_).residual);
   }
 
   IdentifiedModel with_tables() {
@@ -161,8 +187,12 @@ class Experiment {
                                  pipeline_.project().file.string()));
   }
 
-  Outcome play(const Move& move, MatrixXd feedforward, const ClosedLoopSettings& settings) const {
-    Reference reference = move.reference;
+  static Reference asked_of(const Method& method, const Move& move) {
+    return method.motor_side ? motor_reference(*method.model, move.reference) : move.reference;
+  }
+
+  /// @param reference what the motors get; the links have to be where the move has them
+  Outcome play(const Move& move, Reference reference, MatrixXd feedforward, const ClosedLoopSettings& settings) const {
     reference.feedforward = std::move(feedforward);
     const PlantRun run = closed_loop_on_mujoco(plant_, reference, settings);
     const MatrixXd link = run.q - run.deflections;
@@ -170,7 +200,7 @@ class Experiment {
     Outcome out;
     const auto mean_square = [](const MatrixXd& m) { return m.squaredNorm() / static_cast<double>(m.size()); };
     out.motor = mean_square((run.q - reference.q).middleRows(move.start, moving));
-    const MatrixXd error = link - reference.q;
+    const MatrixXd error = link - move.reference.q;
     out.link = mean_square(error.middleRows(move.start, moving));
     out.with_rest = mean_square(error.bottomRows(error.rows() - move.start));
     // its place at the end: the mean over the last tenth of a second
@@ -200,7 +230,7 @@ class Experiment {
     };
     parallel_for(cost.size(), [&](std::size_t i) {
       try {
-        for (const Move& move : moves) cost[i] += play(move, {}, settings(i)).with_rest;
+        for (const Move& move : moves) cost[i] += play(move, move.reference, {}, settings(i)).with_rest;
       } catch (const RunsAway&) {
         cost[i] = 1e300;
       }
@@ -235,19 +265,19 @@ class Experiment {
     return predict_fixed(model, model.formats ? *model.formats : choose_formats(model), states);
   }
 
-  json judge(const std::string& name, const std::string& numbers, const std::string& wrong,
-             const IdentifiedModel* model, const std::vector<Move>& moves) {
+  json judge(const Method& method, const std::vector<Move>& moves) {
     std::vector<Outcome> outcomes(moves.size());
     parallel_for(moves.size(), [&](std::size_t i) {
+      const Reference asked = asked_of(method, moves[i]);
       outcomes[i] =
-          play(moves[i], model == nullptr ? MatrixXd() : feedforward(*model, numbers, moves[i].reference), settings_);
+          play(moves[i], asked,
+               method.model == nullptr ? MatrixXd() : feedforward(*method.model, method.numbers, asked), settings_);
       progress_.step();
     });
-    return summary(name, numbers, wrong, moves, outcomes);
+    return summary(method, moves, outcomes);
   }
 
-  static json summary(const std::string& name, const std::string& numbers, const std::string& wrong,
-                      const std::vector<Move>& moves, const std::vector<Outcome>& outcomes) {
+  static json summary(const Method& method, const std::vector<Move>& moves, const std::vector<Outcome>& outcomes) {
     json kinds = json::object();
     const auto mean = [&](const std::string& kind) {
       Outcome sum;
@@ -271,33 +301,48 @@ class Experiment {
     for (const Move& move : moves) {
       if (!kinds.contains(move.kind)) kinds[move.kind] = mean(move.kind);
     }
-    return {{"feedforward", name}, {"numbers", numbers}, {"parameters_off", wrong}, {"moves", kinds}};
+    return {{"feedforward", method.name},
+            {"numbers", method.numbers},
+            {"parameters_off", method.off},
+            {"reference", method.motor_side ? "motor" : "link"},
+            {"moves", kinds}};
+  }
+
+  /// Over all moves, against the PD alone and the rigid body.
+  static void add_ratios(json& method, const json& methods) {
+    for (const json& other : methods) {
+      const std::string name = other.at("feedforward");
+      if ((name != "none" && name != "rigid") || other.at("parameters_off") != "none") continue;
+      for (const char* key : {"tracking_motor", "tracking_link", "residual", "settling_s", "roughness"}) {
+        const double base = other.at("moves").at("all").at(key);
+        if (base > 0) method["ratios"][name][key] = method.at("moves").at("all").at(key).get<double>() / base;
+      }
+    }
   }
 
   /// Of the motors' remaining error (RMS, double in the loop): how much it is another in fixed point, and how far both
   /// paths are apart. Exact encoders: the steps of real ones part any two runs that differ at all.
-  void compare_numbers(const std::vector<Move>& moves) {
+  json compare_numbers(const std::vector<Move>& moves, bool motor_side) {
     ClosedLoopSettings exact = settings_;
     exact.encoder_step = 0;
     VectorXd error(moves.size()), fixed(moves.size()), apart(moves.size());
     parallel_for(moves.size(), [&](std::size_t i) {
-      const Reference& reference = moves[i].reference;
-      const MatrixXd real = play(moves[i], feedforward(model_, "real", reference), exact).q;
-      const MatrixXd rounded = play(moves[i], feedforward(model_, "fixed", reference), exact).q;
+      const Reference asked = asked_of({"", "", "", &model_, motor_side}, moves[i]);
+      const MatrixXd real = play(moves[i], asked, feedforward(model_, "real", asked), exact).q;
+      const MatrixXd rounded = play(moves[i], asked, feedforward(model_, "fixed", asked), exact).q;
       const auto k = static_cast<Index>(i);
-      error[k] = (real - reference.q).squaredNorm();
-      fixed[k] = (rounded - reference.q).squaredNorm();
+      error[k] = (real - asked.q).squaredNorm();
+      fixed[k] = (rounded - asked.q).squaredNorm();
       apart[k] = (rounded - real).squaredNorm();
       progress_.step();
     });
-    path_difference_ = std::sqrt(apart.sum() / error.sum());
-    error_change_ = std::fabs(std::sqrt(fixed.sum() / error.sum()) - 1);
+    return {{"error_change", std::fabs(std::sqrt(fixed.sum() / error.sum()) - 1)},
+            {"path_difference", std::sqrt(apart.sum() / error.sum())}};
   }
 
   Pipeline pipeline_;
   IdentifiedModel model_, plant_;
   ClosedLoopSettings settings_;
-  double path_difference_ = 0, error_change_ = 0;
   double band_ = 0;  ///< within which a link counts as still [rad | m]
   Progress progress_;
 };
@@ -323,15 +368,22 @@ std::string vibration_table(const json& result) {
   std::string out = fmt::format("PD of {:.3g} Hz, damping {:.2g} (best alone), tick {:.3g} ms; means over all moves\n",
                                 control.at("bandwidth_hz").get<double>(), control.at("damping").get<double>(),
                                 1e3 * control.at("tick_s").get<double>());
-  out += fmt::format("{:<10} {:<6} {:<7} {:>12} {:>12} {:>12} {:>11} {:>10}\n", "feedforward", "as", "off",
-                     "motor mrad", "link mrad", "residual", "settling s", "roughness");
+  out += fmt::format("{:<13} {:<6} {:<7} {:>10} {:>10} {:>9} {:>10} {:>9} | {}\n", "feedforward", "as", "off",
+                     "motor mrad", "link mrad", "residual", "settling s", "roughness",
+                     "of PD alone: motor, link, residual; of rigid: motor, link");
   for (const json& method : result.at("methods")) {
     const json& all = method.at("moves").at("all");
     const auto value = [&](const char* key) { return all.at(key).get<double>(); };
-    out += fmt::format("{:<11} {:<6} {:<7} {:>11.4g} {:>12.4g} {:>12.3g} {:>11.3f} {:>10.2g}\n",
+    const auto ratio = [&](const char* base, const char* key) {
+      const json::json_pointer at(fmt::format("/ratios/{}/{}", base, key));
+      return method.contains(at) ? fmt::format(" {:>6.3f}", method.at(at).get<double>()) : "      -";
+    };
+    out += fmt::format("{:<13} {:<6} {:<7} {:>10.4g} {:>10.4g} {:>9.3g} {:>10.3f} {:>9.2g} |{}{}{} {}{}\n",
                        method.at("feedforward").get<std::string>(), method.at("numbers").get<std::string>(),
                        method.at("parameters_off").get<std::string>(), value("tracking_motor"), value("tracking_link"),
-                       value("residual"), value("settling_s"), value("roughness"));
+                       value("residual"), value("settling_s"), value("roughness"), ratio("none", "tracking_motor"),
+                       ratio("none", "tracking_link"), ratio("none", "residual"), ratio("rigid", "tracking_motor"),
+                       ratio("rigid", "tracking_link"));
   }
   if (!result.contains("fixed_against_double")) return out;
   const json& numbers = result.at("fixed_against_double");

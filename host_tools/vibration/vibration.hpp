@@ -20,17 +20,20 @@ namespace fxdyn {
 /// damping are the best of a grid for the PD alone, on other moves than those that are judged, and stay.
 ///
 /// Feedforward: none; friction (rigid body, rotors, Coulomb and viscous friction, offset by least squares); rigid (the
-/// same without its friction); model (what diagnosis and training made: DIR/model.json). All but none are the
-/// firmware's fixed-point code, fed with the reference; the model also in double, and both once more on exact encoders
-/// (fixed_against_double: of the motors' remaining error, how much it is another, and how far the paths are apart).
-/// Then all of them with parameters 20 % too small, too large, and each parameter of the model one or the other at
-/// random.
+/// same without its friction); model (what diagnosis and training made: DIR/model.json); model_elastic, where the model
+/// knows how gears bend: the same at motor_reference(), which the PD gets, too ("reference": "motor"). All but none are
+/// the firmware's fixed-point code, fed with the reference; the model also in double, and both once more on exact
+/// encoders (fixed_against_double: of the motors' remaining error, how much it is another, and how far the paths are
+/// apart). Then all of them with parameters 20 % too small, too large, and each parameter of the model one or the other
+/// at random; the motors' reference is then made from those, too.
 ///
 /// Per move and over all joints:
-///   tracking_motor, tracking_link  RMS of q - q_r while it moves [mrad | mm]
+///   tracking_motor  RMS of q - what the motors were asked for while it moves [mrad | mm]
+///   tracking_link   RMS of q_link - q_r, the links' reference whatever the motors' is [mrad | mm]
 ///   residual   largest |q_link - its place at the end| after the stop, mean over the joints [mrad | mm]
 ///   settling_s  from the stop until every link stays within a quarter of the PD's residual of that place
 ///   roughness  RMS of the torque's change from tick to tick, of rated, mean over the joints
+/// "ratios": the same over all moves, of none's and of rigid's.
 /// @throws InputError: no train log comes from a scenario
 nlohmann::json vibration(const std::filesystem::path& project, const std::filesystem::path& directory);
 
