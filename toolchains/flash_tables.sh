@@ -22,4 +22,4 @@ if ! cmp -s -n 12 "$own" "$page"; then
   echo "flash_tables: $page is for another model or layout than $elf: build and flash the image anew" >&2
   exit 1
 fi
-"${OPENOCD:-openocd}" "$@" -c "program {$page} verify reset exit 0x$begin"
+"$(dirname "$0")/openocd.sh" "$@" -c "program {$page} verify reset exit 0x$begin"

@@ -18,11 +18,25 @@ grep -q -- '-f target/stm32g4x.cfg' "$root/toolchains/stm32g474.cmake" || fail "
 # The targets' own commands, with a stand-in for openocd that prints what it is told.
 elf=$build/firmware/node-stm32g474.elf
 commands=$(cd "$build" && ninja -t commands flash)
-grep -q "openocd -f interface/stlink.cfg -f target/stm32g4x.cfg -c .*program.*node-stm32g474.elf verify reset exit" <<<"$commands" ||
+grep -q "toolchains/openocd.sh -f interface/stlink.cfg -f target/stm32g4x.cfg -c .*program.*node-stm32g474.elf.* verify reset exit" <<<"$commands" ||
   fail "flash runs $commands"
 printf '#!/bin/sh\necho "$@"\n' >"$work/openocd"
 chmod +x "$work/openocd"
 tables() { OPENOCD=$work/openocd "$root/toolchains/flash_tables.sh" arm-none-eabi- "$elf" "$1" -f interface/stlink.cfg 2>&1; }
+
+# What stops openocd is told in one line, whatever else it prints.
+printf '#!/bin/sh\necho "Info : clock speed 2000 kHz"\necho "$SAYS" >&2\nexit ${CODE:-1}\n' >"$work/failing"
+chmod +x "$work/failing"
+expect_advice() {  # OPENOCD_SAYS ADVICE
+  said=$(SAYS=$1 OPENOCD=$work/failing "$root/toolchains/openocd.sh" -f x 2>&1) && fail "a failing openocd is taken for a good one"
+  [ "$(grep -c '^flash: ' <<<"$said")" -eq 1 ] && [[ $said == *"flash: $2"* ]] || fail "'$1' is told as: $said"
+}
+expect_advice 'Error: open failed' 'no debug probe'
+expect_advice 'Error: libusb_open() failed with LIBUSB_ERROR_ACCESS' 'no permission'
+expect_advice 'Error: init mode failed (unable to connect to the target)' 'the board does not answer'
+expect_advice 'Error: flash write failed' 'openocd failed'
+SAYS=done CODE=0 OPENOCD=$work/failing "$root/toolchains/openocd.sh" >"$work/said" || fail "a good openocd is taken for a failing one"
+! grep -q '^flash: ' "$work/said" || fail "advice for a good openocd"
 
 arm-none-eabi-objcopy -O binary --only-section=.fxdyn_tables "$elf" "$work/tables.bin"
 said=$(tables "$work/tables.bin") || fail "refuses the image's own page: $said"
