@@ -123,6 +123,7 @@ TEST(BusLoad, FdFrames) {
   // One node with six joints at 1 and 4 Mbit/s: SYNC, 48 bytes, 48 bytes.
   static_assert(bus_load::fd_tick_ns(6, 1, {1'000'000, 4'000'000}) == 55'000 + 2 * (34'000 + 129'500));
   static_assert(bus_load::load(bus_load::fd_tick_ns(6, 1, {1'000'000, 4'000'000}), 2000) == 1910);
+  static_assert(bus_load::load(bus_load::fd_tick_ns(6, 1, {1'000'000, 2'000'000}), 2000) == 3205);
 }
 
 }  // namespace
