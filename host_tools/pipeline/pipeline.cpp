@@ -376,6 +376,21 @@ IdentifiedModel Pipeline::model() {
   return read_model(directory_ / "model.json");
 }
 
+IdentifiedModel Pipeline::exported() {
+  const fs::path file = directory_ / "model.json";
+  const auto refuse = [&](const std::string& why, const char* verb) {
+    return InputError(fmt::format("{}: {}: run `fxdyn {} {} --out {}` first", file.string(), why, verb,
+                                  project_.file.string(), directory_.string()));
+  };
+  if (!fs::exists(file)) throw refuse("there is no model", "run");
+  std::optional<IdentifiedModel> model = trained();
+  if (!model) throw refuse("not a trained model of this project and its logs as they are now", "run");
+  const fs::path page = directory_ / "tables.bin";
+  if (!model->formats || !model->layout || !fs::exists(page) || header_of(page).crc32 != model->tables_crc)
+    throw refuse("its tables are not exported", "export");
+  return *std::move(model);
+}
+
 void Pipeline::export_tables() {
   IdentifiedModel model = this->model();
   model.drop_tables();

@@ -31,6 +31,9 @@ class Pipeline {
   IdentifiedModel model();
   /// DIR/model.json, if training made it from project and logs as they are now; makes nothing.
   std::optional<IdentifiedModel> trained() { return written({"trained"}); }
+  /// DIR/model.json with the tables that a drive may run on; makes nothing.
+  /// @throws InputError: the verb that has to come first
+  IdentifiedModel exported();
   /// Logs of one role with the model's filter.
   std::vector<ProcessedLog> logs(Role role);
   /// Tables of the model in these formats and export.json; the model says what is in them.

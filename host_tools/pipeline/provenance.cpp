@@ -1,5 +1,7 @@
 #include "host_tools/pipeline/provenance.hpp"
 
+#include <cstring>
+
 #include "host_tools/files.hpp"
 #include "host_tools/log/log_file.hpp"
 
@@ -54,6 +56,14 @@ json training_seconds(const fs::path& directory) {
   const json all = read_seconds(directory);
   if (!all.contains("diagnose") || !all.contains("train")) return nullptr;
   return all.at("diagnose").get<double>() + all.at("train").get<double>();
+}
+
+PageHeader header_of(const fs::path& page) {
+  const std::string bytes = read_file(page);
+  PageHeader header;
+  if (bytes.size() < sizeof header) return {0, 0, 0, 0};
+  std::memcpy(&header, bytes.data(), sizeof header);
+  return header;
 }
 
 }  // namespace fxdyn

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/log/project.hpp"
+#include "model/table_page.hpp"
 
 namespace fxdyn {
 
@@ -18,5 +19,8 @@ bool is_unchanged(const nlohmann::json& made_from, const std::filesystem::path& 
 void note_seconds(const std::filesystem::path& directory, const char* verb, double seconds);
 /// Of diagnose and train together; null where one of them is not known.
 nlohmann::json training_seconds(const std::filesystem::path& directory);
+
+/// What a file with a page of tables says of itself; all zero where it is too short.
+PageHeader header_of(const std::filesystem::path& page);
 
 }  // namespace fxdyn

@@ -96,12 +96,7 @@ fs::path directory_of(const fs::path& directory, const std::vector<std::size_t>&
 }  // namespace
 
 Replay replay(Pipeline& pipeline, const fs::path& image, Eigen::Index max_ticks) {
-  const IdentifiedModel model = pipeline.model();
-  if (!model.formats) {
-    throw InputError(
-        fmt::format("{}: no tables of this model there; run `fxdyn export` and build the image from its tables.hpp",
-                    pipeline.directory().string()));
-  }
+  const IdentifiedModel model = pipeline.exported();
   std::vector<TickStates> streams;
   for (const Role role : {Role::test, Role::validate}) {
     for (const ProcessedLog& log : pipeline.logs(role)) streams.push_back(at_ticks(log, model.tick_s));

@@ -106,10 +106,7 @@ CanReplay replay_on_can(Pipeline& pipeline, const CanReplaySettings& settings) {
     can::SocketBus bus(settings.interface, settings.fd);
     const std::uint8_t master = free_id(settings.nodes);
     can::Guard guard(settings.interface, master);
-    const IdentifiedModel model = pipeline.model();
-    if (!model.formats)
-      throw InputError(fmt::format("{}: no tables of this model there; run `fxdyn export` and flash them",
-                                   pipeline.directory().string()));
+    const IdentifiedModel model = pipeline.exported();
     CanDrives drives(bus, model, {settings.nodes, settings.fd, master});
     guard.stop_by_signals(drives.nodes());
     json document = {{"schema", "fxdyn.can_replay/1"}, {"interface", settings.interface}, {"fd", settings.fd}};
@@ -124,7 +121,7 @@ CanReplay replay_on_can(Pipeline& pipeline, const CanReplaySettings& settings) {
       }
       std::size_t steps = 0;
       for (const ProcessedLog& log : logs)
-        steps += static_cast<std::size_t>(at_ticks(log, model.tick_s).t.size() / 500);
+        steps += static_cast<std::size_t>(std::min(settings.most_ticks, at_ticks(log, model.tick_s).t.size()) / 500);
       progress.stage("replaying over " + settings.interface, std::max<std::size_t>(1, steps));
       json played = json::array();
       for (const ProcessedLog& log : logs) played.push_back(play(drives, log, model, settings.most_ticks, progress));

@@ -3,18 +3,17 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "host_tools/error.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/files.hpp"
 #include "host_tools/identify/plausible.hpp"
+#include "host_tools/pipeline/provenance.hpp"
 #include "host_tools/report/metrics.hpp"
 #include "host_tools/report/results.hpp"
 #include "host_tools/train/kept_effects.hpp"
 #include "host_tools/train/stored_information.hpp"
-#include "model/table_page.hpp"
 
 namespace fxdyn {
 namespace {
@@ -29,30 +28,6 @@ namespace fs = std::filesystem;
 constexpr double refit_share = 2.0 / 3;
 /// Shorter ones show too little of the motion to say anything of it.
 constexpr double shortest_s = 6;
-
-PageHeader header_of(const fs::path& page) {
-  const std::string bytes = read_file(page);
-  PageHeader header;
-  if (bytes.size() < sizeof header) return {0, 0, 0, 0};
-  std::memcpy(&header, bytes.data(), sizeof header);
-  return header;
-}
-
-/// The model in DIR with the tables that a drive may run on.
-IdentifiedModel exported_model(Pipeline& pipeline) {
-  const fs::path file = pipeline.directory() / "model.json";
-  const auto refuse = [&](const std::string& why, const char* verb) {
-    return InputError(fmt::format("{}: {}: run `fxdyn {} {} --out {}` first", file.string(), why, verb,
-                                  pipeline.project().file.string(), pipeline.directory().string()));
-  };
-  if (!fs::exists(file)) throw refuse("there is no model", "run");
-  std::optional<IdentifiedModel> model = pipeline.trained();
-  if (!model) throw refuse("not a trained model of this project and its logs as they are now", "run");
-  const fs::path page = pipeline.directory() / "tables.bin";
-  if (!model->formats || !model->layout || !fs::exists(page) || header_of(page).crc32 != model->tables_crc)
-    throw refuse("its tables are not exported", "export");
-  return *std::move(model);
-}
 
 /// The new log in two parts, and the logs that the fit never saw.
 struct NewSession {
@@ -327,7 +302,7 @@ Update update(Pipeline& pipeline, const UpdateSettings& settings) {
   const double forgetting = settings.forgetting.value_or(project.identify.forgetting);
   if (!(forgetting > 0 && forgetting <= 1))
     throw InputError(fmt::format("--forgetting {:g}: more than 0, at most 1 (1 forgets nothing)", forgetting));
-  const IdentifiedModel old = exported_model(pipeline);
+  const IdentifiedModel old = pipeline.exported();
   const StoredInformation stored = read_information(old, directory);
 
   Progress progress;

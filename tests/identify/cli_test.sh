@@ -108,7 +108,13 @@ expect 2 "none.csv" payload --model "$work/good/model.json" --log "$work/none.cs
 mkdir "$work/apart" && cp "$work/good.csv" "$work/apart"
 expect 2 "prediction" predict --model "$work/good/model.json" --log "$work/apart/good.csv" --out "$work/apart"
 expect 2 "holds a model" predict --model "$work/good/model.json" --log "$work/good.csv" --out "$work/good"
-expect 2 "fxdyn export" replay "$work/good.toml" --image "$work/none.elf" --out "$work/fresh"
+# the firmware was built from tables of a model that exists: none is made for it
+expect 2 "not a trained model" replay "$work/good.toml" --image "$work/none.elf" --out "$work/fresh"
+expect 2 "there is no model: run" replay "$work/good.toml" --image "$work/none.elf" --out "$work/nowhere"
+if [ -e "$work/nowhere/model.json" ]; then
+  echo "FAILED: replay made a model"
+  failures=$((failures + 1))
+fi
 
 # a project without logs is good for planning only
 project plan.toml '[limits]' 'velocity = [1, 1]'
