@@ -256,7 +256,7 @@ std::string explain(CanOpenResult result, std::string_view interface) {
              name + " up)";
     case CanOpenError::not_fd:
       return name + " carries no CAN FD frames: ip link set " + name + " down && ip link set " + name +
-             " up type can bitrate 1000000 dbitrate 4000000 fd on (a virtual one: ip link set " + name + " mtu 72)";
+             " up type can bitrate 1000000 dbitrate 2000000 fd on (a virtual one: ip link set " + name + " mtu 72)";
     case CanOpenError::permission:
       return "no permission for CAN sockets on " + name + ": run it with sudo, or setcap cap_net_raw+ep on the program";
     case CanOpenError::system:

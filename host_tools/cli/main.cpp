@@ -12,8 +12,8 @@
 #include "host_tools/report/report.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/update/update.hpp"
-#include "model/version.hpp"
 #include "host_tools/vibration/vibration.hpp"
+#include "model/version.hpp"
 
 namespace {
 
@@ -74,6 +74,9 @@ int run(int argc, char** argv) {
       "Example: fxdyn run robot.toml --out out/robot"};
   app.set_version_flag("--version", version);
   app.require_subcommand(1);
+  app.failure_message([](const CLI::App*, const CLI::Error& error) {
+    return fmt::format("fxdyn: {}: see fxdyn VERB --help\n", error.what());
+  });
 
   std::string project, out, scenario, model, log, image, numbers = "real";
   bool as_json = false;
@@ -102,13 +105,14 @@ int run(int argc, char** argv) {
       stage("compare", "Every method on the same logs, from plain least squares to named effects: compare.json.");
   const CLI::App* efficiency_verb =
       stage("efficiency", "Test error against the seconds of train data, per method: efficiency.json.");
-  const CLI::App* vibration_verb = stage(
-      "vibration", "The model as feedforward of the scenario's robot with gears that bend: vibration.json.");
-  CLI::App* replay_verb =
-      stage("replay",
-            "Stream the held-out logs to a firmware image in QEMU (--image) or to drive nodes on a CAN bus (--can) and\n"
-            "compare bit for bit: replay.json, can_replay.json.");
-  auto* image_option = replay_verb->add_option("--image", image, "firmware image (.elf) made by toolchains/build_image.sh");
+  const CLI::App* vibration_verb =
+      stage("vibration", "The model as feedforward of the scenario's robot with gears that bend: vibration.json.");
+  CLI::App* replay_verb = stage(
+      "replay",
+      "Stream the held-out logs to a firmware image in QEMU (--image) or to drive nodes on a CAN bus (--can) and\n"
+      "compare bit for bit: replay.json, can_replay.json.");
+  auto* image_option =
+      replay_verb->add_option("--image", image, "firmware image (.elf) made by toolchains/build_image.sh");
   CanReplaySettings can_replay;
   auto* can_option =
       replay_verb->add_option("--can", can_replay.interface, "SocketCAN interface with the drives, e.g. can0")
@@ -220,8 +224,13 @@ int run(int argc, char** argv) {
       can_replay.nodes.assign(nodes.begin(), nodes.end());
       const CanReplay done = replay_on_can(pipeline, can_replay);
       fmt::print("{}", can_replay_table(done.result));
+      if (const auto disabled = done.result.at("disabled_ticks").get<std::uint64_t>(); disabled > 0)
+        throw DataError(fmt::format(
+            "the enable input was low in {} ticks, and no torque goes out then: set it high and replay again",
+            disabled));
       if (!done.same)
-        throw DataError(fmt::format("drives and host differ: see {}", (pipeline.directory() / "can_replay.json").string()));
+        throw DataError(
+            fmt::format("drives and host differ: see {}", (pipeline.directory() / "can_replay.json").string()));
       return 0;
     }
     if (*replay_verb) {

@@ -123,7 +123,7 @@ void CanDrives::identify(Node& node) {
 void CanDrives::check(const Node& node) {
   // what programs image and tables, and what programs tables alone
   constexpr const char* image =
-      "cmake --build --preset BOARD --target flash with -DFXDYN_TABLES=DIR/tables.hpp (Linux: "
+      "cmake --preset BOARD -DFXDYN_TABLES=$PWD/DIR/tables.hpp && cmake --build --preset BOARD --target flash (Linux: "
       "toolchains/build_node.sh DIR/tables.hpp OUT)";
   constexpr const char* page =
       "cmake --build --preset BOARD --target flash-tables (Linux: fxdyn_node --tables DIR/tables.bin)";
@@ -158,7 +158,7 @@ void CanDrives::restart() {
     if (heartbeat_of_ != 0)
       master_.write(node.id, 0x1016, 1, std::uint32_t{heartbeat_of_} << 16 | can::Guard::consumer_ms, 4);
     master_.write(node.id, 0x2013, 0, 1, 1);
-    if (fd_) master_.write(node.id, 0x2030, 0, 1, 1);
+    if (fd_) use_fd(node);
   }
   const auto ramp = static_cast<std::int32_t>(master_.read(nodes_.front().id, 0x2010, 0));
   for (Joint& joint : joints_) {
@@ -174,6 +174,15 @@ void CanDrives::restart() {
   since_restart_ = 0;
   lockstep_ = std::make_unique<can::Lockstep>(
       master_, can::Lockstep::Options{.joints = joints_.size(), .expect = {}, .fd = fd_, .timeout = torque_time});
+}
+
+void CanDrives::use_fd(const Node& node) {
+  try {
+    master_.write(node.id, 0x2030, 0, 1, 1);
+  } catch (const can::SdoAbort&) {
+    throw InputError(
+        fmt::format("node {} has no CAN FD: replay without --fd (Linux: start it with fxdyn_node --fd)", node.id));
+  }
 }
 
 /// A reset takes the torque to zero by its ramp: what is left of it would be the next run's first torque.
@@ -215,6 +224,7 @@ CanDrives::Tick CanDrives::tick(const Eigen::VectorXd& q, const Eigen::VectorXd&
 
   Tick out;
   out.equal = true;
+  bool enabled = true;
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     Joint& joint = joints_[j];
     std::uint8_t status = torque_status::fresh | torque_status::enabled;
@@ -232,10 +242,12 @@ CanDrives::Tick CanDrives::tick(const Eigen::VectorXd& q, const Eigen::VectorXd&
                               static_cast<std::uint8_t>(joint.first_count + since_restart_), status};
     out.equal = out.equal && *torques[j] == expected;
     out.torque.push_back(1e-3 * torques[j]->milli);
+    enabled = enabled && (torques[j]->status & torque_status::enabled) != 0;
   }
   ++since_restart_;
   ++ticks_;
   equal_ticks_ += out.equal ? 1 : 0;
+  disabled_ticks_ += enabled ? 0 : 1;
   return out;
 }
 
@@ -264,6 +276,7 @@ json CanDrives::report() {
       lost_ + (lockstep_ ? lockstep_->statistics().missing + lockstep_->statistics().late : 0) + master_.bus().lost();
   return {{"ticks", ticks_},
           {"equal_ticks", equal_ticks_},
+          {"disabled_ticks", disabled_ticks_},
           {"frames_lost", lost},
           {"round_trip_ms", {{"p50", ms(0.5)}, {"p99", ms(0.99)}, {"max", ms(1)}}},
           {"ticks_per_second", busy_s_ > 0 ? static_cast<double>(ticks_) / busy_s_ : 0},

@@ -46,8 +46,8 @@ class CanDrives {
   /// One tick of the setpoints q, dq, ddq of all joints.
   Tick tick(const Eigen::VectorXd& q, const Eigen::VectorXd& dq, const Eigen::VectorXd& ddq);
 
-  /// {ticks, equal_ticks, frames_lost, round_trip_ms: {p50, p99, max}, ticks_per_second, nodes: [{id, board, version,
-  /// tables_crc, joints, cost, counters}]}
+  /// {ticks, equal_ticks, disabled_ticks (a node's enable input was low), frames_lost, round_trip_ms: {p50, p99, max},
+  /// ticks_per_second, nodes: [{id, board, version, tables_crc, joints, cost, counters}]}
   nlohmann::json report();
 
  private:
@@ -66,6 +66,7 @@ class CanDrives {
   };
 
   void identify(Node& node);
+  void use_fd(const Node& node);
   void wait_for_zero_torque(const Node& node);
   void check(const Node& node);
   [[noreturn]] void no_answer(const std::string& who);
@@ -79,7 +80,7 @@ class CanDrives {
   std::vector<Node> nodes_;
   std::vector<Joint> joints_;
   std::unique_ptr<can::Lockstep> lockstep_;
-  std::uint64_t since_restart_ = 0, ticks_ = 0, equal_ticks_ = 0, lost_ = 0;
+  std::uint64_t since_restart_ = 0, ticks_ = 0, equal_ticks_ = 0, disabled_ticks_ = 0, lost_ = 0;
   can::RoundTrips round_trips_;
   double busy_s_ = 0;
 };

@@ -40,10 +40,10 @@ fail() {
   failures=$((failures + 1))
 }
 replay() { "$fxdyn" replay arm.project --out out --can vcan0 "$@"; }
-# refused EXIT_CODE EXPECTED ARGUMENT..
+# refused EXIT_CODE EXPECTED ARGUMENT..; OUT: another directory than out
 refused() {
   local code=0
-  "$fxdyn" replay arm.project --out out "${@:3}" >refused.txt 2>&1 || code=$?
+  "$fxdyn" replay arm.project --out "${OUT:-out}" "${@:3}" >refused.txt 2>&1 || code=$?
   [ $code -eq "$1" ] || fail "${*:3}: exit code $code"
   [ "$(grep -c '^fxdyn: ' refused.txt)" -eq 1 ] && tail -1 refused.txt | grep -q "$2" || fail "${*:3}: $(cat refused.txt)"
 }
@@ -93,6 +93,8 @@ step "bad interfaces, nobody there"
 refused 2 'no interface can9' --can can9
 refused 2 'ip link set vcan2' --can vcan2
 refused 2 'no node answers' --can vcan0
+OUT=nowhere refused 2 'there is no model: run .fxdyn run' --can vcan0
+[ ! -e nowhere/model.json ] || fail "a model was made where there was none"
 step "one node"
 start_node "$work/node/fxdyn_node"
 replay --ticks 500 || fail "replay"

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <deque>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "firmware/object_dictionary.hpp"
 #include "host_tools/error.hpp"
@@ -22,6 +23,8 @@ struct ScriptedNode {
   NmtState state = NmtState::pre_operational;
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> objects{};
   bool sends_torque = true;
+  std::uint8_t torque_status = 0;
+  bool has_fd = true;
 };
 
 class ScriptedBus final : public can::Bus {
@@ -36,7 +39,9 @@ class ScriptedBus final : public can::Bus {
     } else if (frame.id == canopen::sync_id) {
       for (auto& [id, node] : nodes) {
         if (node.state == NmtState::operational && node.sends_torque)
-          waiting_.push_back({.id = canopen::torque_id + id, .size = WireTorque::bytes});
+          waiting_.push_back({.id = canopen::torque_id + id,
+                              .size = WireTorque::bytes,
+                              .data = {0, 0, 0, 0, 0, 0, 0, node.torque_status}});
       }
     } else if (const auto node = nodes.find(static_cast<std::uint8_t>(frame.id - canopen::sdo_request_id));
                frame.id > canopen::sdo_request_id && frame.id < canopen::heartbeat_id && node != nodes.end()) {
@@ -73,8 +78,9 @@ class ScriptedBus final : public can::Bus {
     can::Frame reply{.id = canopen::sdo_answer_id + id, .size = 8, .data = request.data};
     const std::pair object{canopen::load<2>(&request.data[1]), std::uint32_t{request.data[3]}};
     if ((request.data[0] & 0xE0U) == 0x20) {
-      node.objects[object] = canopen::load<4>(&request.data[4]);
-      reply.data[0] = 0x60;
+      const bool refused = !node.has_fd && object.first == 0x2030;
+      if (!refused) node.objects[object] = canopen::load<4>(&request.data[4]);
+      reply.data[0] = refused ? 0x80 : 0x60;
     } else {
       reply.data[0] = 0x43;
       canopen::store<4>(&reply.data[4], node.objects[object]);
@@ -246,6 +252,31 @@ TEST_F(CanDrivesTest, SaysWhatToDo) {
   expect_line(with(dictionary::tables, 4, 6), {"a robot of 6 joints", "--target flash", "toolchains/build_node.sh"});
   expect_line(with(dictionary::tables, 2, 1), {"another model", "--target flash", "toolchains/build_node.sh"});
   expect_line(with(dictionary::tables, 1, 1), {"other tables", "--target flash-tables"});
+}
+
+TEST_F(CanDrivesTest, SaysWhichNodeHasNoFd) {
+  two_nodes();
+  bus_.nodes[2].has_fd = false;
+  CanDrives drives(bus_, model_, {.fd = true});
+  try {
+    drives.restart();
+    FAIL() << "taken";
+  } catch (const InputError& error) {
+    expect_line(error.what(), {"node 2", "without --fd", "fxdyn_node --fd"});
+  }
+}
+
+TEST_F(CanDrivesTest, CountsTicksWithEnableLow) {
+  two_nodes();
+  for (auto& [id, node] : bus_.nodes) node.torque_status = torque_status::fresh | torque_status::enabled;
+  CanDrives drives(bus_, model_, {});
+  drives.restart();
+  tick(drives);
+  EXPECT_EQ(drives.report().at("disabled_ticks"), 0);
+  bus_.nodes[2].torque_status = torque_status::fresh;
+  tick(drives);
+  tick(drives);
+  EXPECT_EQ(drives.report().at("disabled_ticks"), 2);
 }
 
 }  // namespace
