@@ -247,18 +247,20 @@ std::string explain(CanOpenResult result, std::string_view interface) {
     case CanOpenError::no_can:
       return "this kernel has no CAN sockets: modprobe can_raw";
     case CanOpenError::no_interface:
-      return "no interface " + name + ": `ip -br link show type can` lists them; a virtual one: ip link add " + name +
-             " type vcan && ip link set " + name + " up";
+      return "no interface " + name + ": `ip -br link show type can` lists them; a virtual one: sudo ip link add " +
+             name + " type vcan && sudo ip link set " + name + " up";
     case CanOpenError::not_can:
       return name + " is no CAN interface: `ip -br link show type can` lists them";
     case CanOpenError::down:
-      return name + " is down: ip link set " + name + " up type can bitrate 1000000 (a virtual one: ip link set " +
-             name + " up)";
+      return name + " is down: sudo ip link set " + name +
+             " up type can bitrate 1000000 (a virtual one: sudo ip link set " + name + " up)";
     case CanOpenError::not_fd:
-      return name + " carries no CAN FD frames: ip link set " + name + " down && ip link set " + name +
-             " up type can bitrate 1000000 dbitrate 2000000 fd on (a virtual one: ip link set " + name + " mtu 72)";
+      return name + " carries no CAN FD frames: sudo ip link set " + name + " down && sudo ip link set " + name +
+             " up type can bitrate 1000000 dbitrate 2000000 fd on (a virtual one: sudo ip link set " + name +
+             " mtu 72)";
     case CanOpenError::permission:
-      return "no permission for CAN sockets on " + name + ": run it with sudo, or setcap cap_net_raw+ep on the program";
+      return "no permission for CAN sockets on " + name +
+             ": run it with sudo, or sudo setcap cap_net_raw+ep on the program";
     case CanOpenError::system:
       break;
   }
@@ -272,10 +274,10 @@ std::string explain(const CanErrors& errors, std::string_view interface, std::ui
     return name + " is error passive (" + std::to_string(errors.transmit) + " transmit, " +
            std::to_string(errors.receive) +
            " receive errors): no other node, no terminator, or not the bit rate of the bus, here " + rate +
-           ": ip link set " + name + " down && ip link set " + name + " up type can bitrate 1000000";
+           ": sudo ip link set " + name + " down && sudo ip link set " + name + " up type can bitrate 1000000";
   }
-  return name + " is off the bus: ip link set " + name + " type can restart (by itself: ip link set " + name +
-         " down && ip link set " + name + " up type can restart-ms 100)";
+  return name + " is off the bus: sudo ip link set " + name + " type can restart (by itself: sudo ip link set " + name +
+         " down && sudo ip link set " + name + " up type can restart-ms 100)";
 }
 
 }  // namespace fxdyn::hal::linux

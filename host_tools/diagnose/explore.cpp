@@ -67,7 +67,7 @@ void Outcome::look_again(const std::vector<SessionLog>& logs) {
   lack.resize(at->joints());
   const LinearFit fit = at->solve(columns_of(*at, in_model(*at)));
   parallel_for(at->joints(), [&](std::size_t j) {
-    features[j] = diagnosis::features(*at, j);
+    features[j] = diagnosis::features(*at, j, models.has_baseline);
     lack[j] = lack_of_fit(*at, j, fit, features[j]);
   });
 }

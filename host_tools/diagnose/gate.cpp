@@ -146,13 +146,21 @@ Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<Se
     gate.held = judge(outcome, logs, gate.groups);
     const VectorXd after =
         gate.groups.empty() || before.size() == 0 ? before : plain_error(outcome.models.current, logs);
+    const auto rises = [&](Index j) { return before.size() > 0 && after[j] > worse * worse * before[j]; };
     std::size_t worst = gate.groups.size();
+    bool worst_on_body = false;
     for (std::size_t i = 0; i < gate.groups.size(); ++i) {
       const Group& group = outcome.at->groups()[gate.groups[i]];
-      const auto j = static_cast<Index>(group.candidate.joint);
-      const bool spoils = !group.on_body && before.size() > 0 && after[j] > worse * worse * before[j];
+      bool spoils = !group.on_body && rises(static_cast<Index>(group.candidate.joint));
+      for (Index j = 0; group.on_body && j < after.size(); ++j)
+        spoils |= gate.held.alone[i][j] > least_felt && rises(j);
       if (!spoils && holds(outcome, group, gate.held, i)) continue;
-      if (worst == gate.groups.size() || gate.held.alone[i].sum() < gate.held.alone[worst].sum()) worst = i;
+      // An effect on the robot that spoils joints goes before theirs, which may have been bent by it.
+      const bool on_body = spoils && group.on_body;
+      const bool first = worst == gate.groups.size() || (on_body && !worst_on_body);
+      if (!first && (worst_on_body != on_body || gate.held.alone[i].sum() >= gate.held.alone[worst].sum())) continue;
+      worst = i;
+      worst_on_body = on_body;
     }
     if (worst == gate.groups.size()) break;
     const EffectId gone = outcome.at->groups()[gate.groups[worst]].id;

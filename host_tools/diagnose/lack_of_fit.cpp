@@ -18,40 +18,56 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int random_features = 24;
-constexpr int shifts = 32;
+constexpr int draws = 32;
 
-/// The residual of the rows in `blocks` at other times of the same log: one column a shift.
-MatrixXd shifted(const Linearised& at, std::size_t joint, const VectorXd& e, const std::vector<std::size_t>& blocks) {
+/// What stands for noise on the rows in `blocks`, one column a draw: pieces of the healthy session's residual. Where
+/// there is none, or it has structure of its own, the residual of the same log at other times, which is more than noise
+/// as it holds what is looked for.
+MatrixXd stand_ins(const Linearised& at, std::size_t joint, const VectorXd& e, const std::vector<std::size_t>& blocks) {
   Random random(4177 + joint);
-  MatrixXd out = MatrixXd::Zero(e.size(), shifts);
+  MatrixXd out = MatrixXd::Zero(e.size(), draws);
+  std::vector<double> healthy;
+  for (const std::size_t i : at.fit_blocks()) {
+    const Block& b = at.blocks()[i];
+    if (b.healthy && at.background(joint) == nullptr)
+      healthy.insert(healthy.end(), e.data() + b.first, e.data() + b.first + b.count);
+  }
+  const auto stock = static_cast<Index>(healthy.size());
   for (const std::size_t i : blocks) {
     const Block& b = at.blocks()[i];
     if (b.healthy) continue;
-    for (int k = 0; k < shifts; ++k) {
-      const auto by = static_cast<Index>(random.uniform(0.08, 0.92) * static_cast<double>(b.count));
-      out.block(b.first, k, b.count - by, 1) = e.segment(b.first + by, b.count - by);
-      out.block(b.first + b.count - by, k, by, 1) = e.segment(b.first, by);
+    for (int k = 0; k < draws; ++k) {
+      if (stock > b.count) {
+        const auto from = static_cast<Index>(random.uniform() * static_cast<double>(stock - b.count));
+        out.block(b.first, k, b.count, 1) = Eigen::Map<const VectorXd>(healthy.data() + from, b.count);
+      } else {
+        const auto by = static_cast<Index>(random.uniform(0.08, 0.92) * static_cast<double>(b.count));
+        out.block(b.first, k, b.count - by, 1) = e.segment(b.first + by, b.count - by);
+        out.block(b.first + b.count - by, k, by, 1) = e.segment(b.first, by);
+      }
     }
   }
   return out;
 }
 
-VectorXd only(const Linearised& at, const VectorXd& e, const std::vector<std::size_t>& blocks) {
+VectorXd only(const Linearised& at, const VectorXd& e, const std::vector<std::size_t>& blocks, bool healthy = false) {
   VectorXd out = VectorXd::Zero(e.size());
   for (const std::size_t i : blocks) {
     const Block& b = at.blocks()[i];
-    if (!b.healthy) out.segment(b.first, b.count) = e.segment(b.first, b.count);
+    if (b.healthy == healthy) out.segment(b.first, b.count) = e.segment(b.first, b.count);
   }
   return out;
 }
 
-/// Features on today's rows. Where the encoder does not tell which way the joint moves they are zero: friction's mean
-/// over what the velocity may be is a smoother function of it than friction is, and that is no structure of the robot.
-MatrixXd only(const Linearised& at, std::size_t joint, const MatrixXd& x, const std::vector<std::size_t>& blocks) {
+/// Features on one session's rows. Where the encoder does not tell which way the joint moves they are zero: friction's
+/// mean over what the velocity may be is a smoother function of it than friction is, and that is no structure of the
+/// robot.
+MatrixXd only(const Linearised& at, std::size_t joint, const MatrixXd& x, const std::vector<std::size_t>& blocks,
+              bool healthy = false) {
   MatrixXd out = MatrixXd::Zero(x.rows(), x.cols());
   for (const std::size_t i : blocks) {
     const Block& b = at.blocks()[i];
-    if (b.healthy) continue;
+    if (b.healthy != healthy) continue;
     for (Index row = b.first; row < b.first + b.count; ++row) {
       if (!at.is_doubtful(joint, row)) out.row(row) = x.row(row);
     }
@@ -156,6 +172,114 @@ InTime slow(const Linearised& at, const VectorXd& e, const std::vector<std::size
   return out;
 }
 
+/// Waves over the recorded range: of another joint's position, of the own one, of friction over the own one.
+constexpr Index other_waves = 6, own_waves = 8, friction_waves = 10;
+/// Functions of another joint's velocity; of the own motion and load.
+constexpr Index of_other_velocity = 3, of_own = 14;
+
+/// Columns of features() that belong together.
+struct Family {
+  Index first, count;
+};
+
+/// In the order of the columns: each other joint's position, all their velocities, own position, friction over it, own
+/// motion and load, random features (none of a family), friction over time.
+std::vector<Family> families(std::size_t joints) {
+  std::vector<Family> out;
+  Index at = 0;
+  const auto add = [&](Index count) {
+    if (count > 0) out.push_back({at, count});
+    at += count;
+  };
+  const auto others = static_cast<Index>(joints) - 1;
+  for (Index k = 0; k < others; ++k) add(other_waves);
+  add(of_other_velocity * others);
+  add(own_waves);
+  add(friction_waves);
+  add(of_own);
+  at += random_features;
+  add(time_features);
+  return out;
+}
+
+/// cos(m pi u), m = 1..count.
+void add_waves(std::vector<Eigen::ArrayXd>& columns, const Eigen::ArrayXd& u, Index count,
+               const Eigen::ArrayXd& times) {
+  for (Index m = 1; m <= count; ++m) columns.push_back((static_cast<double>(m) * std::numbers::pi * u).cos() * times);
+}
+
+/// Projection on functions, as a statistic of any subset of them.
+class Projection {
+ public:
+  /// @param gram of the functions once what is fitted has been taken out; size: their norms before
+  Projection(MatrixXd gram, VectorXd size, const Family& of) : size_(size.segment(of.first, of.count)), of_(of) {
+    const auto scale = size_.asDiagonal();
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(scale * gram.block(of.first, of.first, of.count, of.count) *
+                                                        scale);
+    std::vector<Index> kept;
+    for (Index i = 0; i < of.count; ++i) {
+      if (eigen.eigenvalues()[i] > 1e-4) kept.push_back(i);
+    }
+    basis_ = eigen.eigenvectors()(Eigen::all, kept) * eigen.eigenvalues()(kept).cwiseSqrt().cwiseInverse().asDiagonal();
+  }
+  Index rank() const { return basis_.cols(); }
+  /// Coordinates of an orthonormal basis, of products with all functions.
+  VectorXd coordinates(const VectorXd& products) const {
+    return basis_.transpose() * size_.cwiseProduct(products.segment(of_.first, of_.count));
+  }
+  /// Coefficients of the functions, of coordinates.
+  VectorXd coefficients(const VectorXd& along) const { return size_.cwiseProduct(basis_ * along); }
+  double operator()(const VectorXd& products) const { return coordinates(products).squaredNorm(); }
+
+ private:
+  VectorXd size_;
+  Family of_;
+  MatrixXd basis_;
+};
+
+/// x^T of the columns of a fit, weighed.
+MatrixXd times_columns(const Linearised& at, std::size_t joint, const LinearFit& fit, double w, const MatrixXd& x) {
+  const JointRows& rows = at.rows(joint);
+  MatrixXd out = MatrixXd::Zero(static_cast<Index>(fit.columns.size()), x.cols());
+  for (std::size_t i = 0; i < fit.columns.size(); ++i) {
+    const Index local = rows.local[static_cast<std::size_t>(fit.columns[i])];
+    if (local >= 0) out.row(static_cast<Index>(i)) = w * rows.x.col(local).transpose() * x;
+  }
+  return out;
+}
+
+/// The functions on one session's rows, as what is fitted leaves them, and their products with the residual.
+struct Products {
+  MatrixXd functions{};  ///< as they are, rows x functions
+  MatrixXd gram{};
+  MatrixXd fitted{}, taken{};  ///< what the columns, the background take of them
+  VectorXd size{}, residual{};
+  double whole = 0, rows = 0;  ///< squared residual; how many rows
+};
+
+Products products(const Linearised& at, std::size_t joint, const LinearFit& fit, const MatrixXd& covariance, double w,
+                  const VectorXd& residual, const MatrixXd& all_features, bool healthy) {
+  Products out;
+  out.functions = only(at, joint, all_features, at.fit_blocks(), healthy);
+  const MatrixXd& f = out.functions;
+  const VectorXd e = only(at, residual, at.fit_blocks(), healthy);
+  const MatrixXd cross = times_columns(at, joint, fit, w, f);
+  out.fitted = covariance * cross;
+  out.gram = w * (f.transpose() * f) - cross.transpose() * out.fitted;
+  if (const Background* background = at.background(joint)) {
+    const MatrixXd with = background->b.transpose() * f;
+    out.taken = w * background->inverse * with;
+    out.gram -= with.transpose() * out.taken;
+  }
+  out.size = (w * f.colwise().squaredNorm().transpose().array()).max(1e-300).sqrt().inverse();
+  out.residual = w * f.transpose() * e;
+  out.whole = w * e.squaredNorm();
+  for (const std::size_t i : at.fit_blocks()) {
+    if (at.blocks()[i].healthy == healthy) out.rows += static_cast<double>(at.blocks()[i].count);
+  }
+  return out;
+}
+
 }  // namespace
 
 MatrixXd features(const Linearised& at, std::size_t joint, bool healthy) {
@@ -163,33 +287,47 @@ MatrixXd features(const Linearised& at, std::size_t joint, bool healthy) {
   const auto j = static_cast<Index>(joint);
   MatrixXd out;
   const Index total = at.log_rows(at.logs().size() - 1).first + at.log_rows(at.logs().size() - 1).count;
-  Eigen::ArrayXd speed = Eigen::ArrayXd::Zero(static_cast<Index>(n)), acceleration = speed, load = speed;
+  const auto joints = static_cast<Index>(n);
+  Eigen::ArrayXd speed = Eigen::ArrayXd::Zero(joints), acceleration = speed, load = speed,
+                 low = Eigen::ArrayXd::Constant(joints, 1e300), high = -low;
+  Index today = 0;
   for (std::size_t l = 0; l < at.logs().size(); ++l) {
     const ProcessedLog& log = at.logs()[l].log;
-    const auto inside = [&](const MatrixXd& m) {
-      return m.middleRows(log.first, log.last - log.first).array().abs().colwise().maxCoeff().transpose();
-    };
-    speed = speed.max(inside(at.motion(l).dq).eval());
-    acceleration = acceleration.max(inside(at.motion(l).ddq).eval());
-    load = load.max(inside(at.robot_columns(l).structural()).eval());
+    const auto inside = [&](const MatrixXd& m) { return m.middleRows(log.first, log.last - log.first).array(); };
+    const auto most = [&](const MatrixXd& m) { return inside(m).abs().colwise().maxCoeff().transpose().eval(); };
+    speed = speed.max(most(at.motion(l).dq));
+    acceleration = acceleration.max(most(at.motion(l).ddq));
+    load = load.max(most(at.robot_columns(l).structural()));
+    low = low.min(inside(at.motion(l).q).colwise().minCoeff().transpose());
+    high = high.max(inside(at.motion(l).q).colwise().maxCoeff().transpose());
+    if (!at.logs()[l].healthy) today += at.log_rows(l).count;
   }
   speed = speed.max(1e-9);
   acceleration = acceleration.max(1e-9);
   load = load.max(1e-9);
+  const Eigen::ArrayXd range = (high - low).max(1e-9);
   const bool turns = at.models().current.robot.joints[joint].type == JointType::revolute;
-  VectorXd scales_of(3 * static_cast<Index>(n));
-  scales_of << speed, acceleration, load;
+  const double sign_width = at.models().current.joints[joint].sign_width;
+  VectorXd scales_of(5 * joints + 2);
+  scales_of << speed, acceleration, low, range, 0, static_cast<double>(today), load;
+  Index earlier = 0;  // rows of today's logs before this one
   for (std::size_t l = 0; l < at.logs().size(); ++l) {
     if (at.logs()[l].healthy && !healthy) continue;
+    const Index count = at.log_rows(l).count;
     const auto put = [&](const MatrixXd& rows) {
       if (out.size() == 0) out.setZero(total, rows.cols());
-      out.middleRows(at.log_rows(l).first, at.log_rows(l).count) = at.finish(l, joint, rows);
+      out.middleRows(at.log_rows(l).first, count) = at.finish(l, joint, rows);
     };
+    scales_of[4 * joints] = at.logs()[l].healthy ? -1.0 : static_cast<double>(earlier);
+    const double begins = static_cast<double>(earlier) / static_cast<double>(today),
+                 lasts = static_cast<double>(count) / static_cast<double>(today);
+    if (!at.logs()[l].healthy) earlier += count;
     RowCache::Features& kept = at.logs()[l].cache->features[joint];
     // The load moves a little with each fit; these functions need not.
-    const auto motion = 2 * static_cast<Index>(n);
-    if (kept.rows.size() > 0 && kept.scales.head(motion) == scales_of.head(motion) &&
-        ((kept.scales - scales_of).array().abs() <= 0.05 * scales_of.array()).all()) {
+    const auto motion = 4 * joints + 2;
+    if (kept.rows.size() > 0 && kept.scales.size() == scales_of.size() &&
+        kept.scales.head(motion) == scales_of.head(motion) &&
+        ((kept.scales - scales_of).array().abs() <= 0.05 * scales_of.array().abs()).all()) {
       put(kept.rows);
       continue;
     }
@@ -197,21 +335,22 @@ MatrixXd features(const Linearised& at, std::size_t joint, bool healthy) {
     const Index samples = m.q.rows();
     std::vector<Eigen::ArrayXd> columns;
     const Eigen::ArrayXd q = m.q.col(j), dq = m.dq.col(j) / speed[j], ddq = m.ddq.col(j) / acceleration[j],
-                         tau = at.robot_columns(l).structural().col(j).array() / load[j];
+                         tau = at.robot_columns(l).structural().col(j).array() / load[j],
+                         sign = (m.dq.col(j).array() / sign_width).tanh(), one = Eigen::ArrayXd::Ones(samples);
     const double scale = turns ? 1.0 : 10.0;
-    for (std::size_t k = 0; k < n; ++k) {
-      const auto i = static_cast<Index>(k);
-      const bool peer_turns = at.models().current.robot.joints[k].type == JointType::revolute;
-      const Eigen::ArrayXd qk = m.q.col(i) * (peer_turns ? 1.0 : 10.0), dqk = m.dq.col(i).array() / speed[i];
-      columns.push_back(qk.sin());
-      columns.push_back(qk.cos());
-      columns.push_back((2 * qk).sin());
-      columns.push_back((2 * qk).cos());
-      if (k == joint) continue;
+    const auto place = [&](Index k) -> Eigen::ArrayXd { return (m.q.col(k).array() - low[k]) / range[k]; };
+    for (Index k = 0; k < joints; ++k) {
+      if (k != j) add_waves(columns, place(k), other_waves, one);
+    }
+    for (Index k = 0; k < joints; ++k) {
+      if (k == j) continue;
+      const Eigen::ArrayXd dqk = m.dq.col(k).array() / speed[k];
       columns.push_back((dqk * 40).tanh());
       columns.push_back(dqk);
       columns.push_back(dq * dqk);
     }
+    add_waves(columns, place(j), own_waves, one);
+    add_waves(columns, place(j), friction_waves, sign);
     for (const double width : {0.01, 0.03, 0.1, 0.3}) {
       columns.push_back((dq / width).tanh());
       columns.push_back((dq / width).tanh().abs());
@@ -222,10 +361,10 @@ MatrixXd features(const Linearised& at, std::size_t joint, bool healthy) {
     columns.push_back(tau * (dq * 40).tanh());
     for (const double distance : {1e-3, 5e-3}) {
       const JointSeries series{m.q.col(j), m.dq.col(j), m.ddq.col(j), {}, m.step_s};
-      columns.push_back(effect_columns(Presliding::name, std::array{turns ? distance : 0.1 * distance},
-                                       at.models().current.joints[joint].sign_width, series)
-                            .col(0)
-                            .array());
+      columns.push_back(
+          effect_columns(Presliding::name, std::array{turns ? distance : 0.1 * distance}, sign_width, series)
+              .col(0)
+              .array());
     }
     Random random(91 + joint);
     for (int r = 0; r < random_features; ++r) {
@@ -233,6 +372,8 @@ MatrixXd features(const Linearised& at, std::size_t joint, bool healthy) {
                    e = 2 * std::numbers::pi * random.uniform(), f = 2 * random.normal();
       columns.push_back((a * scale * q * 0.5 + b * dq + c * (dq / 0.02).asinh() + d * ddq + f * tau + e).cos());
     }
+    add_waves(columns, begins + lasts * Eigen::ArrayXd::LinSpaced(samples, 0, 1), time_features,
+              at.logs()[l].healthy ? Eigen::ArrayXd::Zero(samples).eval() : sign);
     MatrixXd full(samples, static_cast<Index>(columns.size()));
     for (std::size_t c = 0; c < columns.size(); ++c) full.col(static_cast<Index>(c)) = columns[c];
     const ProcessedLog& log = at.logs()[l].log;
@@ -248,64 +389,49 @@ LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& 
   const double w = fit.rows[k] / std::max(fit.square[k], 1e-12 * fit.rows[k] / at.weights()[k]);
   const VectorXd residual = at.residual(joint, fit);
   if (fit.square[k] * at.weights()[k] < 1e-10 * fit.rows[k]) return out;
-  const VectorXd e = only(at, residual, at.fit_blocks());
-  const MatrixXd f = only(at, joint, all_features, at.fit_blocks());
-  const JointRows& rows = at.rows(joint);
-  MatrixXd cross = MatrixXd::Zero(static_cast<Index>(fit.columns.size()), f.cols());
-  MatrixXd surrogate = shifted(at, joint, e, at.fit_blocks());
-  MatrixXd theirs = MatrixXd::Zero(static_cast<Index>(fit.columns.size()), surrogate.cols());
-  for (std::size_t i = 0; i < fit.columns.size(); ++i) {
-    const Index local = rows.local[static_cast<std::size_t>(fit.columns[i])];
-    if (local < 0) continue;
-    cross.row(static_cast<Index>(i)) = w * rows.x.col(local).transpose() * f;
-    theirs.row(static_cast<Index>(i)) = w * rows.x.col(local).transpose() * surrogate;
-  }
-  const MatrixXd z = SymmetricSolver(fit.information).inverse() * cross;
-  MatrixXd gram = w * (f.transpose() * f) - cross.transpose() * z;
-  // What the background takes of them.
   const Background* background = at.background(joint);
-  MatrixXd taken;  // functions x features
-  if (background != nullptr) {
-    const MatrixXd products = background->b.transpose() * f;
-    taken = w * background->inverse * products;
-    gram -= products.transpose() * taken;
-  }
-  const VectorXd size = (w * f.colwise().squaredNorm().transpose().array()).max(1e-300).sqrt().inverse();
-  gram = size.asDiagonal() * gram * size.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(gram);
-  std::vector<Index> kept;
-  for (Index i = 0; i < gram.rows(); ++i) {
-    if (eigen.eigenvalues()[i] > 1e-4) kept.push_back(i);
-  }
-  const MatrixXd basis = eigen.eigenvectors()(Eigen::all, kept);
-  const VectorXd inverse = eigen.eigenvalues()(kept).cwiseInverse();
-  const auto statistic = [&](const VectorXd& b) {
-    const VectorXd along = basis.transpose() * size.cwiseProduct(b);
-    return along.cwiseAbs2().dot(inverse);
-  };
-  const double mine = statistic(w * f.transpose() * e);
-  MatrixXd b = w * (f.transpose() * surrogate) - z.transpose() * theirs;
-  if (background != nullptr) b -= taken.transpose() * (background->b.transpose() * surrogate);
-  VectorXd null(surrogate.cols());
-  for (Index s = 0; s < null.size(); ++s) null[s] = statistic(b.col(s));
-  const double mean = null.mean(),
-               variance = (null.array() - mean).square().sum() / static_cast<double>(null.size() - 1);
-  const double freedom =
-      std::clamp(2 * mean * mean / std::max(variance, 1e-300), 3.0, static_cast<double>(kept.size()));
-  // Shares of the residual: with few rows noise alone fills many of its directions.
-  const double whole = w * e.squaredNorm();
+  const MatrixXd covariance = SymmetricSolver(fit.information).inverse();
+  const Products today = products(at, joint, fit, covariance, w, residual, all_features, false);
+  const Products before = background == nullptr && at.models().has_baseline
+                              ? products(at, joint, fit, covariance, w, residual, all_features, true)
+                              : Products{};
+  // Stand-ins have been fitted by nothing yet.
+  const MatrixXd noise = stand_ins(at, joint, residual, at.fit_blocks());
+  MatrixXd theirs =
+      w * (today.functions.transpose() * noise) - today.fitted.transpose() * times_columns(at, joint, fit, w, noise);
+  if (background != nullptr) theirs -= today.taken.transpose() * (background->b.transpose() * noise);
+  const double mean_noise = w * noise.squaredNorm() / draws;
   auto fitted = static_cast<double>(background != nullptr ? background->b.cols() : 0);
-  for (const Index c : fit.columns) fitted += rows.local[static_cast<std::size_t>(c)] >= 0 ? 1 : 0;
-  double today = 0;
-  for (const std::size_t i : at.fit_blocks()) {
-    if (!at.blocks()[i].healthy) today += static_cast<double>(at.blocks()[i].count);
+  for (const Index c : fit.columns) fitted += at.rows(joint).local[static_cast<std::size_t>(c)] >= 0 ? 1 : 0;
+  // Shares of the residual: with few rows noise alone fills many of its directions.
+  const auto odds = [](double part, double of) { return part / std::max(of - part, 1e-9 * of); };
+  const auto chance_of = [&](const Family& family) {
+    const Projection statistic(today.gram, today.size, family);
+    const auto rank = static_cast<double>(statistic.rank());
+    // The columns are fitted to both sessions; today's rows bear their share of them.
+    const double rest = today.rows - fitted * today.rows / fit.rows[k] - rank;
+    // With hardly more rows than functions nothing can be told.
+    if (rank == 0 || rest <= 0.3 * rank) return 1.0;
+    VectorXd null(draws);
+    for (Index s = 0; s < null.size(); ++s) null[s] = statistic(theirs.col(s));
+    const double mean = null.mean(),
+                 variance = (null.array() - mean).square().sum() / static_cast<double>(null.size() - 1);
+    const double freedom = std::clamp(2 * mean * mean / std::max(variance, 1e-300), 3.0, std::max(3.0, rank));
+    double expected = odds(mean, mean_noise);
+    // What the healthy session has of it as well (friction near standstill, where the velocity is uncertain) is no
+    // change.
+    if (before.rows > 0) {
+      const double part = Projection(before.gram, before.size, family)(before.residual);
+      expected = std::max(expected, odds(part, before.whole) * before.rows / today.rows);
+    }
+    return chance(odds(statistic(today.residual), today.whole) / std::max(expected, 1e-300), freedom, rest);
+  };
+  // All functions together see anything; a family sees its own kind where it is small.
+  const std::vector<Family> all = families(at.joints());
+  out.state_p = chance_of({0, all_features.cols()});
+  for (const Family& family : all) {
+    out.state_p = std::min(out.state_p, static_cast<double>(all.size()) * chance_of(family));
   }
-  // The columns are fitted to both sessions; today's rows bear their share of them.
-  const double rest = today - fitted * today / fit.rows[k] - static_cast<double>(kept.size());
-  const auto odds = [&](double part) { return part / std::max(whole - part, 1e-9 * whole); };
-  // With hardly more rows than functions nothing can be told.
-  if (rest > 0.3 * static_cast<double>(kept.size()))
-    out.state_p = chance(odds(mine) / std::max(odds(mean), 1e-300), freedom, rest);
   out.time_p = std::min(lines(at, residual, at.fit_blocks()).p,
                         at.models().has_baseline ? slow(at, residual, at.fit_blocks()).p : 1.0);
   return out;
@@ -313,37 +439,32 @@ LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& 
 
 double structured_share(const Linearised& at, std::size_t joint, const LinearFit& fit, const MatrixXd& all_features,
                         const std::vector<std::size_t>& blocks) {
-  const VectorXd e = only(at, at.residual(joint, fit), blocks);
+  const VectorXd residual = at.residual(joint, fit), e = only(at, residual, blocks);
   const MatrixXd f = only(at, joint, all_features, blocks);
   Index count = 0;
   for (const std::size_t b : blocks) count += at.blocks()[b].healthy ? 0 : at.blocks()[b].count;
-  if (!(e.squaredNorm() > 0) || 2 * count < 3 * f.cols()) return 0;
+  if (!(e.squaredNorm() > 0)) return 0;
   const VectorXd size = f.colwise().norm().transpose().array().max(1e-300).inverse();
-  const MatrixXd gram = size.asDiagonal() * (f.transpose() * f) * size.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(gram);
-  // Coefficients of an orthonormal basis.
-  const auto coordinates = [&](const VectorXd& x) {
-    VectorXd along = eigen.eigenvectors().transpose() * size.cwiseProduct(f.transpose() * x);
-    for (Index i = 0; i < along.size(); ++i)
-      along[i] = eigen.eigenvalues()[i] > 1e-4 ? along[i] / std::sqrt(eigen.eigenvalues()[i]) : 0;
-    return along;
-  };
-  const auto energy = [&](const VectorXd& x) { return coordinates(x).squaredNorm(); };
-  const MatrixXd surrogate = shifted(at, joint, e, blocks);
-  double null = 0;
-  for (Index s = 0; s < surrogate.cols(); ++s) null += energy(surrogate.col(s)) / static_cast<double>(surrogate.cols());
-  const double whole = e.squaredNorm(), found = energy(e), expected = std::min(null / whole, 0.95);
+  const MatrixXd gram = f.transpose() * f, noise = stand_ins(at, joint, residual, blocks),
+                 theirs = f.transpose() * noise;
+  const VectorXd mine = f.transpose() * e;
+  const double whole = e.squaredNorm();
   // found = structure + expected * (whole - structure)
-  const double of_state = std::clamp((found / whole - expected) / (1 - expected), 0.0, 1.0);
+  const auto share_of = [&](const Projection& energy) {
+    if (2 * count < 3 * energy.rank()) return 0.0;  // too few rows to tell
+    double null = 0;
+    for (Index s = 0; s < theirs.cols(); ++s) null += energy(theirs.col(s));
+    const double found = energy(mine), expected = std::min(null / std::max(noise.squaredNorm(), 1e-300), 0.95);
+    return std::clamp((found / whole - expected) / (1 - expected), 0.0, 1.0);
+  };
+  const Projection all(gram, size, {0, f.cols()});
+  double of_state = share_of(all);
+  for (const Family& family : families(at.joints()))
+    of_state = std::max(of_state, share_of(Projection(gram, size, family)));
   // What the state does not explain may still repeat or wander.
-  VectorXd along = coordinates(e);
-  for (Index i = 0; i < along.size(); ++i) {
-    if (eigen.eigenvalues()[i] > 1e-4) along[i] /= std::sqrt(eigen.eigenvalues()[i]);
-  }
-  const VectorXd rest = e - f * size.cwiseProduct(eigen.eigenvectors() * along);
-  const double of_time =
-      std::max(lines(at, rest, blocks).share,
-               at.models().has_baseline ? slow(at, rest + (at.residual(joint, fit) - e), blocks).share : 0.0);
+  const VectorXd rest = 2 * count < 3 * all.rank() ? e : e - f * all.coefficients(all.coordinates(mine));
+  const double of_time = std::max(lines(at, rest, blocks).share,
+                                  at.models().has_baseline ? slow(at, rest + (residual - e), blocks).share : 0.0);
   return of_state + (1 - of_state) * std::clamp(of_time, 0.0, 1.0);
 }
 

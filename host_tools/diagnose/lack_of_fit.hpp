@@ -4,19 +4,24 @@
 
 namespace fxdyn::diagnosis {
 
-/// Functions of the state that name no effect, for one joint: sines and cosines of all positions, velocities and their
-/// products, paths with memory, random Fourier features of (q, dq, ddq, load). Filtered, decimated and whitened like
-/// everything else; rows x features, zero on the healthy session's rows unless `healthy`.
+/// Functions of the state that name no effect, for one joint: cosines over the ranges of all positions, velocities and
+/// their products, friction over the own position and over the session's time, paths with memory, random Fourier
+/// features of (q, dq, ddq, load). Filtered, decimated and whitened like everything else; rows x features, those of
+/// time last. Zero on the healthy session's rows unless `healthy`, and those of time always.
 Eigen::MatrixXd features(const Linearised& at, std::size_t joint, bool healthy = false);
+
+/// Features of time alone: what changes with time does not come back.
+constexpr Eigen::Index time_features = 15;
 
 struct LackOfFit {
   double state_p = 1;  ///< chance that noise looks as much like a function of the state
   double time_p = 1;   ///< .. like something periodic or slow in time
-  bool structured() const { return state_p < 1e-6 || time_p < 1e-6; }
+  bool structured() const { return state_p < 1e-8 || time_p < 1e-6; }
 };
 
-/// Is there structure in what a fit leaves of a joint, on the rows that fit? The statistic's distribution comes from
-/// the same residual at other times, so that noise of any colour counts as noise.
+/// Is there structure in what a fit leaves of a joint, on the rows that fit? All functions together see anything, and
+/// each family of them its own kind where that is small (Bonferroni). The statistics' distribution comes from the
+/// healthy session's residual, else from the same residual at other times: noise of any colour counts as noise.
 LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& fit, const Eigen::MatrixXd& features);
 
 /// Share of the squared residual of a fit on the blocks that is a function of the state, or of the rest a matter of

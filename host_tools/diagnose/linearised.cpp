@@ -630,6 +630,7 @@ void Linearised::add_background(std::size_t joint) {
   auto background = std::make_unique<Background>();
   background->b = features(*this, joint, true);
   MatrixXd& b = background->b;
+  b.conservativeResize(Eigen::NoChange, b.cols() - time_features);
   // Of the size of the noise each at most: friction and base parameters must not hide in it.
   const VectorXd rms = (b.colwise().norm() / std::sqrt(static_cast<double>(b.rows()))).transpose().array().max(1e-300);
   b = b * rms.cwiseInverse().asDiagonal();

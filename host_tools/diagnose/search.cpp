@@ -383,8 +383,8 @@ void Search::find_ripples(const Choice& state, std::optional<std::size_t> joint)
     if (!joint || j == *joint) found[j] = ripples(at_, j, at_.residual(j, state.fit), 3);
   });
   std::vector<Group> fresh;
-  for (const auto& joint : found) {
-    for (const Group& group : joint) {
+  for (const auto& of_joint : found) {
+    for (const Group& group : of_joint) {
       const bool known = std::any_of(at_.groups().begin(), at_.groups().end(), [&](const Group& g) {
         return g.candidate.effect == group.candidate.effect && g.candidate.joint == group.candidate.joint &&
                std::fabs(g.candidate.shape[0] - group.candidate.shape[0]) < 1e-9;

@@ -158,7 +158,8 @@ TEST(SocketCan, ReadsStatesFromErrorFrames) {
   EXPECT_EQ(bus.errors().transmit, 128);
   EXPECT_EQ(bus.errors().receive, 3);
   EXPECT_NE(explain(bus.errors(), "can0", 500'000)
-                .find("not the bit rate of the bus, here 500000: ip link set can0 down && ip link set can0 up type can "
+                .find("not the bit rate of the bus, here 500000: sudo ip link set can0 down && sudo ip link set can0 "
+                      "up type can "
                       "bitrate"),
             std::string::npos);
   error_frame(CAN_ERR_BUSOFF, 0, 0, 0);
