@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/model/effects.hpp"
@@ -65,10 +66,19 @@ void Outcome::look_again(const std::vector<SessionLog>& logs) {
   whitening = at->whitening();
   features.resize(at->joints());
   lack.resize(at->joints());
-  const LinearFit fit = at->solve(columns_of(*at, in_model(*at)));
+  const std::vector<Index> columns = columns_of(*at, in_model(*at));
+  const LinearFit fit = at->solve(columns);
+  std::optional<LinearFit> alone;
+  if (models.has_baseline) {
+    std::vector<std::size_t> healthy;
+    for (const std::size_t b : at->fit_blocks()) {
+      if (at->blocks()[b].healthy) healthy.push_back(b);
+    }
+    alone = at->solve(columns, healthy);
+  }
   parallel_for(at->joints(), [&](std::size_t j) {
     features[j] = diagnosis::features(*at, j, models.has_baseline);
-    lack[j] = lack_of_fit(*at, j, fit, features[j]);
+    lack[j] = lack_of_fit(*at, j, fit, alone ? &*alone : nullptr, features[j]);
   });
 }
 

@@ -23,14 +23,16 @@ constexpr int draws = 32;
 /// What stands for noise on the rows in `blocks`, one column a draw: pieces of the healthy session's residual. Where
 /// there is none, or it has structure of its own, the residual of the same log at other times, which is more than noise
 /// as it holds what is looked for.
-MatrixXd stand_ins(const Linearised& at, std::size_t joint, const VectorXd& e, const std::vector<std::size_t>& blocks) {
+/// @param before what a fit leaves of the healthy session
+MatrixXd stand_ins(const Linearised& at, std::size_t joint, const VectorXd& e, const VectorXd& before,
+                   const std::vector<std::size_t>& blocks) {
   Random random(4177 + joint);
   MatrixXd out = MatrixXd::Zero(e.size(), draws);
   std::vector<double> healthy;
   for (const std::size_t i : at.fit_blocks()) {
     const Block& b = at.blocks()[i];
     if (b.healthy && at.background(joint) == nullptr)
-      healthy.insert(healthy.end(), e.data() + b.first, e.data() + b.first + b.count);
+      healthy.insert(healthy.end(), before.data() + b.first, before.data() + b.first + b.count);
   }
   const auto stock = static_cast<Index>(healthy.size());
   for (const std::size_t i : blocks) {
@@ -257,14 +259,14 @@ struct Products {
   double whole = 0, rows = 0;  ///< squared residual; how many rows
 };
 
-Products products(const Linearised& at, std::size_t joint, const LinearFit& fit, const MatrixXd& covariance, double w,
-                  const VectorXd& residual, const MatrixXd& all_features, bool healthy) {
+Products products(const Linearised& at, std::size_t joint, const LinearFit& fit, double w, const VectorXd& residual,
+                  const MatrixXd& all_features, bool healthy) {
   Products out;
   out.functions = only(at, joint, all_features, at.fit_blocks(), healthy);
   const MatrixXd& f = out.functions;
   const VectorXd e = only(at, residual, at.fit_blocks(), healthy);
   const MatrixXd cross = times_columns(at, joint, fit, w, f);
-  out.fitted = covariance * cross;
+  out.fitted = SymmetricSolver(fit.information).inverse() * cross;
   out.gram = w * (f.transpose() * f) - cross.transpose() * out.fitted;
   if (const Background* background = at.background(joint)) {
     const MatrixXd with = background->b.transpose() * f;
@@ -383,20 +385,25 @@ MatrixXd features(const Linearised& at, std::size_t joint, bool healthy) {
   return out;
 }
 
-LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& fit, const MatrixXd& all_features) {
+LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& fit, const LinearFit* alone,
+                      const MatrixXd& all_features) {
   LackOfFit out;
   const auto k = static_cast<Index>(joint);
   const double w = fit.rows[k] / std::max(fit.square[k], 1e-12 * fit.rows[k] / at.weights()[k]);
   const VectorXd residual = at.residual(joint, fit);
   if (fit.square[k] * at.weights()[k] < 1e-10 * fit.rows[k]) return out;
   const Background* background = at.background(joint);
-  const MatrixXd covariance = SymmetricSolver(fit.information).inverse();
-  const Products today = products(at, joint, fit, covariance, w, residual, all_features, false);
-  const Products before = background == nullptr && at.models().has_baseline
-                              ? products(at, joint, fit, covariance, w, residual, all_features, true)
-                              : Products{};
+  const Products today = products(at, joint, fit, w, residual, all_features, false);
+  // Fitted on its own: what today's structure does to common parameters is not the healthy session's.
+  Products before;
+  VectorXd healthy = residual;
+  if (background == nullptr && alone != nullptr) {
+    healthy = at.residual(joint, *alone);
+    before =
+        products(at, joint, *alone, alone->rows[k] / std::max(alone->square[k], 1e-300), healthy, all_features, true);
+  }
   // Stand-ins have been fitted by nothing yet.
-  const MatrixXd noise = stand_ins(at, joint, residual, at.fit_blocks());
+  const MatrixXd noise = stand_ins(at, joint, residual, healthy, at.fit_blocks());
   MatrixXd theirs =
       w * (today.functions.transpose() * noise) - today.fitted.transpose() * times_columns(at, joint, fit, w, noise);
   if (background != nullptr) theirs -= today.taken.transpose() * (background->b.transpose() * noise);
@@ -445,7 +452,7 @@ double structured_share(const Linearised& at, std::size_t joint, const LinearFit
   for (const std::size_t b : blocks) count += at.blocks()[b].healthy ? 0 : at.blocks()[b].count;
   if (!(e.squaredNorm() > 0)) return 0;
   const VectorXd size = f.colwise().norm().transpose().array().max(1e-300).inverse();
-  const MatrixXd gram = f.transpose() * f, noise = stand_ins(at, joint, residual, blocks),
+  const MatrixXd gram = f.transpose() * f, noise = stand_ins(at, joint, residual, residual, blocks),
                  theirs = f.transpose() * noise;
   const VectorXd mine = f.transpose() * e;
   const double whole = e.squaredNorm();

@@ -22,7 +22,9 @@ struct LackOfFit {
 /// Is there structure in what a fit leaves of a joint, on the rows that fit? All functions together see anything, and
 /// each family of them its own kind where that is small (Bonferroni). The statistics' distribution comes from the
 /// healthy session's residual, else from the same residual at other times: noise of any colour counts as noise.
-LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& fit, const Eigen::MatrixXd& features);
+/// @param alone the same columns fitted to the healthy session only; null where there is none
+LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& fit, const LinearFit* alone,
+                      const Eigen::MatrixXd& features);
 
 /// Share of the squared residual of a fit on the blocks that is a function of the state, or of the rest a matter of
 /// time (lines, slow changes), the expected part of noise taken off; 0..1.

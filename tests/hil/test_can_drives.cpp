@@ -257,7 +257,9 @@ TEST_F(CanDrivesTest, SaysWhatToDo) {
 TEST_F(CanDrivesTest, SaysWhichNodeHasNoFd) {
   two_nodes();
   bus_.nodes[2].has_fd = false;
-  CanDrives drives(bus_, model_, {.fd = true});
+  CanDrives::Settings settings;
+  settings.fd = true;
+  CanDrives drives(bus_, model_, settings);
   try {
     drives.restart();
     FAIL() << "taken";
