@@ -8,8 +8,9 @@ bin=$1 image=$2 ticks=${3:-5000} least=${4:-0}
 
 if [ "${FXDYN_INSIDE:-0}" = 0 ]; then
   lines=$(mktemp -d)
+  # mux: a UART without it gets one byte a turn of QEMU's main loop, with it the next one as soon as it has read the last
   timeout 840 qemu-system-arm -M mps2-an386 -display none -monitor none \
-    -chardev "socket,id=line,path=$lines/board,server=on,wait=on" -serial chardev:line -kernel "$image" &
+    -chardev "socket,id=line,path=$lines/board,server=on,wait=on,mux=on" -serial chardev:line -kernel "$image" &
   board=$!
   "$bin/slcan_relay" "$lines/host" "$lines/board" &
   trap 'kill $board 2>/dev/null || true; rm -rf "$lines"' EXIT
