@@ -3,6 +3,7 @@
 # one by one; bad input gives exit code 1 or 2, one line that says what is wrong, and no files.
 set -u
 fxdyn=$1
+here=$(cd "$(dirname "$0")" && pwd)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
@@ -164,6 +165,23 @@ judge joule 'NR > 1 { $4 *= 1000; $5 *= 1000 } { print }'
 expect 1 "joule.csv: its torques are" diagnose joule
 judge fewer '{ print $1, $2, $4 }'
 expect 2 "no column 'q2'" diagnose fewer
+
+# Gears that bend and friction that sticks, in two logs: a load that fits them and spoils the validate log goes, and what
+# is true stays (compliance 3e-4, 1.2 N m of friction over 4 mrad).
+cp -r "$here/../support/elastic_arm" .
+sed -i 's/^encoder_bits = 22/&\nlink_encoder_bits = 22/' elastic_arm/arm.toml
+"$fxdyn" diagnose elastic_arm/arm.project --out elastic >elastic.txt 2>&1 || fail "elastic arm: $(tail -1 elastic.txt)"
+python3 - <<'PYTHON' || fail "the elastic arm: $(cat elastic.txt)"
+import json
+diagnosis = json.load(open("elastic/diagnosis.json"))
+assert not diagnosis["robot_effects"] and not diagnosis["resembles"]
+for joint in diagnosis["joints"]:
+    assert joint["verdict"] == "effects_found" and joint["gap_after"] < 0.1 * joint["gap_before"], joint
+    assert {e["effect"] for e in joint["effects"]} == {"elasticity", "presliding"}
+found = {e["effect"]: {p["name"]: p["value"] for p in e["parameters"]} for e in diagnosis["joints"][1]["effects"]}
+assert abs(found["elasticity"]["compliance"] / 3e-4 - 1) < 0.02
+assert abs(found["presliding"]["amplitude"] / 1.2 - 1) < 0.03 and abs(found["presliding"]["distance"] / 4e-3 - 1) < 0.03
+PYTHON
 
 # A diagnosed model is a plant.
 printf 'seed = 1\n[robot]\nmodel = "%s/run/model.json"\n[[log]]\nname = "played"\nduration_s = 4\nseed = 3\n' "$work" >played.toml

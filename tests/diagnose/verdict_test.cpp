@@ -36,6 +36,15 @@ TEST(DiagnosisVerdict, WhatRepeatsInTimeIsUnexplainedWhateverElseHasAName) {
   EXPECT_LT(report.at("joints").at(1).at("noise_floor"), 0.8 * report.at("joints").at(1).at("gap_after").get<double>());
 }
 
+TEST(DiagnosisVerdict, ASlowStructureOfAnotherJointIsUnexplained) {
+  if (test::sanitized) GTEST_SKIP() << "other cases run the same code";
+  // A cable that the shoulder pulls along at the elbow: half of the noise, and like itself at other times.
+  const json report = diagnosed(
+      "cable", {.tamper = [](Log& log) { log.tau.col(1).array() += 0.15 * (5 * log.q.col(0).array() + 0.7).sin(); }});
+  EXPECT_EQ(report.at("joints").at(0).at("verdict"), "nothing_missing");
+  EXPECT_EQ(report.at("joints").at(1).at("verdict"), "unexplained") << report.dump(1);
+}
+
 TEST(DiagnosisVerdict, TestLogsDecideNothing) {
   if (test::sanitized) GTEST_SKIP() << "other cases run the same code";
   const std::string drift = effect("friction_drift", 1, "time_constant = 30.0, coulomb = -0.9, viscous = -0.5");
