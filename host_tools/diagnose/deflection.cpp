@@ -423,7 +423,9 @@ Deflections find_deflections(const IdentifiedModel& model, const MatrixXd& base_
                              const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before,
                              std::vector<DeflectionEffect>& background) {
   const std::size_t n = model.joints.size();
-  const std::vector<MatrixXd> load_now = loads(model, now), load_before = loads(model, before);
+  IdentifiedModel healthy_model = model;  // without today's load
+  std::erase_if(healthy_model.body, [](const EffectFit& fit) { return fit.named; });
+  const std::vector<MatrixXd> load_now = loads(model, now), load_before = loads(healthy_model, before);
   std::vector<Deflections> found(n);
   std::vector<std::vector<DeflectionEffect>> learned(n);
   parallel_for(n, [&](std::size_t j) {

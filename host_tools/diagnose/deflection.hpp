@@ -32,6 +32,7 @@ struct Deflections {
 /// deflection fits best (maximum a posteriori, Gauss-Newton over parameters of load and effects). A rotor that the base
 /// parameters have is found the same way: the gear does not carry it. What a healthy
 /// session has alike (within a third) is not reported but returned in `background`.
+/// Called before any torque is looked at, and again with the model that knows what else was missing.
 /// @param base_covariance of the model's base parameters
 /// @param now logs of the current session (train fits, validate judges) @param before healthy ones, may be empty
 Deflections find_deflections(const IdentifiedModel& model, const Eigen::MatrixXd& base_covariance,

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "host_tools/diagnose/deflection.hpp"
@@ -166,7 +167,7 @@ class Work {
 
     Outcome outcome = explore(models_, logs_, settings_, never_, 2, progress_);
     Gate gate = pass(outcome, models_.current, logs_, still_);
-    if (load_of_links_changed(outcome)) gate = pass(outcome, models_.current, logs_, still_);
+    if (refit_links(outcome)) gate = pass(outcome, models_.current, logs_, still_);
     Models& found = outcome.models;
     if (gate.groups.empty() && deflections_.found.empty()) {
       found.current = models_.current;
@@ -255,23 +256,52 @@ class Work {
   }
 
   /// The links' deflection was fitted by the load of a model that did not know what else was missing (friction that it
-  /// lacks bends its inertias): again, by the load of the one that does.
-  bool load_of_links_changed(Outcome& outcome) {
+  /// lacks bends its inertias): again, by the load of the one that does. What comes out as another set of effects, or
+  /// closes less on the data that judge, stays as it was.
+  bool refit_links(Outcome& outcome) {
     if (deflections_.found.empty() || outcome.found.empty()) return false;
-    // Which part of the inertia is the rotor's, too.
-    Models models = outcome.models;
+    const auto at_joint = [](const Deflections& all, std::size_t joint) {
+      std::vector<DeflectionEffect> out;
+      for (const DeflectionEffect& effect : all.found) {
+        if (effect.joint == joint) out.push_back(effect);
+      }
+      std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.fit.effect < b.fit.effect; });
+      return out;
+    };
+    // Which part of the inertia is the rotor's is found anew where the deflection told it.
+    const auto without_rotors = [&](Models models, const Deflections& told, std::vector<EffectId>& ids) {
+      for (const DeflectionEffect& effect : told.found) {
+        if (effect.rotor > 0) forget_rotor(models, ids, effect.joint);
+      }
+      return models;
+    };
     std::vector<EffectId> ids;
     for (const Finding& finding : outcome.found) ids.push_back(finding.id);
-    for (std::size_t j = 0; j < joints(); ++j) forget_rotor(models, ids, j);
+    std::vector<EffectId> unused = ids;
+    const Models asked = without_rotors(outcome.models, deflections_, unused);
     std::vector<DeflectionEffect> already;
     const Deflections again =
-        find_deflections(models.current, base_covariance(Linearised(models, logs_)), data_.logs, baseline_, already);
-    if (again.found.size() != deflections_.found.size()) return false;
-    for (std::size_t i = 0; i < again.found.size(); ++i) {
-      const DeflectionEffect &now = again.found[i], &was = deflections_.found[i];
-      if (now.joint != was.joint || now.fit.effect != was.fit.effect) return false;
+        find_deflections(asked.current, base_covariance(Linearised(asked, logs_)), data_.logs, baseline_, already);
+    Deflections taken, kept;
+    for (std::size_t j = 0; j < joints(); ++j) {
+      const auto now = at_joint(again, j), was = at_joint(deflections_, j);
+      const auto closes = [](const std::vector<DeflectionEffect>& all) {
+        return std::accumulate(all.begin(), all.end(), 0.0,
+                               [](double sum, const DeflectionEffect& effect) { return sum + effect.closure; });
+      };
+      const bool same = std::equal(now.begin(), now.end(), was.begin(), was.end(),
+                                   [](const auto& a, const auto& b) { return a.fit.effect == b.fit.effect; });
+      const bool better = same && !was.empty() && closes(now) >= closes(was) - 0.01;
+      taken.found.insert(taken.found.end(), now.begin(), better ? now.end() : now.begin());
+      kept.found.insert(kept.found.end(), was.begin(), better ? was.begin() : was.end());
     }
-    for (const DeflectionEffect& effect : again.found) {
+    if (taken.found.empty()) return false;
+    Deflections replaced;  // where the old rotor goes
+    for (const DeflectionEffect& effect : deflections_.found) {
+      if (!at_joint(taken, effect.joint).empty()) replaced.found.push_back(effect);
+    }
+    Models models = without_rotors(outcome.models, replaced, ids);
+    for (const DeflectionEffect& effect : taken.found) {
       for (EffectFit& fit : models.current.joints[effect.joint].effects) {
         if (fit.effect == effect.fit.effect) fit = effect.fit;
       }
@@ -280,7 +310,8 @@ class Work {
       }
       add_rotor(models, effect);
     }
-    deflections_.found = again.found;
+    kept.found.insert(kept.found.end(), taken.found.begin(), taken.found.end());
+    deflections_.found = kept.found;
     outcome.models = std::move(models);
     for (std::size_t i = 0; i < ids.size(); ++i) outcome.found[i].id = ids[i];
     refit(outcome.models, logs_, outcome.whitening, 4);

@@ -1,6 +1,7 @@
 #include "host_tools/diagnose/lack_of_fit.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <complex>
 #include <numbers>
@@ -18,30 +19,29 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int random_features = 24;
-constexpr int draws = 32;
+constexpr int draws = 64;
 
 /// What stands for noise on the rows in `blocks`, one column a draw: pieces of the healthy session's residual. Where
-/// there is none, or it has structure of its own, the residual of the same log at other times, which is more than noise
-/// as it holds what is looked for.
-/// @param before what a fit leaves of the healthy session
-MatrixXd stand_ins(const Linearised& at, std::size_t joint, const VectorXd& e, const VectorXd& before,
+/// there is little of it, or it has structure of its own, the residual of the same block at other times, which is more
+/// than noise as it holds what is looked for.
+MatrixXd stand_ins(const Linearised& at, std::size_t joint, const VectorXd& e, const VectorXd& healthy_residual,
                    const std::vector<std::size_t>& blocks) {
   Random random(4177 + joint);
   MatrixXd out = MatrixXd::Zero(e.size(), draws);
-  std::vector<double> healthy;
+  std::vector<double> stock;
   for (const std::size_t i : at.fit_blocks()) {
     const Block& b = at.blocks()[i];
     if (b.healthy && at.background(joint) == nullptr)
-      healthy.insert(healthy.end(), before.data() + b.first, before.data() + b.first + b.count);
+      stock.insert(stock.end(), healthy_residual.data() + b.first, healthy_residual.data() + b.first + b.count);
   }
-  const auto stock = static_cast<Index>(healthy.size());
+  const std::size_t size = stock.size();
   for (const std::size_t i : blocks) {
     const Block& b = at.blocks()[i];
-    if (b.healthy) continue;
     for (int k = 0; k < draws; ++k) {
-      if (stock > b.count) {
-        const auto from = static_cast<Index>(random.uniform() * static_cast<double>(stock - b.count));
-        out.block(b.first, k, b.count, 1) = Eigen::Map<const VectorXd>(healthy.data() + from, b.count);
+      if (2 * size >= static_cast<std::size_t>(b.count)) {
+        const auto from = static_cast<std::size_t>(random.uniform() * static_cast<double>(size));
+        for (Index row = 0; row < b.count; ++row)
+          out(b.first + row, k) = stock[(from + static_cast<std::size_t>(row)) % size];
       } else {
         const auto by = static_cast<Index>(random.uniform(0.08, 0.92) * static_cast<double>(b.count));
         out.block(b.first, k, b.count - by, 1) = e.segment(b.first + by, b.count - by);
@@ -185,7 +185,7 @@ struct Family {
 };
 
 /// In the order of the columns: each other joint's position, all their velocities, own position, friction over it, own
-/// motion and load, random features (none of a family), friction over time.
+/// motion and load, random features (none of a family), friction over today's rows in their order.
 std::vector<Family> families(std::size_t joints) {
   std::vector<Family> out;
   Index at = 0;
@@ -214,7 +214,8 @@ void add_waves(std::vector<Eigen::ArrayXd>& columns, const Eigen::ArrayXd& u, In
 class Projection {
  public:
   /// @param gram of the functions once what is fitted has been taken out; size: their norms before
-  Projection(MatrixXd gram, VectorXd size, const Family& of) : size_(size.segment(of.first, of.count)), of_(of) {
+  Projection(const MatrixXd& gram, const VectorXd& size, const Family& of)
+      : size_(size.segment(of.first, of.count)), of_(of) {
     const auto scale = size_.asDiagonal();
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(scale * gram.block(of.first, of.first, of.count, of.count) *
                                                         scale);
@@ -310,8 +311,8 @@ MatrixXd features(const Linearised& at, std::size_t joint, bool healthy) {
   const Eigen::ArrayXd range = (high - low).max(1e-9);
   const bool turns = at.models().current.robot.joints[joint].type == JointType::revolute;
   const double sign_width = at.models().current.joints[joint].sign_width;
-  VectorXd scales_of(5 * joints + 2);
-  scales_of << speed, acceleration, low, range, 0, static_cast<double>(today), load;
+  VectorXd scales_of(5 * joints + 3);
+  scales_of << speed, acceleration, low, range, 0, static_cast<double>(today), load, sign_width;
   Index earlier = 0;  // rows of today's logs before this one
   for (std::size_t l = 0; l < at.logs().size(); ++l) {
     if (at.logs()[l].healthy && !healthy) continue;
@@ -321,6 +322,7 @@ MatrixXd features(const Linearised& at, std::size_t joint, bool healthy) {
       out.middleRows(at.log_rows(l).first, count) = at.finish(l, joint, rows);
     };
     scales_of[4 * joints] = at.logs()[l].healthy ? -1.0 : static_cast<double>(earlier);
+    scales_of[4 * joints + 1] = at.logs()[l].healthy ? 0.0 : static_cast<double>(today);
     const double begins = static_cast<double>(earlier) / static_cast<double>(today),
                  lasts = static_cast<double>(count) / static_cast<double>(today);
     if (!at.logs()[l].healthy) earlier += count;
@@ -376,6 +378,7 @@ MatrixXd features(const Linearised& at, std::size_t joint, bool healthy) {
     }
     add_waves(columns, begins + lasts * Eigen::ArrayXd::LinSpaced(samples, 0, 1), time_features,
               at.logs()[l].healthy ? Eigen::ArrayXd::Zero(samples).eval() : sign);
+    assert(columns.size() == static_cast<std::size_t>(families(n).back().first + families(n).back().count));
     MatrixXd full(samples, static_cast<Index>(columns.size()));
     for (std::size_t c = 0; c < columns.size(); ++c) full.col(static_cast<Index>(c)) = columns[c];
     const ProcessedLog& log = at.logs()[l].log;
@@ -399,15 +402,18 @@ LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& 
   VectorXd healthy = residual;
   if (background == nullptr && alone != nullptr) {
     healthy = at.residual(joint, *alone);
-    before =
-        products(at, joint, *alone, alone->rows[k] / std::max(alone->square[k], 1e-300), healthy, all_features, true);
+    before = products(at, joint, *alone, at.weights()[k], healthy, all_features, true);
   }
-  // Stand-ins have been fitted by nothing yet.
+  // Stand-ins, in both sessions, have been fitted by nothing yet.
   const MatrixXd noise = stand_ins(at, joint, residual, healthy, at.fit_blocks());
   MatrixXd theirs =
       w * (today.functions.transpose() * noise) - today.fitted.transpose() * times_columns(at, joint, fit, w, noise);
   if (background != nullptr) theirs -= today.taken.transpose() * (background->b.transpose() * noise);
-  const double mean_noise = w * noise.squaredNorm() / draws;
+  double mean_noise = 0;
+  for (const std::size_t i : at.fit_blocks()) {
+    const Block& b = at.blocks()[i];
+    if (!b.healthy) mean_noise += w * noise.middleRows(b.first, b.count).squaredNorm() / draws;
+  }
   auto fitted = static_cast<double>(background != nullptr ? background->b.cols() : 0);
   for (const Index c : fit.columns) fitted += at.rows(joint).local[static_cast<std::size_t>(c)] >= 0 ? 1 : 0;
   // Shares of the residual: with few rows noise alone fills many of its directions.
@@ -423,13 +429,15 @@ LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& 
     for (Index s = 0; s < null.size(); ++s) null[s] = statistic(theirs.col(s));
     const double mean = null.mean(),
                  variance = (null.array() - mean).square().sum() / static_cast<double>(null.size() - 1);
-    const double freedom = std::clamp(2 * mean * mean / std::max(variance, 1e-300), 3.0, std::max(3.0, rank));
+    const double freedom = std::clamp(2 * mean * mean / std::max(variance, 1e-300), 1.0, rank);
     double expected = odds(mean, mean_noise);
-    // What the healthy session has of it as well (friction near standstill, where the velocity is uncertain) is no
-    // change.
+    // What the healthy session has of it beyond noise (friction near standstill, where the velocity is uncertain) is no
+    // change: the same share, however many rows there are.
     if (before.rows > 0) {
-      const double part = Projection(before.gram, before.size, family)(before.residual);
-      expected = std::max(expected, odds(part, before.whole) * before.rows / today.rows);
+      const Projection then(before.gram, before.size, family);
+      const auto also = static_cast<double>(then.rank());
+      const double beyond = odds(then(before.residual), before.whole) - also / std::max(before.rows - also, 1.0);
+      expected = std::max(expected, rank / rest + std::max(0.0, beyond));
     }
     return chance(odds(statistic(today.residual), today.whole) / std::max(expected, 1e-300), freedom, rest);
   };

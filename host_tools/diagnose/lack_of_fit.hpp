@@ -5,9 +5,9 @@
 namespace fxdyn::diagnosis {
 
 /// Functions of the state that name no effect, for one joint: cosines over the ranges of all positions, velocities and
-/// their products, friction over the own position and over the session's time, paths with memory, random Fourier
-/// features of (q, dq, ddq, load). Filtered, decimated and whitened like everything else; rows x features, those of
-/// time last. Zero on the healthy session's rows unless `healthy`, and those of time always.
+/// their products, friction over the own position and over today's rows in their order, paths with memory, random
+/// Fourier features of (q, dq, ddq, load). Filtered, decimated and whitened like everything else; rows x features,
+/// those of time last. Zero on the healthy session's rows unless `healthy`, and those of time always.
 Eigen::MatrixXd features(const Linearised& at, std::size_t joint, bool healthy = false);
 
 /// Features of time alone: what changes with time does not come back.
@@ -20,8 +20,9 @@ struct LackOfFit {
 };
 
 /// Is there structure in what a fit leaves of a joint, on the rows that fit? All functions together see anything, and
-/// each family of them its own kind where that is small (Bonferroni). The statistics' distribution comes from the
-/// healthy session's residual, else from the same residual at other times: noise of any colour counts as noise.
+/// each family of them its own kind where that is small (Bonferroni over the families). The statistics' distribution
+/// comes from the healthy session's residual, else from the same residual at other times: noise of any colour counts as
+/// noise.
 /// @param alone the same columns fitted to the healthy session only; null where there is none
 LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& fit, const LinearFit* alone,
                       const Eigen::MatrixXd& features);

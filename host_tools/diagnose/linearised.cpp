@@ -969,7 +969,9 @@ double least_inertia(const IdentifiedModel& model, std::size_t joint, const std:
 
 MatrixXd base_covariance(const Linearised& at) {
   const auto n = static_cast<Index>(at.models().current.base.size());
-  return SymmetricSolver(at.solve(at.nuisance()).information).inverse().topLeftCorner(n, n);
+  std::vector<Index> all(at.unknowns().size());
+  std::iota(all.begin(), all.end(), Index{0});
+  return SymmetricSolver(at.solve(all).information).inverse().topLeftCorner(n, n);
 }
 
 void update(Models& models, const Linearised& at, const LinearFit& fit, double share) {
