@@ -97,6 +97,8 @@ struct JointModel {
   using LinkShape = Link_;
   static constexpr std::size_t words = (0 + ... + words_of<Effects>);
   static constexpr bool deflects = (false || ... || (acts_on<Effects> == ActsOn::position));
+  /// By the load: what deflects has to know the torque first.
+  static constexpr bool bends = (false || ... || (acts_on<Effects> == ActsOn::position && needs_structural<Effects>));
   static constexpr bool couples = (false || ... || needs_peers<Effects>);
   template <class N>
   using State = std::tuple<typename Effects::template State<N>...>;
@@ -155,6 +157,7 @@ struct RobotModel {
   static constexpr std::size_t outputs = static_cast<std::size_t>(std::popcount(outputs_));
   static constexpr std::size_t effect_words = (0 + ... + Joints::words);
   static constexpr bool deflects = (false || ... || Joints::deflects);
+  static constexpr bool bends = (false || ... || Joints::bends);
   static constexpr bool couples = (false || ... || Joints::couples);
 
   /// In flash. Only 32-bit words on a target.
@@ -198,9 +201,11 @@ struct RobotModel {
       if constexpr (couples) inputs[i].peers = inputs;
     }
     std::array<Torque<N>, joints> structural;
-    rigid_body<deflects ? 0 : first>(parameters, limited, structural);
+    if constexpr (bends || !deflects) rigid_body<deflects ? 0 : first>(parameters, limited, structural);
     if constexpr (deflects) {
-      for (std::size_t i = 0; i < joints; ++i) inputs[i].structural = structural[i];
+      if constexpr (bends) {
+        for (std::size_t i = 0; i < joints; ++i) inputs[i].structural = structural[i];
+      }
       each(
           [&]<std::size_t i, class J>(const typename N::Word* data) {
             const auto sum =

@@ -176,16 +176,17 @@ InTime slow(const Linearised& at, const VectorXd& e, const std::vector<std::size
 
 /// Waves over the recorded range: of another joint's position, of the own one, of friction over the own one.
 constexpr Index other_waves = 6, own_waves = 8, friction_waves = 10;
-/// Functions of another joint's velocity; of the own motion and load.
-constexpr Index of_other_velocity = 3, of_own = 14;
+/// Functions of another joint's velocity; of the own motion and load, the first of them of the motion alone.
+constexpr Index of_other_velocity = 3, of_own = 14, of_own_motion = 10;
 
 /// Columns of features() that belong together.
 struct Family {
   Index first, count;
 };
 
-/// In the order of the columns: each other joint's position, all their velocities, own position, friction over it, own
-/// motion and load, random features (none of a family), friction over today's rows in their order.
+/// In the order of the columns: each other joint's position, all their velocities, own position, own motion and load,
+/// friction over the own position, random features (none of a family), friction over a session's rows in their order.
+/// Those that know nothing but the motion come first.
 std::vector<Family> families(std::size_t joints) {
   std::vector<Family> out;
   Index at = 0;
@@ -197,8 +198,8 @@ std::vector<Family> families(std::size_t joints) {
   for (Index k = 0; k < others; ++k) add(other_waves);
   add(of_other_velocity * others);
   add(own_waves);
-  add(friction_waves);
   add(of_own);
+  add(friction_waves);
   at += random_features;
   add(time_features);
   return out;
@@ -251,7 +252,8 @@ MatrixXd times_columns(const Linearised& at, std::size_t joint, const LinearFit&
   return out;
 }
 
-/// The functions on one session's rows, as what is fitted leaves them, and their products with the residual.
+/// The functions on one session's rows, as what is fitted leaves them, and their products with the residual. Of the
+/// healthy session a background is left in both: how much it is, is asked.
 struct Products {
   MatrixXd functions{};  ///< as they are, rows x functions
   MatrixXd gram{};
@@ -269,7 +271,7 @@ Products products(const Linearised& at, std::size_t joint, const LinearFit& fit,
   const MatrixXd cross = times_columns(at, joint, fit, w, f);
   out.fitted = SymmetricSolver(fit.information).inverse() * cross;
   out.gram = w * (f.transpose() * f) - cross.transpose() * out.fitted;
-  if (const Background* background = at.background(joint)) {
+  if (const Background* background = at.background(joint); background != nullptr && !healthy) {
     const MatrixXd with = background->b.transpose() * f;
     out.taken = w * background->inverse * with;
     out.gram -= with.transpose() * out.taken;
@@ -293,8 +295,10 @@ MatrixXd features(const Linearised& at, std::size_t joint, bool healthy) {
   const auto joints = static_cast<Index>(n);
   Eigen::ArrayXd speed = Eigen::ArrayXd::Zero(joints), acceleration = speed, load = speed,
                  low = Eigen::ArrayXd::Constant(joints, 1e300), high = -low;
-  Index today = 0;
+  // Scales are those of the logs that fit, which every linearisation has: rows that are kept stay true.
+  Index fitted[2] = {0, 0};  // rows of the session: today's, the healthy one's
   for (std::size_t l = 0; l < at.logs().size(); ++l) {
+    if (!at.logs()[l].fits) continue;
     const ProcessedLog& log = at.logs()[l].log;
     const auto inside = [&](const MatrixXd& m) { return m.middleRows(log.first, log.last - log.first).array(); };
     const auto most = [&](const MatrixXd& m) { return inside(m).abs().colwise().maxCoeff().transpose().eval(); };
@@ -303,7 +307,7 @@ MatrixXd features(const Linearised& at, std::size_t joint, bool healthy) {
     load = load.max(most(at.robot_columns(l).structural()));
     low = low.min(inside(at.motion(l).q).colwise().minCoeff().transpose());
     high = high.max(inside(at.motion(l).q).colwise().maxCoeff().transpose());
-    if (!at.logs()[l].healthy) today += at.log_rows(l).count;
+    fitted[at.logs()[l].healthy] += at.log_rows(l).count;
   }
   speed = speed.max(1e-9);
   acceleration = acceleration.max(1e-9);
@@ -311,79 +315,87 @@ MatrixXd features(const Linearised& at, std::size_t joint, bool healthy) {
   const Eigen::ArrayXd range = (high - low).max(1e-9);
   const bool turns = at.models().current.robot.joints[joint].type == JointType::revolute;
   const double sign_width = at.models().current.joints[joint].sign_width;
-  VectorXd scales_of(5 * joints + 3);
-  scales_of << speed, acceleration, low, range, 0, static_cast<double>(today), load, sign_width;
-  Index earlier = 0;  // rows of today's logs before this one
+  VectorXd motion_scales(4 * joints), model_scales(joints + 3);
+  motion_scales << speed, acceleration, low, range;
+  model_scales << load, sign_width, 0, 0;
+  const Index of_motion = other_waves * (joints - 1) + of_other_velocity * (joints - 1) + own_waves + of_own_motion;
+  // Rows of the session before a log. Those that judge come after those that fit.
+  Index fits_before[2] = {0, 0}, judges_before[2] = {fitted[0], fitted[1]};
   for (std::size_t l = 0; l < at.logs().size(); ++l) {
-    if (at.logs()[l].healthy && !healthy) continue;
+    const SessionLog& entry = at.logs()[l];
+    if (entry.healthy && !healthy) continue;
+    const ProcessedLog& log = entry.log;
     const Index count = at.log_rows(l).count;
-    const auto put = [&](const MatrixXd& rows) {
-      if (out.size() == 0) out.setZero(total, rows.cols());
-      out.middleRows(at.log_rows(l).first, count) = at.finish(l, joint, rows);
-    };
-    scales_of[4 * joints] = at.logs()[l].healthy ? -1.0 : static_cast<double>(earlier);
-    scales_of[4 * joints + 1] = at.logs()[l].healthy ? 0.0 : static_cast<double>(today);
-    const double begins = static_cast<double>(earlier) / static_cast<double>(today),
-                 lasts = static_cast<double>(count) / static_cast<double>(today);
-    if (!at.logs()[l].healthy) earlier += count;
-    RowCache::Features& kept = at.logs()[l].cache->features[joint];
-    // The load moves a little with each fit; these functions need not.
-    const auto motion = 4 * joints + 2;
-    if (kept.rows.size() > 0 && kept.scales.size() == scales_of.size() &&
-        kept.scales.head(motion) == scales_of.head(motion) &&
-        ((kept.scales - scales_of).array().abs() <= 0.05 * scales_of.array().abs()).all()) {
-      put(kept.rows);
-      continue;
-    }
+    Index& before = (entry.fits ? fits_before : judges_before)[entry.healthy];
+    const auto first = static_cast<double>(before), whole = static_cast<double>(fitted[entry.healthy]);
+    const double begins = first / whole, lasts = static_cast<double>(count) / whole;
+    model_scales.tail(2) << first, whole;
+    before += count;
     const Motion& m = at.motion(l);
     const Index samples = m.q.rows();
-    std::vector<Eigen::ArrayXd> columns;
-    const Eigen::ArrayXd q = m.q.col(j), dq = m.dq.col(j) / speed[j], ddq = m.ddq.col(j) / acceleration[j],
-                         tau = at.robot_columns(l).structural().col(j).array() / load[j],
-                         sign = (m.dq.col(j).array() / sign_width).tanh(), one = Eigen::ArrayXd::Ones(samples);
-    const double scale = turns ? 1.0 : 10.0;
+    const Eigen::ArrayXd dq = m.dq.col(j) / speed[j], ddq = m.ddq.col(j) / acceleration[j],
+                         one = Eigen::ArrayXd::Ones(samples);
     const auto place = [&](Index k) -> Eigen::ArrayXd { return (m.q.col(k).array() - low[k]) / range[k]; };
-    for (Index k = 0; k < joints; ++k) {
-      if (k != j) add_waves(columns, place(k), other_waves, one);
+    std::vector<Eigen::ArrayXd> columns;
+    const auto keep = [&](RowCache::Features& in, const VectorXd& scales) {
+      MatrixXd full(samples, static_cast<Index>(columns.size()));
+      for (std::size_t c = 0; c < columns.size(); ++c) full.col(static_cast<Index>(c)) = columns[c];
+      columns.clear();
+      in = {scales, log.decimate(log.filter_columns(full))};
+    };
+    auto& [kept_motion, kept_model] = entry.cache->features[joint];
+    if (kept_motion.scales.size() == 0 || kept_motion.scales != motion_scales) {
+      for (Index k = 0; k < joints; ++k) {
+        if (k != j) add_waves(columns, place(k), other_waves, one);
+      }
+      for (Index k = 0; k < joints; ++k) {
+        if (k == j) continue;
+        const Eigen::ArrayXd dqk = m.dq.col(k).array() / speed[k];
+        columns.push_back((dqk * 40).tanh());
+        columns.push_back(dqk);
+        columns.push_back(dq * dqk);
+      }
+      add_waves(columns, place(j), own_waves, one);
+      for (const double width : {0.01, 0.03, 0.1, 0.3}) {
+        columns.push_back((dq / width).tanh());
+        columns.push_back((dq / width).tanh().abs());
+      }
+      columns.push_back(ddq);
+      columns.push_back(ddq * ddq.abs());
+      keep(kept_motion, motion_scales);
+      kept_model.scales.resize(0);
     }
-    for (Index k = 0; k < joints; ++k) {
-      if (k == j) continue;
-      const Eigen::ArrayXd dqk = m.dq.col(k).array() / speed[k];
-      columns.push_back((dqk * 40).tanh());
-      columns.push_back(dqk);
-      columns.push_back(dq * dqk);
+    // The load moves a little with each fit; these functions need not.
+    if (kept_model.scales.size() == 0 ||
+        !((kept_model.scales - model_scales).array().abs() <= 0.05 * model_scales.array().abs()).all()) {
+      const Eigen::ArrayXd tau = at.robot_columns(l).structural().col(j).array() / load[j],
+                           sign = (m.dq.col(j).array() / sign_width).tanh();
+      columns.push_back(tau);
+      columns.push_back(tau * (dq * 40).tanh());
+      for (const double distance : {1e-3, 5e-3}) {
+        const JointSeries series{m.q.col(j), m.dq.col(j), m.ddq.col(j), {}, m.step_s};
+        columns.push_back(
+            effect_columns(Presliding::name, std::array{turns ? distance : 0.1 * distance}, sign_width, series)
+                .col(0)
+                .array());
+      }
+      add_waves(columns, place(j), friction_waves, sign);
+      const double scale = turns ? 0.5 : 5.0;
+      const Eigen::ArrayXd slowest = (dq / 0.02).asinh();
+      Random random(91 + joint);
+      for (int r = 0; r < random_features; ++r) {
+        const double a = 3 * random.normal(), b = 3 * random.normal(), c = 1.5 * random.normal(), d = random.normal(),
+                     e = 2 * std::numbers::pi * random.uniform(), f = 2 * random.normal();
+        columns.push_back((a * scale * m.q.col(j).array() + b * dq + c * slowest + d * ddq + f * tau + e).cos());
+      }
+      add_waves(columns, begins + lasts * Eigen::ArrayXd::LinSpaced(samples, 0, 1), time_features, sign);
+      keep(kept_model, model_scales);
     }
-    add_waves(columns, place(j), own_waves, one);
-    add_waves(columns, place(j), friction_waves, sign);
-    for (const double width : {0.01, 0.03, 0.1, 0.3}) {
-      columns.push_back((dq / width).tanh());
-      columns.push_back((dq / width).tanh().abs());
-    }
-    columns.push_back(ddq);
-    columns.push_back(ddq * ddq.abs());
-    columns.push_back(tau);
-    columns.push_back(tau * (dq * 40).tanh());
-    for (const double distance : {1e-3, 5e-3}) {
-      const JointSeries series{m.q.col(j), m.dq.col(j), m.ddq.col(j), {}, m.step_s};
-      columns.push_back(
-          effect_columns(Presliding::name, std::array{turns ? distance : 0.1 * distance}, sign_width, series)
-              .col(0)
-              .array());
-    }
-    Random random(91 + joint);
-    for (int r = 0; r < random_features; ++r) {
-      const double a = 3 * random.normal(), b = 3 * random.normal(), c = 1.5 * random.normal(), d = random.normal(),
-                   e = 2 * std::numbers::pi * random.uniform(), f = 2 * random.normal();
-      columns.push_back((a * scale * q * 0.5 + b * dq + c * (dq / 0.02).asinh() + d * ddq + f * tau + e).cos());
-    }
-    add_waves(columns, begins + lasts * Eigen::ArrayXd::LinSpaced(samples, 0, 1), time_features,
-              at.logs()[l].healthy ? Eigen::ArrayXd::Zero(samples).eval() : sign);
-    assert(columns.size() == static_cast<std::size_t>(families(n).back().first + families(n).back().count));
-    MatrixXd full(samples, static_cast<Index>(columns.size()));
-    for (std::size_t c = 0; c < columns.size(); ++c) full.col(static_cast<Index>(c)) = columns[c];
-    const ProcessedLog& log = at.logs()[l].log;
-    kept = {scales_of, log.decimate(log.filter_columns(full))};
-    put(kept.rows);
+    const Index cols = of_motion + kept_model.rows.cols();
+    assert(kept_motion.rows.cols() == of_motion && cols == families(n).back().first + families(n).back().count);
+    if (out.size() == 0) out.setZero(total, cols);
+    out.block(at.log_rows(l).first, 0, count, of_motion) = at.finish(l, joint, kept_motion.rows);
+    out.block(at.log_rows(l).first, of_motion, count, cols - of_motion) = at.finish(l, joint, kept_model.rows);
   }
   return out;
 }
@@ -400,8 +412,8 @@ LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& 
   // Fitted on its own: what today's structure does to common parameters is not the healthy session's.
   Products before;
   VectorXd healthy = residual;
-  if (background == nullptr && alone != nullptr) {
-    healthy = at.residual(joint, *alone);
+  if (alone != nullptr) {
+    healthy = at.residual_with_background(joint, *alone);
     before = products(at, joint, *alone, at.weights()[k], healthy, all_features, true);
   }
   // Stand-ins, in both sessions, have been fitted by nothing yet.
@@ -430,16 +442,20 @@ LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& 
     const double mean = null.mean(),
                  variance = (null.array() - mean).square().sum() / static_cast<double>(null.size() - 1);
     const double freedom = std::clamp(2 * mean * mean / std::max(variance, 1e-300), 1.0, rank);
-    double expected = odds(mean, mean_noise);
-    // What the healthy session has of it beyond noise (friction near standstill, where the velocity is uncertain) is no
-    // change: the same share, however many rows there are.
+    double expected = odds(mean, mean_noise), known_by = rest;
+    // What the healthy session has of it beyond noise (friction near standstill, where the velocity is uncertain, or a
+    // background that another motion shows otherwise) is no change: the same share, however many rows there are.
     if (before.rows > 0) {
       const Projection then(before.gram, before.size, family);
       const auto also = static_cast<double>(then.rank());
-      const double beyond = odds(then(before.residual), before.whole) - also / std::max(before.rows - also, 1.0);
-      expected = std::max(expected, rank / rest + std::max(0.0, beyond));
+      const double beyond =
+          std::max(0.0, odds(then(before.residual), before.whole) - also / std::max(before.rows - also, 1.0));
+      expected = std::max(expected, rank / rest + beyond);
+      // A background is known as well as so many of its functions tell it, not rows.
+      if (background != nullptr)
+        known_by = expected * expected / (expected * expected / rest + beyond * beyond / freedom);
     }
-    return chance(odds(statistic(today.residual), today.whole) / std::max(expected, 1e-300), freedom, rest);
+    return chance(odds(statistic(today.residual), today.whole) / std::max(expected, 1e-300), freedom, known_by);
   };
   // All functions together see anything; a family sees its own kind where it is small.
   const std::vector<Family> all = families(at.joints());

@@ -475,7 +475,8 @@ void Linearised::make_rows() {
       full[j].setZero(log.samples(), static_cast<Index>(rows_[j].column.size()) - (nb - first_base(j)) + 1);
       rows_[j].x.block(at, 0, count, nb - first_base(j)) = base_rows(l, j);
     }
-    const MatrixXd torque = torque_of(l, model);
+    const bool bends_slowly = slow_[l] && stiffened(model);  // then predict() is not all there is
+    const MatrixXd torque = bends_slowly ? torque_of(l, model) : robot_[l]->torque();
     MatrixXd predicted = torque;
     for (Index c = nb; c < columns_; ++c) {
       const Unknown& common = unknowns_[static_cast<std::size_t>(c)];
@@ -512,8 +513,12 @@ void Linearised::make_rows() {
           double step = difference * value;
           if (u.kind == Unknown::Kind::shape && fit.shape[u.index] * std::exp(step) > u.upper) step = -step;
           add_to(more, u, step);
-          const MatrixXd slope = (torque_of(l, more) - torque) / step;
-          for (std::size_t j = 0; j < n; ++j) columns[j] = slope.col(static_cast<Index>(j));
+          if (info.acts_on == ActsOn::torque && u.kind != Unknown::Kind::rotor && !bends_slowly) {
+            columns[u.joint] = robot_[l]->own_slope(more, u.joint, step);
+          } else {
+            const MatrixXd slope = (torque_of(l, more) - torque) / step;
+            for (std::size_t j = 0; j < n; ++j) columns[j] = slope.col(static_cast<Index>(j));
+          }
         } else if (u.kind == Unknown::Kind::linear) {
           columns[u.joint] =
               full_rate(l, {fit.effect, u.joint, fit.shape}).joints[u.joint].col(static_cast<Index>(u.index));
@@ -621,7 +626,7 @@ void Linearised::make_rows() {
     rows.sums.clear();
     sum_up(rows, 0);
   });
-  for (const std::size_t j : models_.background) add_background(j);
+  parallel_for(models_.background.size(), [&](std::size_t k) { add_background(models_.background[k]); });
   reweight();
 }
 
@@ -874,6 +879,18 @@ VectorXd Linearised::residual(std::size_t joint, const LinearFit& fit) const {
     if (at >= 0) e -= fit.x[static_cast<Index>(i)] * rows.x.col(at);
   }
   return e;
+}
+
+VectorXd Linearised::residual_with_background(std::size_t joint, const LinearFit& fit) const {
+  VectorXd e = residual(joint, fit);
+  if (!background_[joint]) return e;
+  const JointRows& rows = rows_[joint];
+  VectorXd more = rows.more_y;
+  for (std::size_t i = 0; i < fit.columns.size(); ++i) {
+    const Index at = rows.local[static_cast<std::size_t>(fit.columns[i])];
+    if (at >= 0) more -= fit.x[static_cast<Index>(i)] * rows.more_x.col(at);
+  }
+  return e - background_[joint]->b * (more / std::sqrt(Background::prior));
 }
 
 MatrixXd Linearised::cross(const std::vector<Index>& columns, Index from) const {

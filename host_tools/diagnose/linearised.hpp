@@ -49,9 +49,12 @@ struct RowCache {
     Eigen::VectorXd scales;
     Eigen::MatrixXd rows;
   };
+  struct AllFeatures {
+    Features of_motion, of_model;
+  };
   std::once_flag made;
   std::vector<Eigen::MatrixXd> base;  ///< per joint: its base columns, nothing following in the torque's path
-  std::vector<Features> features;     ///< per joint, see features()
+  std::vector<AllFeatures> features;  ///< per joint, see features()
 };
 
 /// A log of one of the two sessions. Rows are decimated to `log.decimation`.
@@ -189,6 +192,8 @@ class Linearised {
   Eigen::VectorXd row_count(const std::vector<std::size_t>& blocks) const;
   /// Whitened residual of a joint, all rows.
   Eigen::VectorXd residual(std::size_t joint, const LinearFit& fit) const;
+  /// .. with what the joint's background explains still in it.
+  Eigen::VectorXd residual_with_background(std::size_t joint, const LinearFit& fit) const;
   /// Share of a joint's rows in which the friction that an uncertain velocity makes is more than the noise.
   double doubtful(std::size_t joint) const;
   bool is_doubtful(std::size_t joint, Eigen::Index row) const { return row_scale_[joint][row] < std::sqrt(0.5); }

@@ -130,7 +130,8 @@ Evaluator<N>::Evaluator(const IdentifiedModel& model, double tick_s) {
     if (const auto& bls = model.joints[i].bls)
       with_bls_types(*bls, [&]<class Inputs, class Activation>() {
         add_bls<Inputs, Activation>(i, *bls, node_bits(model, i), tick_s);
-      ; });
+        ;
+      });
     for (const EffectFit* fit : in_order(model.joints[i], true)) add_effect(i, *fit, tick_s);
   }
   limited_.resize(n);
@@ -152,6 +153,7 @@ void Evaluator<N>::add_effect(std::size_t joint, const EffectFit& fit, double ti
     found = true;
     constexpr bool position = acts_on<E> == ActsOn::position;
     deflects_ |= position;
+    bends_ |= position && needs_structural<E>;
     couples_ |= needs_peers<E>;
     if constexpr (needs_peers<E>) {
       const double other = fit.shape[0];
@@ -260,28 +262,17 @@ std::span<const Torque<N>> Evaluator<N>::rigid_body(std::span<const JointState<N
 }
 
 template <class N>
-std::span<const Torque<N>> Evaluator<N>::tick(std::span<const JointState<N>> setpoints, Saturations& saturations) {
-  // RobotModel::tick() with what is a type there read from lists
-  const std::size_t n = joints();
-  const auto rigid_body = [&] {
-    rnea<N, std::dynamic_extent>(geometry_, inertia_, up_, limited_, motions_, wrenches_, structural_);
-  };
-  for (std::size_t i = 0; i < n; ++i) {
+void Evaluator<N>::take(std::span<const JointState<N>> setpoints, Saturations& saturations) {
+  for (std::size_t i = 0; i < joints(); ++i) {
     limited_[i] = limit_setpoint<N>(setpoints[i], constants_[i].limits, saturations);
     inputs_[i] = joint_input<N>(limited_[i], constants_[i]);
     if (couples_) inputs_[i].peers = inputs_;
   }
-  rigid_body();
-  if (deflects_) {
-    for (std::size_t i = 0; i < n; ++i) inputs_[i].structural = structural_[i];
-    for (std::size_t i = 0; i < n; ++i) {
-      auto sum = N::no_deflection();
-      for (auto& step : steps_[i]) sum = sum + step->deflection(inputs_[i], saturations);
-      limited_[i] = deflections_[i].step(limited_[i], sum, ticks_per_second_, constants_[i].limits, saturations);
-    }
-    rigid_body();
-  }
-  for (std::size_t i = 0; i < n; ++i) {
+}
+
+template <class N>
+std::span<const Torque<N>> Evaluator<N>::put_out(Saturations& saturations) {
+  for (std::size_t i = 0; i < joints(); ++i) {
     if (!is_output(i)) continue;
     inputs_[i].structural = structural_[i];
     auto sum = N::no_torque();
@@ -291,6 +282,35 @@ std::span<const Torque<N>> Evaluator<N>::tick(std::span<const JointState<N>> set
     tau_[i] = joint_feedforward<N>(structural_[i], sum, constants_[i].limits, saturations);
   }
   return tau_;
+}
+
+template <class N>
+std::span<const Torque<N>> Evaluator<N>::tick(std::span<const JointState<N>> setpoints, Saturations& saturations) {
+  // RobotModel::tick() with what is a type there read from lists
+  const std::size_t n = joints();
+  const auto rigid_body = [&] {
+    rnea<N, std::dynamic_extent>(geometry_, inertia_, up_, limited_, motions_, wrenches_, structural_);
+  };
+  take(setpoints, saturations);
+  if (!deflects_ || bends_) rigid_body();
+  if (deflects_) {
+    for (std::size_t i = 0; bends_ && i < n; ++i) inputs_[i].structural = structural_[i];
+    for (std::size_t i = 0; i < n; ++i) {
+      auto sum = N::no_deflection();
+      for (auto& step : steps_[i]) sum = sum + step->deflection(inputs_[i], saturations);
+      limited_[i] = deflections_[i].step(limited_[i], sum, ticks_per_second_, constants_[i].limits, saturations);
+    }
+    rigid_body();
+  }
+  return put_out(saturations);
+}
+
+template <class N>
+std::span<const Torque<N>> Evaluator<N>::tick(std::span<const JointState<N>> setpoints,
+                                              std::span<const Torque<N>> structural, Saturations& saturations) {
+  take(setpoints, saturations);
+  std::copy(structural.begin(), structural.end(), structural_.begin());
+  return put_out(saturations);
 }
 
 template <class N>
@@ -335,16 +355,19 @@ Predictor::Predictor(const IdentifiedModel& model, double step_s, double age_s)
 }
 
 void Predictor::operator()(const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq, const Eigen::MatrixXd& ddq,
-                           Eigen::Ref<Eigen::MatrixXd> tau, Eigen::MatrixXd* deflections) {
+                           Eigen::Ref<Eigen::MatrixXd> tau, Eigen::MatrixXd* deflections, Eigen::MatrixXd* structural) {
   Saturations saturations;
   if (deflections != nullptr) deflections->resize(q.rows(), q.cols());
+  if (structural != nullptr) structural->resize(q.rows(), q.cols());
   for (Eigen::Index k = 0; k < q.rows(); ++k) {
     for (Eigen::Index i = 0; i < q.cols(); ++i) state_[static_cast<std::size_t>(i)] = {q(k, i), dq(k, i), ddq(k, i)};
     const auto out = evaluator_.tick(state_, saturations);
-    for (Eigen::Index i = 0; i < q.cols(); ++i) tau(k, i) = out[static_cast<std::size_t>(i)];
-    if (deflections == nullptr) continue;
-    for (Eigen::Index i = 0; i < q.cols(); ++i)
-      (*deflections)(k, i) = evaluator_.deflections()[static_cast<std::size_t>(i)].delta;
+    for (Eigen::Index i = 0; i < q.cols(); ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      tau(k, i) = out[at];
+      if (deflections != nullptr) (*deflections)(k, i) = evaluator_.deflections()[at].delta;
+      if (structural != nullptr) (*structural)(k, i) = evaluator_.structural()[at];
+    }
   }
 }
 
@@ -352,6 +375,25 @@ Eigen::MatrixXd predict(const IdentifiedModel& model, const Eigen::MatrixXd& q, 
                         const Eigen::MatrixXd& ddq, double step_s, Eigen::MatrixXd* deflections, double age_s) {
   Eigen::MatrixXd tau(q.rows(), q.cols());
   Predictor(model, step_s, age_s)(q, dq, ddq, tau, deflections);
+  return tau;
+}
+
+Eigen::VectorXd predict_joint(const IdentifiedModel& model, std::size_t joint, const Eigen::MatrixXd& q,
+                              const Eigen::MatrixXd& dq, const Eigen::MatrixXd& ddq, const Eigen::MatrixXd& structural,
+                              double step_s) {
+  Evaluator<Real> evaluator(unlimited(model), step_s);
+  evaluator.set_outputs(1U << joint);
+  std::vector<JointState<Real>> state(model.joints.size());
+  std::vector<double> known(model.joints.size());
+  Saturations saturations;
+  Eigen::VectorXd tau(q.rows());
+  for (Eigen::Index k = 0; k < q.rows(); ++k) {
+    for (Eigen::Index i = 0; i < q.cols(); ++i) {
+      state[static_cast<std::size_t>(i)] = {q(k, i), dq(k, i), ddq(k, i)};
+      known[static_cast<std::size_t>(i)] = structural(k, i);
+    }
+    tau[k] = evaluator.tick(state, known, saturations)[joint];
+  }
   return tau;
 }
 

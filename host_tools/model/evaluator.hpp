@@ -89,6 +89,10 @@ class Evaluator {
   std::span<const Torque<N>> rigid_body(std::span<const JointState<N>> states);
   /// One tick; the span returned is valid until the next call.
   std::span<const Torque<N>> tick(std::span<const JointState<N>> setpoints, Saturations& saturations);
+  /// The same where the rigid-body torque of this tick is known: structural() of a model that differs in its torque
+  /// effects only.
+  std::span<const Torque<N>> tick(std::span<const JointState<N>> setpoints, std::span<const Torque<N>> structural,
+                                  Saturations& saturations);
   /// Rigid-body torque of the last tick.
   std::span<const Torque<N>> structural() const { return structural_; }
   /// Between motor and link of each joint in the last tick; at rest where no effect acts on the position.
@@ -155,6 +159,8 @@ class Evaluator {
     return FromSi<N>::word({group, quantity}, value);
   }
   bool is_output(std::size_t i) const { return (outputs_ >> i & 1U) != 0; }
+  void take(std::span<const JointState<N>> setpoints, Saturations& saturations);
+  std::span<const Torque<N>> put_out(Saturations& saturations);
   void add_effect(std::size_t joint, const EffectFit& fit, double tick_s);
   template <class Inputs, class Activation>
   void add_bls(std::size_t joint, const BroadLearningFit& fit, int bits, double tick_s);
@@ -162,7 +168,7 @@ class Evaluator {
   Vector3<LinearAcceleration<N>> up_;
   Count<N> ticks_per_second_{};
   std::uint32_t outputs_ = ~0U;
-  bool deflects_ = false, couples_ = false;
+  bool deflects_ = false, bends_ = false, couples_ = false;
   std::vector<LinkGeometry<N>> geometry_;
   std::vector<LinkInertia<N>> inertia_;
   std::vector<JointConstants<N>> constants_;
@@ -187,9 +193,10 @@ class Predictor {
   /// @param age_s how long the robot has run before the motion (Evaluator::warm_up) [s]
   Predictor(const IdentifiedModel& model, double step_s, double age_s = 0);
   /// The next samples of the motion, samples x joints; writes their torques [N*m | N] and, where asked for, motor minus
-  /// link of each joint [rad | m].
+  /// link of each joint [rad | m] and the rigid body's part of the torque.
   void operator()(const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq, const Eigen::MatrixXd& ddq,
-                  Eigen::Ref<Eigen::MatrixXd> tau, Eigen::MatrixXd* deflections = nullptr);
+                  Eigen::Ref<Eigen::MatrixXd> tau, Eigen::MatrixXd* deflections = nullptr,
+                  Eigen::MatrixXd* structural = nullptr);
 
  private:
   Evaluator<Real> evaluator_;
@@ -203,5 +210,11 @@ IdentifiedModel unlimited(IdentifiedModel model);
 Eigen::MatrixXd predict(const IdentifiedModel& model, const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,
                         const Eigen::MatrixXd& ddq, double step_s, Eigen::MatrixXd* deflections = nullptr,
                         double age_s = 0);
+
+/// One joint's torque over a whole motion where the rigid body's part is known (samples x joints), which is what takes
+/// the time: for models that differ in this joint's torque effects only.
+Eigen::VectorXd predict_joint(const IdentifiedModel& model, std::size_t joint, const Eigen::MatrixXd& q,
+                              const Eigen::MatrixXd& dq, const Eigen::MatrixXd& ddq, const Eigen::MatrixXd& structural,
+                              double step_s);
 
 }  // namespace fxdyn

@@ -45,13 +45,8 @@ std::vector<ColumnName> column_names(std::string_view effect, JointType type) {
 }
 
 RobotColumns::RobotColumns(const IdentifiedModel& model, const Motion& motion)
-    : model_(model), motion_(&motion), torque_(predict(model, motion)) {
-  IdentifiedModel rigid = model;
-  for (JointFit& joint : rigid.joints) {
-    std::erase_if(joint.effects, [](const EffectFit& fit) { return info_of(fit.effect).acts_on != ActsOn::position; });
-    joint.bls.reset();
-  }
-  structural_ = predict(rigid, motion);
+    : model_(model), motion_(&motion), torque_(motion.q.rows(), motion.q.cols()) {
+  Predictor(model, motion.step_s)(motion.q, motion.dq, motion.ddq, torque_, nullptr, &structural_);
 }
 
 MatrixXd RobotColumns::phi(const EffectCandidate& candidate) const {
@@ -73,6 +68,13 @@ MatrixXd RobotColumns::phi(const EffectCandidate& candidate) const {
 
 MatrixXd RobotColumns::slope(const IdentifiedModel& changed, double theta) const {
   return (predict(changed, *motion_) - torque_) / theta;
+}
+
+Eigen::VectorXd RobotColumns::own_slope(const IdentifiedModel& changed, std::size_t joint, double theta) const {
+  const Motion& m = *motion_;
+  return (predict_joint(changed, joint, m.q, m.dq, m.ddq, structural_, m.step_s) -
+          torque_.col(static_cast<Index>(joint))) /
+         theta;
 }
 
 EffectColumns RobotColumns::operator()(const EffectCandidate& candidate) const {
@@ -121,7 +123,12 @@ EffectColumns RobotColumns::operator()(const EffectCandidate& candidate) const {
       if (largest > 0) step /= largest;
       std::vector<double> linear(info.linear.size());
       linear[i] = step;
-      slopes.push_back(largest > 0 ? slope(with(linear), step) : MatrixXd::Zero(torque_.rows(), torque_.cols()));
+      slopes.emplace_back(MatrixXd::Zero(torque_.rows(), torque_.cols()));
+      if (largest > 0 && info.acts_on == ActsOn::torque) {
+        slopes.back().col(static_cast<Index>(candidate.joint)) = own_slope(with(linear), candidate.joint, step);
+      } else if (largest > 0) {
+        slopes.back() = slope(with(linear), step);
+      }
     }
   }
   for (Index j = 0; j < torque_.cols(); ++j) {

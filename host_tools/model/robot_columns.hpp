@@ -51,6 +51,9 @@ class RobotColumns {
   /// The model's torque, and that of its rigid body (after deflections), samples x joints [N*m | N].
   const Eigen::MatrixXd& torque() const { return torque_; }
   const Eigen::MatrixXd& structural() const { return structural_; }
+  /// [torque of `changed` - torque of the model] / theta at one joint, where nothing else differs than that joint's
+  /// torque effects.
+  Eigen::VectorXd own_slope(const IdentifiedModel& changed, std::size_t joint, double theta) const;
 
  private:
   /// [torque of `changed` - torque of the model] / theta
