@@ -142,7 +142,7 @@ MatrixXd bls_rows(const BroadLearningFit& bls, const ProcessedLog& log, Index jo
     nodes(u.data(), log.samples(), weights.data(), first);
     if (from == 0) tile.block(0, filter.before(), inputs, log.samples()) = u;
     filter(tile, kept);
-    for (Index r = 0; r < rows; ++r) out.row(r).segment(from, count) = kept.col(r).head(count);
+    for (Index lane = 0; lane < count; ++lane) out.col(from + lane) = kept.row(lane).transpose();
   }
   return out;
 }

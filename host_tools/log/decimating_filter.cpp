@@ -131,10 +131,10 @@ DecimatingFilter::DecimatingFilter(double cutoff_hz, double step_s, Index sample
 }
 
 void DecimatingFilter::continue_beyond(MatrixXd& tile) const {
+  const auto at = [&](Index i) { return Eigen::Map<Eigen::Array<double, lanes, 1>>(tile.data() + lanes * i); };
   const Index begin = before(), end = begin + samples_, last = samples_ - 1;
-  for (Index i = 1; i <= begin; ++i) tile.col(begin - i) = 2 * tile.col(begin) - tile.col(begin + std::min(i, last));
-  for (Index i = 1; end - 1 + i < tile.cols(); ++i)
-    tile.col(end - 1 + i) = 2 * tile.col(end - 1) - tile.col(end - 1 - std::min(i, last));
+  for (Index i = 1; i <= begin; ++i) at(begin - i) = 2 * at(begin) - at(begin + std::min(i, last));
+  for (Index i = 1; end - 1 + i < tile.cols(); ++i) at(end - 1 + i) = 2 * at(end - 1) - at(end - 1 - std::min(i, last));
 }
 
 void DecimatingFilter::operator()(MatrixXd& tile, MatrixXd& out) const {
