@@ -15,14 +15,26 @@ struct Vector {
   [[gnu::always_inline]] static const Double& at(const double* x) { return *reinterpret_cast<const Double*>(x); }
 };
 
-/// Whether the processor has vectors of four (AVX2); every one has vectors of two. Inner loops are compiled for both:
-/// without fused multiply-add, so that the outcome is the same to the bit. Tests turn it off.
+/// How long the processor's vectors are: eight (AVX-512), four (AVX2), and every one has vectors of two. Inner loops
+/// are compiled for all of them, without fused multiply-add (-ffp-contract=off), so that the outcome is the same to the
+/// bit. Tests make it less.
 #ifdef __x86_64__
 #define FXDYN_FOUR_AT_ONCE [[gnu::target("avx2")]]
-inline std::atomic<bool> four_at_once = __builtin_cpu_supports("avx2") != 0;
+#define FXDYN_EIGHT_AT_ONCE [[gnu::target("avx512f,avx512dq")]]
+inline std::atomic<int> at_once = __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512dq") != 0 ? 8
+                                  : __builtin_cpu_supports("avx2") != 0                                             ? 4
+                                                                                                                    : 2;
 #else
 #define FXDYN_FOUR_AT_ONCE
-inline std::atomic<bool> four_at_once = false;
+#define FXDYN_EIGHT_AT_ONCE
+inline std::atomic<int> at_once = 2;
 #endif
+
+/// Of the same function compiled three times, the one for this processor.
+template <class Function>
+Function* widest(Function* eight, Function* four, Function* two) {
+  const int count = at_once;
+  return count >= 8 ? eight : count >= 4 ? four : two;
+}
 
 }  // namespace fxdyn

@@ -15,8 +15,6 @@ namespace fxdyn {
 namespace {
 
 constexpr int blocks_of_one_log = 5;
-/// Rows of columns that are multiplied while they are in the processor's cache.
-constexpr Eigen::Index cached_rows = 1024;
 
 /// The inputs, then the nodes, at full rate.
 Eigen::MatrixXd bls_columns(const BroadLearningFit& bls, double sign_width, const JointSeries& series) {
@@ -349,20 +347,11 @@ void Fitter::make_base_moments(std::size_t joint) {
 
 Fitter::Own Fitter::own_moments(std::size_t joint, const Eigen::MatrixXd& own) const {
   Own out;
-  const Eigen::MatrixXd& base_rows = data_->base_rows[joint];
   for (const Block& block : data_->blocks) {
-    OwnMoments m{Eigen::MatrixXd::Zero(base_rows.cols(), own.cols()), Eigen::MatrixXd::Zero(own.cols(), own.cols()),
-                 Eigen::VectorXd::Zero(own.cols())};
-    for (Eigen::Index from = block.from; own.cols() > 0 && from < block.to; from += cached_rows) {
-      const Eigen::Index count = std::min(cached_rows, block.to - from);
-      const auto x = own.middleRows(from, count);
-      const Eigen::MatrixXd wx = row_weights_[joint].segment(from, count).asDiagonal() * x;
-      m.cross.noalias() += base_rows.middleRows(from, count).transpose() * wx;
-      m.gram.triangularView<Eigen::Lower>() += wx.transpose() * x;
-      m.projection.noalias() += wx.transpose() * torque_rows_[joint].segment(from, count);
-    }
-    m.gram.triangularView<Eigen::StrictlyUpper>() = m.gram.transpose();
-    out.push_back(std::move(m));
+    const Eigen::Index count = block.to - block.from;
+    out.push_back(weighted_products(data_->base_rows[joint].middleRows(block.from, count),
+                                    own.middleRows(block.from, count), row_weights_[joint].segment(block.from, count),
+                                    torque_rows_[joint].segment(block.from, count)));
   }
   return out;
 }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "host_tools/identify/dataset.hpp"
+#include "host_tools/identify/products.hpp"
 #include "host_tools/identify/regressor.hpp"
 #include "host_tools/identify/square_root.hpp"
 #include "host_tools/model/effects.hpp"
@@ -18,10 +19,6 @@ struct BaseMoments {
   Eigen::VectorXd projection;
   double square = 0;  ///< of the torque
   double count = 0;   ///< rows, by their weights
-};
-struct OwnMoments {
-  Eigen::MatrixXd cross, gram;  ///< base x own, own x own
-  Eigen::VectorXd projection;
 };
 
 /// Linear parameters of one fit.

@@ -69,17 +69,16 @@ class ZeroPhaseFilter {
   /// A cut-off at or above 0.95 of the Nyquist frequency, or <= 0, makes it the identity.
   ZeroPhaseFilter(double cutoff_hz, double step_s, int order = 4);
   Eigen::MatrixXd apply(const Eigen::Ref<const Eigen::MatrixXd>& columns) const;
-  /// The same of `lanes` columns that stand side by side: lanes x samples.
-  static constexpr Eigen::Index lanes = 8;
-  void apply_in_place(Eigen::MatrixXd& side_by_side) const;
   /// Samples at either end that the transient of the filter can reach.
   Eigen::Index edge_samples() const;
   double cutoff_hz() const { return cutoff_hz_; }
-
- private:
+  /// (b0 + b1 / z + b2 / z^2) / (1 + a1 / z + a2 / z^2), one after another; none: the identity.
   struct Section {
     double b0, b1, b2, a1, a2;
   };
+  const std::vector<Section>& sections() const { return sections_; }
+
+ private:
   template <int columns>
   void apply_to(double* side_by_side, Eigen::Index samples) const;
 

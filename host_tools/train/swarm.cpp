@@ -88,15 +88,27 @@ void Swarm::tell(const VectorXd& values) {
   if (!finished()) move();
 }
 
+VectorXd Swarm::best_near(Index particle) const {
+  const Index n = x_.cols();
+  Index best = particle;
+  for (Index k = -settings_.neighbours; k <= settings_.neighbours; ++k) {
+    const Index other = ((particle + k) % n + n) % n;
+    if (own_value_[other] < own_value_[best]) best = other;
+  }
+  return own_best_.col(best);
+}
+
 void Swarm::move() {
   const double chi = constriction(settings_.cognitive + settings_.social);
   const double done = static_cast<double>(generation_ - 1) / std::max(1, settings_.iterations - 1);
   const double inertia = settings_.first_inertia + done * (settings_.last_inertia - settings_.first_inertia);
+  const bool near = generation_ <= settings_.neighbourly * settings_.iterations;
   for (Index p = 0; p < x_.cols(); ++p) {
     Random random = stream(settings_.seed, generation_, p);
+    const VectorXd followed = near ? best_near(p) : best_;
     for (Index i = 0; i < x_.rows(); ++i) {
       const double own = settings_.cognitive * random.uniform() * (own_best_(i, p) - x_(i, p));
-      const double common = settings_.social * random.uniform() * (best_[i] - x_(i, p));
+      const double common = settings_.social * random.uniform() * (followed[i] - x_(i, p));
       const double most = settings_.largest_step * (upper_[i] - lower_[i]);
       v_(i, p) = std::clamp(inertia * v_(i, p) + chi * (own + common), -most, most);
       x_(i, p) += v_(i, p);

@@ -10,6 +10,8 @@ namespace fxdyn {
 /// - Eq. 33 is chi = 2 / |2 - phi - sqrt(phi^2 - 4 phi)|, phi = c_1 + c_2 > 4 (Clerc and Kennedy 2002).
 /// - chi multiplies the inertia weight too (Eq. 34), which damps twice; `first_inertia` and `last_inertia` are what is
 ///   left of it, chi w, so that the usual figures hold.
+/// - Eq. 34 knows one best of all: a swarm follows it into the first basin it finds. Here g is the best among a
+///   particle's neighbours in a ring (Kennedy and Mendes 2002) for the first part of the search.
 /// - Eq. 38 would stop at the first generation in which nothing was found: here after `stall` of them.
 struct SwarmSettings {
   int particles = 30;
@@ -17,7 +19,9 @@ struct SwarmSettings {
   int stall = 10;                                  ///< stop after so many without progress
   double tolerance = 1e-4;                         ///< progress: the best falls by more than this share
   double cognitive = 2.05, social = 2.05;          ///< c_1, c_2
-  double first_inertia = 0.9, last_inertia = 0.4;  ///< chi w, falling linearly (Eq. 37)
+  double first_inertia = 0.6, last_inertia = 0.3;  ///< chi w, falling linearly (Eq. 37)
+  int neighbours = 2;                              ///< on either side
+  double neighbourly = 0.6;                        ///< share of the generations in which only neighbours are followed
   double largest_step = 0.3;                       ///< velocity's bound, of the box
   std::uint64_t seed = 1;
 };
@@ -28,7 +32,8 @@ struct SwarmSettings {
 ///
 ///   v <- chi [w v + c_1 r_1 (p - x) + c_2 r_2 (g - x)],  x <- x + v,  cut to the box (paper Eqs. 34, 32, 36)
 ///
-/// r_1, r_2 uniform per element; p the particle's best, g the swarm's. At a wall the velocity across it ends.
+/// r_1, r_2 uniform per element; p the particle's best, g its neighbours', later the swarm's. At a wall the velocity
+/// across it ends.
 class Swarm {
  public:
   /// @param lower, upper the box, one element a dimension
@@ -51,6 +56,8 @@ class Swarm {
 
  private:
   void move();
+  /// Where the best of the particle's neighbours was, itself included.
+  Eigen::VectorXd best_near(Eigen::Index particle) const;
 
   Eigen::VectorXd lower_, upper_;
   SwarmSettings settings_;

@@ -42,6 +42,7 @@ struct Options {
   std::uint64_t first_seed = 1;
   fs::path out;
   double worst_ratio = 0, worst_evaluations = 0;  ///< 0: anything goes
+  double duration = 0;                            ///< of the demo's logs [s]; 0: as they are
   bool time = false;
   double rows = 15000;
   std::vector<double> most_nodes{40, 120};
@@ -257,7 +258,9 @@ Table table_of(const std::vector<Runs>& all, std::size_t budget) {
 
 int compare(const Options& options) {
   const Folder folder;
-  const Identified demo_fit(demo / "project.toml", folder.path());
+  const fs::path shorter = folder.path() / "shorter";
+  const Identified demo_fit = options.duration > 0 ? Identified(demo_of(shorter, options.duration), shorter)
+                                                   : Identified(demo / "project.toml", folder.path());
   std::vector<Runs> all;
   std::vector<BlsFitness> fitness;
   std::vector<std::size_t> joints = options.joints;
@@ -371,6 +374,8 @@ int main(int argc, char** argv) {
   app.add_option("--joints", options.joints, "from 1; all unless given")->delimiter(',');
   app.add_option("--particles", options.particles, "of each search")->check(CLI::Range(5, 1000));
   app.add_option("--generations", options.generations, "after the first")->check(CLI::PositiveNumber);
+  app.add_option("--duration", options.duration, "of the logs that are compared on [s]; shorter ones take less time")
+      ->check(CLI::PositiveNumber);
   app.add_option("--out", options.out, "the table, Markdown");
   app.add_option("--worst-ratio", options.worst_ratio,
                  "fail where our median J, after 25, 50 or 100 %, is more than so many times the better peer's");
