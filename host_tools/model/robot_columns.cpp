@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "host_tools/error.hpp"
 #include "host_tools/model/effects.hpp"
 #include "host_tools/model/evaluator.hpp"
@@ -17,6 +19,10 @@ using Eigen::MatrixXd;
 constexpr double small_angle = 1e-6;
 /// Torque that is added, as a share of the model's largest.
 constexpr double small_torque = 1e-6;
+/// Steps of one joint's state. The torque is quadratic in velocities [rad/s | m/s] and linear in accelerations.
+constexpr double small_velocity = 1e-5, unit_acceleration = 1;
+/// All that ByState keeps [bytes].
+constexpr double most_kept = 64e6;
 /// The torque is linear in a payload's mass and first moment: any values do that are small beside a robot's.
 constexpr double small_mass = 1e-3, lever = 1;
 
@@ -47,6 +53,54 @@ std::vector<ColumnName> column_names(std::string_view effect, JointType type) {
 RobotColumns::RobotColumns(const IdentifiedModel& model, const Motion& motion)
     : model_(model), motion_(&motion), torque_(motion.q.rows(), motion.q.cols()) {
   Predictor(model, motion.step_s)(motion.q, motion.dq, motion.ddq, torque_, nullptr, &structural_);
+  const bool plain = std::all_of(model.joints.begin(), model.joints.end(), [](const JointFit& joint) {
+    return !joint.bls && std::all_of(joint.effects.begin(), joint.effects.end(), [](const EffectFit& fit) {
+      const EffectInfo& info = info_of(fit.effect);
+      return info.acts_on == ActsOn::torque && !info.needs_structural && !info.needs_total;
+    });
+  });
+  const auto joints = static_cast<double>(model.joints.size());
+  if (!plain || 3 * sizeof(double) * joints * joints * static_cast<double>(motion.q.rows()) > most_kept) return;
+  for (std::size_t j = 0; j < model.joints.size(); ++j) by_state_.push_back(std::make_unique<ByState>());
+}
+
+const RobotColumns::ByState& RobotColumns::by_state(std::size_t joint) const {
+  ByState& out = *by_state_[joint];
+  std::call_once(out.made, [&] {
+    const Index samples = motion_->q.rows(), joints = motion_->q.cols();
+    Evaluator<Real> robot(unlimited(model_), motion_->step_s);
+    std::vector<JointState<Real>> state(model_.joints.size());
+    for (MatrixXd* m : {&out.q, &out.dq, &out.ddq}) m->resize(samples, joints);
+    for (Index k = 0; k < samples; ++k) {
+      for (Index i = 0; i < joints; ++i)
+        state[static_cast<std::size_t>(i)] = {motion_->q(k, i), motion_->dq(k, i), motion_->ddq(k, i)};
+      const JointState<Real> at = state[joint];
+      const auto put = [&](MatrixXd& slope, const JointState<Real>& moved, double step) {
+        state[joint] = moved;
+        const auto tau = robot.rigid_body(state);
+        for (Index i = 0; i < joints; ++i) slope(k, i) = (tau[static_cast<std::size_t>(i)] - structural_(k, i)) / step;
+      };
+      put(out.q, {at.q + small_angle, at.dq, at.ddq}, small_angle);
+      put(out.dq, {at.q, at.dq + small_velocity, at.ddq}, small_velocity);
+      put(out.ddq, {at.q, at.dq, at.ddq + unit_acceleration}, unit_acceleration);
+    }
+  });
+  return out;
+}
+
+MatrixXd RobotColumns::of_deflection(std::size_t joint, const Eigen::VectorXd& delta) const {
+  const ByState& slope = by_state(joint);
+  JointLimits<Real> limits;
+  limits.q_upper = limits.dq_upper = limits.ddq_upper = unbounded;
+  limits.q_lower = limits.dq_lower = limits.ddq_lower = -unbounded;
+  Deflection<Real> deflection;
+  Saturations saturations;
+  MatrixXd out(delta.size(), slope.q.cols());
+  for (Index k = 0; k < delta.size(); ++k) {
+    const JointState<Real> link = deflection.step({}, delta[k], 1 / motion_->step_s, limits, saturations);
+    out.row(k) = link.q * slope.q.row(k) + link.dq * slope.dq.row(k) + link.ddq * slope.ddq.row(k);
+  }
+  return out;
 }
 
 MatrixXd RobotColumns::phi(const EffectCandidate& candidate) const {
@@ -117,6 +171,7 @@ EffectColumns RobotColumns::operator()(const EffectCandidate& candidate) const {
     }
   } else {
     const MatrixXd size = on_body ? MatrixXd::Ones(1, static_cast<Index>(info.linear.size())) : phi(candidate);
+    const bool shared = info.acts_on == ActsOn::position && !by_state_.empty();
     for (std::size_t i = 0; i < info.linear.size(); ++i) {
       const double largest = size.col(static_cast<Index>(i)).cwiseAbs().maxCoeff();
       double step = info.acts_on == ActsOn::torque ? small_torque * torque_.cwiseAbs().maxCoeff() : small_angle;
@@ -126,6 +181,8 @@ EffectColumns RobotColumns::operator()(const EffectCandidate& candidate) const {
       slopes.emplace_back(MatrixXd::Zero(torque_.rows(), torque_.cols()));
       if (largest > 0 && info.acts_on == ActsOn::torque) {
         slopes.back().col(static_cast<Index>(candidate.joint)) = own_slope(with(linear), candidate.joint, step);
+      } else if (largest > 0 && shared) {
+        slopes.back() = of_deflection(candidate.joint, size.col(static_cast<Index>(i)));
       } else if (largest > 0) {
         slopes.back() = slope(with(linear), step);
       }

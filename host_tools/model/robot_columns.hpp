@@ -1,5 +1,7 @@
 #pragma once
 
+#include <memory>
+#include <mutex>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -34,8 +36,9 @@ struct EffectColumns {
 /// Columns of effects that are added to a model, over one motion: d tau / d theta where the added effect's theta is
 /// zero. Torque effects give their phi (effect_columns()) with the model's structural and total torque; everything else
 /// (deflections, the body, torque effects where the model has effects of the total after them) is the difference that a
-/// small theta makes in predict(), so that there is no second formula. An effect that the model has already is
-/// linearised around what the model has. States start at rest with the motion.
+/// small theta makes in predict(), so that there is no second formula; where only the rigid body feels a deflection,
+/// all those of a joint share the differences that its position, velocity and acceleration make. An effect that the
+/// model has already is linearised around what the model has. States start at rest with the motion.
 class RobotColumns {
  public:
   /// @param motion has to outlive this
@@ -59,9 +62,20 @@ class RobotColumns {
   /// [torque of `changed` - torque of the model] / theta
   Eigen::MatrixXd slope(const IdentifiedModel& changed, double theta) const;
 
+  /// Change of the rigid body's torques with one joint's state, samples x joints each.
+  struct ByState {
+    std::once_flag made;
+    Eigen::MatrixXd q, dq, ddq;
+  };
+  const ByState& by_state(std::size_t joint) const;
+  /// Torques for a deflection [rad | m per unit] of a joint, by its state's slopes.
+  Eigen::MatrixXd of_deflection(std::size_t joint, const Eigen::VectorXd& delta) const;
+
   IdentifiedModel model_;
   const Motion* motion_;
   Eigen::MatrixXd torque_, structural_;
+  /// Empty where something else than the rigid body feels a deflection, or the motion is too long to keep them.
+  mutable std::vector<std::unique_ptr<ByState>> by_state_;
 };
 
 }  // namespace fxdyn
