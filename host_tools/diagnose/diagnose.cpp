@@ -91,7 +91,7 @@ void add_deviations(Models& models, const Linearised& at) {
 /// In residuals with structure neighbouring rows say the same: a column counts as the residual's slowest part does.
 ///   variance of a mean / that of white noise = S(0) / r(0)
 VectorXd diluted(const Linearised& at) {
-  std::vector<Index> columns = columns_of(at, in_model(at));
+  std::vector<Index> columns = at.columns_of(in_model(at));
   const LinearFit fit = at.solve(columns);
   VectorXd weights = at.weights();
   for (std::size_t j = 0; j < at.joints(); ++j) {

@@ -66,7 +66,7 @@ void Outcome::look_again(const std::vector<SessionLog>& logs) {
   whitening = at->whitening();
   features.resize(at->joints());
   lack.resize(at->joints());
-  const std::vector<Index> columns = columns_of(*at, in_model(*at));
+  const std::vector<Index> columns = at->columns_of(in_model(*at));
   const LinearFit fit = at->solve(columns);
   std::optional<LinearFit> alone;
   if (models.has_baseline) {
@@ -90,14 +90,6 @@ std::vector<std::size_t> in_model(const Linearised& at) {
   return groups;
 }
 
-std::vector<Index> columns_of(const Linearised& at, const std::vector<std::size_t>& groups) {
-  std::vector<Index> out = at.nuisance();
-  for (const std::size_t g : groups) {
-    for (Index i = 0; i < at.groups()[g].count; ++i) out.push_back(at.groups()[g].first + i);
-  }
-  return out;
-}
-
 Outcome explore(Models models, const std::vector<SessionLog>& logs, const SearchSettings& settings,
                 const std::vector<EffectCandidate>& never, int passes, Progress& progress) {
   Outcome out;
@@ -117,7 +109,7 @@ Outcome explore(Models models, const std::vector<SessionLog>& logs, const Search
     const std::vector<Found> found = search.explain(choice);
     // The model follows the choice. What is appended first leaves the ids of the others as they are.
     std::vector<EffectId> ids;
-    auto column = static_cast<Index>(at.nuisance().size());
+    Index column = first_of_groups(at, choice);
     for (const std::size_t g : choice.groups) {
       const Group& group = at.groups()[g];
       ids.push_back(group.in_model ? group.id : name(models, group, choice.fit.x.segment(column, group.count)));

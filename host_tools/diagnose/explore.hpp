@@ -33,8 +33,6 @@ struct Outcome {
 
 /// Groups of the model's named effects, in the model's order.
 std::vector<std::size_t> in_model(const Linearised& at);
-/// The nuisance's columns and those of the groups.
-std::vector<Eigen::Index> columns_of(const Linearised& at, const std::vector<std::size_t>& groups);
 
 /// Search, name, fit again around what was named; again where that left structure or found several effects.
 /// @param passes at most

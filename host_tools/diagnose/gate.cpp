@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/model/effects.hpp"
@@ -22,14 +23,40 @@ constexpr double least_share = 0.01, least_share_in_structure = 0.02;
 /// Times the plain error before.
 constexpr double worse = 1.02;
 
-HeldOut hold_out(const Linearised& at, const std::vector<MatrixXd>& features, const std::vector<std::size_t>& groups) {
+/// The model without some of its named effects. Leaving out their columns is not enough where they work on what others
+/// do, as those columns are of a model that has the effect: inertias seen through a gear that bends may do its work.
+std::unique_ptr<Linearised> without(const Outcome& outcome, const std::vector<SessionLog>& logs, const Linearised& at,
+                                    const std::vector<std::size_t>& groups) {
+  Models models = outcome.models;
+  std::vector<EffectId> ids;
+  for (const std::size_t g : groups) ids.push_back(at.groups()[g].id);
+  while (!ids.empty()) {
+    const EffectId gone = ids.back();
+    ids.pop_back();
+    take_back(models, ids, gone);
+  }
+  auto out = std::make_unique<Linearised>(models, logs, at.whitening());
+  out->set_weights(at.weights());
+  return out;
+}
+
+/// Squares of a model's judged rows, its coefficients fitted to a fold's others.
+VectorXd judged(const Linearised& at, const Fold& fold) {
+  return at.square(at.solve(at.columns_of(in_model(at)), fold.fit), fold.judge);
+}
+
+HeldOut hold_out(const Outcome& outcome, const std::vector<SessionLog>& logs, const Linearised& at,
+                 const std::vector<MatrixXd>& features, const std::vector<std::size_t>& groups) {
   const auto n = static_cast<Index>(at.joints());
   const VectorXd& w = at.weights();
-  const std::vector<Index> with = columns_of(at, groups);
+  const std::vector<Index> with = at.columns_of(groups);
   HeldOut out;
-  out.before = out.after = out.leftover = out.rows = VectorXd::Zero(n);
+  out.before = out.after = out.leftover = out.excess = out.rows = VectorXd::Zero(n);
   out.alone.assign(groups.size(), VectorXd::Zero(n));
-  out.fitted_before = at.square(at.solve(at.nuisance()), at.fit_blocks()).cwiseProduct(w);
+  const std::unique_ptr<Linearised> plain = groups.empty() ? nullptr : without(outcome, logs, at, groups);
+  const Linearised& before = plain ? *plain : at;
+  out.fitted_before =
+      before.square(before.solve(before.columns_of(in_model(before))), before.fit_blocks()).cwiseProduct(w);
   out.fitted_after = at.square(at.solve(with), at.fit_blocks()).cwiseProduct(w);
   out.fitted_rows = at.row_count(at.fit_blocks());
   for (const Fold& fold : at.folds()) {
@@ -37,42 +64,56 @@ HeldOut hold_out(const Linearised& at, const std::vector<MatrixXd>& features, co
     const LinearFit all = at.solve(with, fold.fit);
     const VectorXd after = at.square(all, fold.judge).cwiseProduct(w);
     out.after += after;
-    VectorXd share(n);
+    VectorXd share(n), healthy(VectorXd::Zero(n));
     parallel_for(at.joints(), [&](std::size_t j) {
-      share[static_cast<Index>(j)] = structured_share(at, j, all, features[j], fold.judge);
+      const auto k = static_cast<Index>(j);
+      share[k] = structured_share(at, j, all, features[j], fold.judge);
+      if (at.models().has_baseline) healthy[k] = structured_share(at, j, all, features[j], at.fit_blocks(), true);
     });
     out.leftover += after.cwiseProduct(share);
-    out.before += at.square(at.solve(at.nuisance(), fold.fit), fold.judge).cwiseProduct(w);
-    for (std::size_t i = 0; i < groups.size(); ++i) {
-      std::vector<std::size_t> others = groups;
-      others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
-      out.alone[i] += at.square(at.solve(columns_of(at, others), fold.fit), fold.judge).cwiseProduct(w) - after;
+    out.excess += after.cwiseProduct((share - healthy).cwiseMax(0.0));
+    out.before += judged(before, fold).cwiseProduct(w);
+  }
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    std::vector<std::size_t> others = groups;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+    const EffectInfo& info = *find_effect(at.groups()[groups[i]].candidate.effect);
+    const bool works_on_others = info.acts_on != ActsOn::torque || info.needs_structural || info.needs_total;
+    std::unique_ptr<Linearised> less;
+    if (works_on_others && !others.empty()) less = without(outcome, logs, at, {groups[i]});
+    for (const Fold& fold : at.folds()) {
+      const VectorXd squares = others.empty() ? judged(before, fold)
+                               : less         ? judged(*less, fold)
+                                              : at.square(at.solve(at.columns_of(others), fold.fit), fold.judge);
+      out.alone[i] += squares.cwiseProduct(w);
     }
+    out.alone[i] -= out.after;
   }
   return out;
 }
 
 /// Where structure remains, what counts is the error in the whole band: whitening would weigh it by how fast it is.
 HeldOut judge(const Outcome& outcome, const std::vector<SessionLog>& logs, const std::vector<std::size_t>& groups) {
-  HeldOut held = hold_out(*outcome.at, outcome.features, groups);
+  HeldOut held = hold_out(outcome, logs, *outcome.at, outcome.features, groups);
   if (!outcome.structured()) return held;
   const std::size_t n = outcome.lack.size();
   const Linearised at(outcome.models, logs, std::vector<VectorXd>(n, VectorXd::Zero(1)));
   std::vector<MatrixXd> in_band(n);
-  parallel_for(n, [&](std::size_t j) { in_band[j] = features(at, j); });
-  const HeldOut band = hold_out(at, in_band, groups);
+  parallel_for(n, [&](std::size_t j) { in_band[j] = features(at, j, at.models().has_baseline); });
+  const HeldOut band = hold_out(outcome, logs, at, in_band, groups);
   for (std::size_t j = 0; j < n; ++j) {
     if (!outcome.lack[j].structured()) continue;
     const auto k = static_cast<Index>(j);
-    for (VectorXd HeldOut::*of : {&HeldOut::before, &HeldOut::after, &HeldOut::leftover, &HeldOut::rows,
-                                  &HeldOut::fitted_before, &HeldOut::fitted_after, &HeldOut::fitted_rows})
+    for (VectorXd HeldOut::*of :
+         {&HeldOut::before, &HeldOut::after, &HeldOut::leftover, &HeldOut::excess, &HeldOut::rows,
+          &HeldOut::fitted_before, &HeldOut::fitted_after, &HeldOut::fitted_rows})
       (held.*of)[k] = (band.*of)[k];
     for (std::size_t i = 0; i < groups.size(); ++i) held.alone[i][k] = band.alone[i][k];
   }
   return held;
 }
 
-VectorXd gap_of(const HeldOut& held) { return (held.before - held.after).cwiseMax(0.0) + held.leftover; }
+VectorXd gap_of(const HeldOut& held) { return (held.before - held.after).cwiseMax(0.0) + held.excess; }
 
 /// Whether an effect brings anything: over all joints, and as a share of the gap at its own.
 bool holds(const Outcome& outcome, const Group& group, const HeldOut& held, std::size_t i) {
@@ -80,6 +121,7 @@ bool holds(const Outcome& outcome, const Group& group, const HeldOut& held, std:
   if (brings <= least_gain) return false;
   if (group.on_body) return true;
   const std::size_t j = group.candidate.joint;
+  if (held.alone[i][static_cast<Index>(j)] <= 0) return false;  // whatever it does at others
   const double share = outcome.lack[j].structured() ? least_share_in_structure : least_share;
   return brings > share * gap_of(held)[static_cast<Index>(j)];
 }
@@ -112,8 +154,7 @@ void choose_time_constants(Outcome& outcome, const std::vector<SessionLog>& logs
         fit.shape[0] = std::clamp(found * factor, 0.1, 1e4);
         const Linearised at(outcome.models, logs, outcome.whitening);
         double sum = 0;
-        for (const Fold& fold : at.folds())
-          sum += at.square(at.solve(columns_of(at, in_model(at)), fold.fit), fold.judge)[static_cast<Index>(j)];
+        for (const Fold& fold : at.folds()) sum += judged(at, fold)[static_cast<Index>(j)];
         if (sum >= least) continue;
         least = sum;
         best = fit.shape[0];
@@ -125,6 +166,58 @@ void choose_time_constants(Outcome& outcome, const std::vector<SessionLog>& logs
   if (!drifted) return;
   refit(outcome.models, logs, outcome.whitening, 4);
   outcome.look_again(logs);
+}
+
+/// Which names are believed at each joint.
+void conclude(Gate& gate, const Outcome& outcome, const std::vector<bool>& still) {
+  const HeldOut& held = gate.held;
+  const auto n = static_cast<Index>(outcome.lack.size());
+  gate.gap = gap_of(held);
+  gate.closure.setZero(n);
+  gate.remains.clear();
+  gate.accepted.clear();
+  for (Index j = 0; j < n; ++j) {
+    const auto k = static_cast<std::size_t>(j);
+    const double closed = held.before[j] - held.after[j];
+    if (gate.gap[j] > 0) gate.closure[j] = closed / gate.gap[j];
+    gate.remains.push_back(!still[k] && outcome.lack[k].structured() &&
+                           held.excess[j] > (1 - sure_closure) * gate.gap[j]);
+    gate.accepted.push_back(
+        gate.closure[j] >= (gate.remains.back() ? sure_closure : least_closure) &&
+        (outcome.at->background(k) == nullptr || closed >= least_beside_background * (closed + held.leftover[j])));
+  }
+}
+
+/// The named effect that goes first, as a place in the gate's groups; their number: all hold.
+/// @param before, after mean squares of the plain error on the logs that judge
+std::size_t weakest(const Gate& gate, const Outcome& outcome, const VectorXd& before, const VectorXd& after) {
+  const auto rises = [&](Index j) { return before.size() > 0 && after[j] > worse * worse * before[j]; };
+  const std::size_t none = gate.groups.size();
+  std::size_t worst = none;
+  bool worst_on_body = false;
+  for (std::size_t i = 0; i < none; ++i) {
+    const Group& group = outcome.at->groups()[gate.groups[i]];
+    bool spoils = !group.on_body && rises(static_cast<Index>(group.candidate.joint));
+    for (Index j = 0; group.on_body && j < after.size(); ++j) spoils |= gate.held.alone[i][j] > least_felt && rises(j);
+    if (!spoils && holds(outcome, group, gate.held, i)) continue;
+    // An effect on the robot that spoils joints goes before theirs, which may have been bent by it.
+    const bool on_body = spoils && group.on_body;
+    const bool first = worst == none || (on_body && !worst_on_body);
+    if (!first && (worst_on_body != on_body || gate.held.alone[i].sum() >= gate.held.alone[worst].sum())) continue;
+    worst = i;
+    worst_on_body = on_body;
+  }
+  if (worst != none) return worst;
+  // Beside a background, and with no more structure than the healthy session has, what is not believed only resembles
+  // that background.
+  for (std::size_t i = 0; i < none; ++i) {
+    const Group& group = outcome.at->groups()[gate.groups[i]];
+    const std::size_t j = group.candidate.joint;
+    if (group.on_body || outcome.at->background(j) == nullptr || outcome.lack[j].structured() || gate.accepted[j])
+      continue;
+    if (worst == none || gate.held.alone[i].sum() < gate.held.alone[worst].sum()) worst = i;
+  }
+  return worst;
 }
 
 }  // namespace
@@ -144,24 +237,10 @@ Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<Se
   for (;;) {
     gate.groups = in_model(*outcome.at);
     gate.held = judge(outcome, logs, gate.groups);
+    conclude(gate, outcome, still);
     const VectorXd after =
         gate.groups.empty() || before.size() == 0 ? before : plain_error(outcome.models.current, logs);
-    const auto rises = [&](Index j) { return before.size() > 0 && after[j] > worse * worse * before[j]; };
-    std::size_t worst = gate.groups.size();
-    bool worst_on_body = false;
-    for (std::size_t i = 0; i < gate.groups.size(); ++i) {
-      const Group& group = outcome.at->groups()[gate.groups[i]];
-      bool spoils = !group.on_body && rises(static_cast<Index>(group.candidate.joint));
-      for (Index j = 0; group.on_body && j < after.size(); ++j)
-        spoils |= gate.held.alone[i][j] > least_felt && rises(j);
-      if (!spoils && holds(outcome, group, gate.held, i)) continue;
-      // An effect on the robot that spoils joints goes before theirs, which may have been bent by it.
-      const bool on_body = spoils && group.on_body;
-      const bool first = worst == gate.groups.size() || (on_body && !worst_on_body);
-      if (!first && (worst_on_body != on_body || gate.held.alone[i].sum() >= gate.held.alone[worst].sum())) continue;
-      worst = i;
-      worst_on_body = on_body;
-    }
+    const std::size_t worst = weakest(gate, outcome, before, after);
     if (worst == gate.groups.size()) break;
     const EffectId gone = outcome.at->groups()[gate.groups[worst]].id;
     std::erase_if(outcome.found, [&](const Finding& f) { return f.id == gone; });
@@ -172,25 +251,14 @@ Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<Se
     refit(outcome.models, logs, outcome.whitening, 3);
     outcome.look_again(logs);
   }
-
-  const HeldOut& held = gate.held;
-  const auto n = static_cast<Index>(outcome.lack.size());
-  gate.gap = gap_of(held);
-  gate.closure.setZero(n);
-  for (Index j = 0; j < n; ++j) {
-    const auto k = static_cast<std::size_t>(j);
-    if (gate.gap[j] > 0) gate.closure[j] = (held.before[j] - held.after[j]) / gate.gap[j];
-    gate.remains.push_back(!still[k] && outcome.lack[k].structured() &&
-                           held.leftover[j] > (1 - sure_closure) * gate.gap[j]);
-    gate.accepted.push_back(gate.closure[j] >= (gate.remains.back() ? sure_closure : least_closure));
-  }
   // An effect on the robot: what comes back without it against what it leaves on the joints that it reaches.
+  const HeldOut& held = gate.held;
   gate.robot_closure.assign(gate.groups.size(), 0.0);
   for (std::size_t i = 0; i < gate.groups.size(); ++i) {
     if (!outcome.at->groups()[gate.groups[i]].on_body) continue;
     double left = 0;
-    for (Index j = 0; j < n; ++j) {
-      if (held.alone[i][j] > least_felt) left += held.leftover[j];
+    for (Index j = 0; j < held.excess.size(); ++j) {
+      if (held.alone[i][j] > least_felt) left += held.excess[j];
     }
     const double back = held.alone[i].sum();
     gate.robot_closure[i] = back / std::max(back + left, 1e-300);

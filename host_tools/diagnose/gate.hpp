@@ -10,12 +10,17 @@ namespace fxdyn::diagnosis {
 inline constexpr double least_closure = 0.5;
 /// .. and this much where structure remains: another effect may only resemble it.
 inline constexpr double sure_closure = 0.8;
+/// .. and this much where the healthy session's own structure is counted as well: beside that much of it a name is
+/// anyone's guess.
+inline constexpr double least_beside_background = 0.25;
 /// Squares, in units of the noise, from which a joint feels an effect on the robot.
 inline constexpr double least_felt = 6;
 
 /// Squares of judged residuals per joint, whitened and weighted to unit variance.
 struct HeldOut {
-  Eigen::VectorXd before, after, leftover, rows;
+  Eigen::VectorXd before, after, rows;
+  Eigen::VectorXd leftover;  ///< structure that is left
+  Eigen::VectorXd excess;    ///< .. beyond the share of it that the healthy session shows
   Eigen::VectorXd fitted_before, fitted_after, fitted_rows;  ///< of the rows that fit, with a fit of all of them
   std::vector<Eigen::VectorXd> alone;  ///< by named group: what comes back when it alone is removed
 };
@@ -24,7 +29,7 @@ struct HeldOut {
 struct Gate {
   HeldOut held;
   std::vector<std::size_t> groups;  ///< of Outcome::at, in the model's order
-  Eigen::VectorXd gap;              ///< what there was to close: closed and left over
+  Eigen::VectorXd gap;              ///< what there was to close: closed, and left over in excess
   Eigen::VectorXd closure;
   std::vector<double> robot_closure;  ///< by group; effects on the body only
   std::vector<bool> remains;          ///< structure that counts is left

@@ -469,11 +469,11 @@ LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& 
 }
 
 double structured_share(const Linearised& at, std::size_t joint, const LinearFit& fit, const MatrixXd& all_features,
-                        const std::vector<std::size_t>& blocks) {
-  const VectorXd residual = at.residual(joint, fit), e = only(at, residual, blocks);
-  const MatrixXd f = only(at, joint, all_features, blocks);
+                        const std::vector<std::size_t>& blocks, bool healthy) {
+  const VectorXd residual = at.residual(joint, fit), e = only(at, residual, blocks, healthy);
+  const MatrixXd f = only(at, joint, all_features, blocks, healthy);
   Index count = 0;
-  for (const std::size_t b : blocks) count += at.blocks()[b].healthy ? 0 : at.blocks()[b].count;
+  for (const std::size_t b : blocks) count += at.blocks()[b].healthy == healthy ? at.blocks()[b].count : 0;
   if (!(e.squaredNorm() > 0)) return 0;
   const VectorXd size = f.colwise().norm().transpose().array().max(1e-300).inverse();
   const MatrixXd gram = f.transpose() * f, noise = stand_ins(at, joint, residual, residual, blocks),
@@ -492,6 +492,7 @@ double structured_share(const Linearised& at, std::size_t joint, const LinearFit
   double of_state = share_of(all);
   for (const Family& family : families(at.joints()))
     of_state = std::max(of_state, share_of(Projection(gram, size, family)));
+  if (healthy) return of_state;
   // What the state does not explain may still repeat or wander.
   const VectorXd rest = 2 * count < 3 * all.rank() ? e : e - f * all.coefficients(all.coordinates(mine));
   const double of_time = std::max(lines(at, rest, blocks).share,

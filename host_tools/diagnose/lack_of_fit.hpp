@@ -5,9 +5,9 @@
 namespace fxdyn::diagnosis {
 
 /// Functions of the state that name no effect, for one joint: cosines over the ranges of all positions, velocities and
-/// their products, friction over the own position and over today's rows in their order, paths with memory, random
-/// Fourier features of (q, dq, ddq, load). Filtered, decimated and whitened like everything else; rows x features,
-/// those of time last. Zero on the healthy session's rows unless `healthy`, and those of time always.
+/// their products, friction over the own position and over each session's rows in their order, paths with memory,
+/// random Fourier features of (q, dq, ddq, load). Filtered, decimated and whitened like everything else; rows x
+/// features, those of time last. Zero on the healthy session's rows unless `healthy`.
 Eigen::MatrixXd features(const Linearised& at, std::size_t joint, bool healthy = false);
 
 /// Features of time alone: what changes with time does not come back.
@@ -29,7 +29,8 @@ LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& 
 
 /// Share of the squared residual of a fit on the blocks that is a function of the state, or of the rest a matter of
 /// time (lines, slow changes), the expected part of noise taken off; 0..1.
+/// @param healthy of the blocks of the healthy session instead of today's, where matters of time are not looked for
 double structured_share(const Linearised& at, std::size_t joint, const LinearFit& fit, const Eigen::MatrixXd& features,
-                        const std::vector<std::size_t>& blocks);
+                        const std::vector<std::size_t>& blocks, bool healthy = false);
 
 }  // namespace fxdyn::diagnosis

@@ -297,6 +297,32 @@ void Linearised::make_unknowns() {
   columns_ = static_cast<Index>(unknowns_.size());
 }
 
+std::vector<Index> Linearised::columns_of(const std::vector<std::size_t>& groups) const {
+  const auto told = [&](std::size_t joint) {
+    const auto tells = [&](std::size_t g) {
+      const Group& group = groups_[g];
+      return !group.on_body && group.candidate.joint == joint && tells_rotor(group.candidate.effect);
+    };
+    if (std::any_of(groups.begin(), groups.end(), tells)) return true;
+    // What the model has of them beside the groups: a background's, a link encoder's.
+    const auto& effects = models_.current.joints[joint].effects;
+    const auto all =
+        std::count_if(effects.begin(), effects.end(), [](const EffectFit& fit) { return tells_rotor(fit.effect); });
+    std::ptrdiff_t named = 0;
+    for (std::size_t g = 0; g < groups_.size(); ++g) named += groups_[g].in_model && tells(g);
+    return all > named;
+  };
+  std::vector<Index> out;
+  for (const Index c : nuisance_) {
+    const Unknown& u = unknowns_[static_cast<std::size_t>(c)];
+    if (u.kind != Unknown::Kind::rotor || told(u.joint)) out.push_back(c);
+  }
+  for (const std::size_t g : groups) {
+    for (Index i = 0; i < groups_[g].count; ++i) out.push_back(groups_[g].first + i);
+  }
+  return out;
+}
+
 MatrixXd Linearised::follow(std::size_t log, std::size_t joint, MatrixXd columns) const {
   const SessionLog& entry = (*logs_)[log];
   const JointFit& fit = (entry.healthy ? models_.healthy : models_.current).joints[joint];
@@ -960,6 +986,8 @@ BaseSet base_of(const IdentifiedModel& model) {
   for (const BaseParameter& parameter : model.base) base.columns.push_back(static_cast<Index>(parameter.column));
   return base;
 }
+
+bool tells_rotor(std::string_view effect) { return find_effect(effect)->needs_structural; }
 
 void take_from_base(IdentifiedModel& model, const VectorXd& rotor_in_base, double inertia) {
   for (std::size_t k = 0; k < model.base.size(); ++k)

@@ -164,6 +164,9 @@ class Linearised {
   const std::vector<Unknown>& unknowns() const { return unknowns_; }  ///< of the nuisance and of named effects
   const std::vector<Eigen::Index>& nuisance() const { return nuisance_; }
   const std::vector<Group>& groups() const { return groups_; }
+  /// The nuisance's columns and those of groups, in that order. A rotor's is left out where no effect of the link's
+  /// torque tells it from the base parameters: around an effect that is not among the groups it would do its work.
+  std::vector<Eigen::Index> columns_of(const std::vector<std::size_t>& groups) const;
   const JointRows& rows(std::size_t joint) const { return rows_[joint]; }
   const std::vector<Block>& blocks() const { return blocks_; }
   const std::vector<Fold>& folds() const { return folds_; }
@@ -263,6 +266,9 @@ class Linearised {
 
 /// The base parameters of a model as a set of columns; its grouping is not there.
 BaseSet base_of(const IdentifiedModel& model);
+
+/// Whether an effect works on the link's torque, in which the rotor has no part: it tells the two apart.
+bool tells_rotor(std::string_view effect);
 
 /// What of a joint's own inertia is the same in every pose, at most: the smallest element M_jj of the mass matrix along
 /// positions (samples x joints each). A rotor has no more.

@@ -75,16 +75,6 @@ void refit(Models& models, const std::vector<SessionLog>& all, const std::vector
   }
 }
 
-namespace {
-
-/// Effects of the link's torque: the rotor has no part in them.
-bool tells_rotor(std::string_view effect) {
-  const EffectInfo& info = *find_effect(effect);
-  return info.needs_structural;
-}
-
-}  // namespace
-
 void bring_rotor(Models& models, const Rotor& rotor, double inertia) {
   EffectFit fit;
   fit.effect = RotorInertia::name;

@@ -118,13 +118,10 @@ double Search::threshold(std::size_t g) const {
   return most;
 }
 
-std::vector<Index> Search::columns(const std::vector<std::size_t>& groups) const {
-  std::vector<Index> out = at_.nuisance();
-  for (const std::size_t g : groups) {
-    const Group& group = at_.groups()[g];
-    for (Index i = 0; i < group.count; ++i) out.push_back(group.first + i);
-  }
-  return out;
+Index first_of_groups(const Linearised& at, const Choice& choice) {
+  auto first = static_cast<Index>(choice.fit.columns.size());
+  for (const std::size_t g : choice.groups) first -= at.groups()[g].count;
+  return first;
 }
 
 bool Search::allowed(const Choice& state, std::size_t g) const {
@@ -165,7 +162,7 @@ bool Search::allowed(const Choice& state, std::size_t g) const {
 Choice Search::evaluate(const std::vector<std::size_t>& groups) const {
   Choice out;
   out.groups = groups;
-  out.fit = at_.solve(columns(groups));
+  out.fit = at_.solve(at_.columns_of(groups));
   out.score = 0;
   for (Index j = 0; j < out.fit.square.size(); ++j) {
     // noise-free data: below a billionth of the signal there is nothing to find
@@ -174,8 +171,7 @@ Choice Search::evaluate(const std::vector<std::size_t>& groups) const {
   }
   for (const std::size_t g : groups) out.score -= penalty(g);
   const SymmetricSolver solver(out.fit.information);
-  const auto first = static_cast<Index>(at_.nuisance().size());
-  Index at = first;
+  Index at = first_of_groups(at_, out);
   MatrixXd inverse;
   for (const std::size_t g : groups) {
     const Group& group = at_.groups()[g];

@@ -27,6 +27,9 @@ struct Choice {
   bool possible = true;  ///< coefficients keep their bounds
 };
 
+/// Place in the fit's coefficients at which those of its groups begin.
+Eigen::Index first_of_groups(const Linearised& at, const Choice& choice);
+
 struct Alternative {
   EffectCandidate candidate;
   double behind = 0;  ///< score of the set with it in place of the chosen one, less
@@ -71,7 +74,6 @@ class Search {
   double penalty(std::size_t group) const;
   double threshold(std::size_t group) const;
   bool allowed(const Choice& state, std::size_t group) const;
-  std::vector<Eigen::Index> columns(const std::vector<std::size_t>& groups) const;
   void find_ripples(const Choice& state, std::optional<std::size_t> joint);
   double samples() const;
 
