@@ -153,6 +153,7 @@ class Work {
     Models before = models_;
     refit(before, logs_, plain(), 8);
     check_judges(before.current, data_.logs, still_);
+    check_judges(before.current, test_, still_);
     if (deflections_.found.empty()) {
       models_ = before;
     } else {
@@ -170,6 +171,11 @@ class Work {
     if (refit_links(outcome)) gate = pass(outcome, models_.current, logs_, still_);
     Models& found = outcome.models;
     if (gate.groups.empty() && deflections_.found.empty()) {
+      if (found.rotors.size() != models_.rotors.size()) {
+        // The search gave up a rotor that the baseline has.
+        found = models_;
+        outcome.look_again(logs_);
+      }
       found.current = models_.current;
       add_deviations(found, *outcome.at);
     } else if (outcome.structured()) {

@@ -55,10 +55,13 @@ HeldOut hold_out(const Outcome& outcome, const std::vector<SessionLog>& logs, co
   out.alone.assign(groups.size(), VectorXd::Zero(n));
   const std::unique_ptr<Linearised> plain = groups.empty() ? nullptr : without(outcome, logs, at, groups);
   const Linearised& before = plain ? *plain : at;
-  out.fitted_before =
-      before.square(before.solve(before.columns_of(in_model(before))), before.fit_blocks()).cwiseProduct(w);
-  out.fitted_after = at.square(at.solve(with), at.fit_blocks()).cwiseProduct(w);
-  out.fitted_rows = at.row_count(at.fit_blocks());
+  std::vector<std::size_t> todays;
+  for (const std::size_t b : at.fit_blocks()) {
+    if (!at.blocks()[b].healthy) todays.push_back(b);
+  }
+  out.fitted_before = before.square(before.solve(before.columns_of(in_model(before))), todays).cwiseProduct(w);
+  out.fitted_after = at.square(at.solve(with), todays).cwiseProduct(w);
+  out.fitted_rows = at.row_count(todays);
   for (const Fold& fold : at.folds()) {
     out.rows += at.row_count(fold.judge);
     const LinearFit all = at.solve(with, fold.fit);
@@ -119,6 +122,9 @@ VectorXd gap_of(const HeldOut& held) { return (held.before - held.after).cwiseMa
 bool holds(const Outcome& outcome, const Group& group, const HeldOut& held, std::size_t i) {
   const double brings = held.alone[i].sum();
   if (brings <= least_gain) return false;
+  // At its bound a load is what would weigh less than nothing.
+  if (group.candidate.effect == Payload::name && outcome.models.current.body[group.id.effect].linear[0] <= least_mass)
+    return false;
   if (group.on_body) return true;
   const std::size_t j = group.candidate.joint;
   if (held.alone[i][static_cast<Index>(j)] <= 0) return false;  // whatever it does at others

@@ -16,12 +16,13 @@ inline constexpr double least_beside_background = 0.25;
 /// Squares, in units of the noise, from which a joint feels an effect on the robot.
 inline constexpr double least_felt = 6;
 
-/// Squares of judged residuals per joint, whitened and weighted to unit variance.
+/// Squares of judged residuals per joint, weighted to unit variance: whitened, but for joints with structure left,
+/// which are judged in the whole band.
 struct HeldOut {
   Eigen::VectorXd before, after, rows;
   Eigen::VectorXd leftover;  ///< structure that is left
   Eigen::VectorXd excess;    ///< .. beyond the share of it that the healthy session shows
-  Eigen::VectorXd fitted_before, fitted_after, fitted_rows;  ///< of the rows that fit, with a fit of all of them
+  Eigen::VectorXd fitted_before, fitted_after, fitted_rows;  ///< of today's rows that fit, with a fit of all
   std::vector<Eigen::VectorXd> alone;  ///< by named group: what comes back when it alone is removed
 };
 
@@ -40,8 +41,9 @@ struct Gate {
 };
 
 /// Judges each fold by a fit of the others; time constants of drift are chosen by that, and names that do not hold are
-/// taken out of the outcome one by one: those that bring nothing, and at joints whose plain error on the validate logs
-/// is larger than that of `nominal` (rows near standstill, of which the search believes little, count there too).
+/// taken out of the outcome one by one: those that bring nothing; those at joints whose plain error on the validate
+/// logs is larger than that of `nominal` (rows near standstill, of which the search believes little, count there too);
+/// and those not believed at joints that show no more structure than their background.
 Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs,
           const std::vector<bool>& still);
 

@@ -1031,7 +1031,7 @@ void update(Models& models, const Linearised& at, const LinearFit& fit, double s
     if (!u.change && u.kind == Unknown::Kind::linear && u.body && u.index == 0 &&
         fit_of(models.current, u).effect == Payload::name) {
       EffectFit& load = models.current.body[u.effect];
-      const double mass = std::max(1e-6, load.linear[0] + step);
+      const double mass = std::max(least_mass, load.linear[0] + step);
       for (std::size_t k = 1; k < load.linear.size(); ++k) load.linear[k] *= load.linear[0] / mass;
       load.linear[0] = mass;
       continue;

@@ -24,6 +24,9 @@ struct Rotor {
   double inertia = 0, std = 0;  ///< known beforehand, from a link encoder; std 0: it is not
 };
 
+/// Of a payload [kg], whose centre is first moment over mass.
+inline constexpr double least_mass = 1e-6;
+
 /// Two states of one robot: before (the baseline, a session known to be healthy) and now. Base parameters are the same;
 /// friction may differ a little, named effects are in `current` only. Without a baseline `healthy` is not used.
 struct Models {

@@ -100,7 +100,7 @@ EffectId name(Models& models, const Group& group, const VectorXd& theta) {
   }
   if (info.linear[0].name == "share") fit.linear[0] = 1;
   if (fit.effect == Payload::name) {
-    fit.linear[0] = std::max(fit.linear[0], 1e-6);
+    fit.linear[0] = std::max(fit.linear[0], least_mass);
     for (std::size_t i = 1; i < fit.linear.size(); ++i)
       fit.linear[i] = std::clamp(fit.linear[i] / fit.linear[0], -10.0, 10.0);
   }

@@ -188,11 +188,11 @@ void check_same_robot(Models models, const std::vector<SessionLog>& logs, const 
   }
 }
 
-void check_judges(const IdentifiedModel& model, const std::vector<ProcessedLog>& now, const std::vector<bool>& still) {
+void check_judges(const IdentifiedModel& model, const std::vector<ProcessedLog>& logs, const std::vector<bool>& still) {
   constexpr double alike = 0.9;  // of the torque's power is the model's times a factor
   constexpr double factor = 3;   // more than any load or change makes of all joints
-  for (const ProcessedLog& log : now) {
-    if (log.role != Role::validate) continue;
+  for (const ProcessedLog& log : logs) {
+    if (log.role != Role::validate && log.role != Role::test) continue;
     const MatrixXd ours = log.filter_columns(predict(model, log)), theirs = log.filter_columns(log.tau);
     const Index count = log.last - log.first;
     std::size_t judged = 0, odd = 0;
@@ -212,8 +212,8 @@ void check_judges(const IdentifiedModel& model, const std::vector<ProcessedLog>&
     if (judged == 0 || odd < judged) continue;
     throw DataError(fmt::format(
         "{}: its torques are {:.3g} times those of the train logs' motion, at every joint: other units, gains or sign? "
-        "Correct it or remove it (role = \"validate\")",
-        log.name, last));
+        "Correct it or remove it (role = \"{}\")",
+        log.name, last, log.role == Role::test ? "test" : "validate"));
   }
 }
 

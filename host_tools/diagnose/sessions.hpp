@@ -33,7 +33,7 @@ void mute(std::vector<SessionLog>& logs, const IdentifiedModel& model, const std
 /// @throws DataError: nothing explains both
 void check_same_robot(Models models, const std::vector<SessionLog>& logs, const std::vector<bool>& still);
 
-/// @throws DataError: at every joint a log that judges has the train logs' torque times some factor: other units.
-void check_judges(const IdentifiedModel& model, const std::vector<ProcessedLog>& now, const std::vector<bool>& still);
+/// @throws DataError: at every joint a validate or test log has the train logs' torque times some factor: other units.
+void check_judges(const IdentifiedModel& model, const std::vector<ProcessedLog>& logs, const std::vector<bool>& still);
 
 }  // namespace fxdyn::diagnosis

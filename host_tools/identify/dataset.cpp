@@ -86,25 +86,6 @@ bool is_noisy(const VectorXd& velocity, double cutoff_hz, double step_s) {
   return above.middleRows(edge, rows).norm() > 1e-6 * velocity.middleRows(edge, rows).norm();
 }
 
-/// Smallest step of an encoder: what all differences between samples are multiples of; 0 if there is none.
-double encoder_step(const VectorXd& q) {
-  double smallest = 1e300, largest = 0;
-  for (Index k = 1; k < q.size(); ++k) {
-    const double step = std::fabs(q[k] - q[k - 1]);
-    largest = std::max(largest, step);
-    if (step > 1e-12) smallest = std::min(smallest, step);
-  }
-  if (smallest > largest) return 0;
-  Index counted = 0, multiples = 0;
-  for (Index k = 1; k < q.size(); ++k) {
-    const double steps = std::fabs(q[k] - q[k - 1]) / smallest;
-    if (steps < 0.5 || steps > 100) continue;
-    ++counted;
-    multiples += std::fabs(steps - std::round(steps)) < 0.02 * steps + 0.02;
-  }
-  return counted > 20 && static_cast<double>(multiples) > 0.9 * static_cast<double>(counted) ? smallest : 0;
-}
-
 /// Where the motion sinks into the noise: the first frequency from which the density of q is below twice the level
 /// of its highest octave, for four bins at least.
 double crossing_frequency(const Spectrum& spectrum) {
@@ -219,7 +200,8 @@ FilterFit choose_filter(const std::vector<Log>& logs, const SignalSettings& sett
       const double crossing = crossing_frequency(position);
       const double ceiling = std::min({30.0, 0.4 * rate, log.dq.size() == 0 ? crossing : 30.0});
       filter.excited_hz = std::max(filter.excited_hz, velocity.frequency_of_share(0.999, ceiling));
-      filter.encoder_step[k] = std::max(filter.encoder_step[k], encoder_step(q));
+      const double step = log.encoder_step.size() > 0 ? log.encoder_step[j] : encoder_step(q);
+      filter.encoder_step[k] = std::max(filter.encoder_step[k], step);
       filter.position_noise[k] = std::max(filter.position_noise[k], position.noise_rms());
       filter.crossing_hz = std::max(filter.crossing_hz, crossing);
     }

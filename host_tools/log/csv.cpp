@@ -336,6 +336,24 @@ Eigen::MatrixXd interpolate(const Eigen::MatrixXd& columns, const Eigen::VectorX
   return resample(columns, t, at);
 }
 
+double encoder_step(const Eigen::Ref<const Eigen::VectorXd>& q) {
+  double smallest = 1e300, largest = 0;
+  for (Index k = 1; k < q.size(); ++k) {
+    const double step = std::fabs(q[k] - q[k - 1]);
+    largest = std::max(largest, step);
+    if (step > 1e-12) smallest = std::min(smallest, step);
+  }
+  if (smallest > largest) return 0;
+  Index counted = 0, multiples = 0;
+  for (Index k = 1; k < q.size(); ++k) {
+    const double steps = std::fabs(q[k] - q[k - 1]) / smallest;
+    if (steps < 0.5 || steps > 10) continue;  // of more the first one's rounding makes any number
+    ++counted;
+    multiples += std::fabs(steps - std::round(steps)) < 0.02 * steps + 0.02;
+  }
+  return counted > 20 && static_cast<double>(multiples) > 0.9 * static_cast<double>(counted) ? smallest : 0;
+}
+
 namespace {
 
 void resample(Log& log, double step) {
@@ -505,6 +523,8 @@ Log read_log(const std::filesystem::path& file, std::size_t joints, const std::v
   check_ranges(log, revolute, where);
   if (log.resampled) {
     log.stamps = log.t;
+    log.encoder_step.resize(log.joints());  // between samples there are no steps
+    for (Index joint = 0; joint < log.joints(); ++joint) log.encoder_step[joint] = encoder_step(log.q.col(joint));
     resample(log, log.step_s);
   }
   return log;

@@ -31,7 +31,8 @@ struct Log {
   Eigen::VectorXd t;            ///< [s]
   Eigen::VectorXd stamps;       ///< the file's own time stamps in the window [s]; empty: t
   Eigen::MatrixXd q, dq, ddq, tau, qlink;
-  std::optional<Load> load;  ///< known from the project
+  Eigen::VectorXd encoder_step;  ///< of a resampled log: encoder_step() of the q that was recorded; empty: of q
+  std::optional<Load> load;      ///< known from the project
   Eigen::Index samples() const { return t.size(); }
   Eigen::Index joints() const { return q.cols(); }
 };
@@ -55,6 +56,10 @@ Log read_log(const std::filesystem::path& file, std::size_t joints, const std::v
 
 /// Writes t, q, dq?, ddq?, tau? with 17 significant digits (to a temporary file, then renamed).
 void write_log(const std::filesystem::path& file, const Log& log);
+
+/// Smallest step of an encoder [rad | m]: what all differences between neighbouring samples are multiples of; 0 if
+/// there is none.
+double encoder_step(const Eigen::Ref<const Eigen::VectorXd>& q);
 
 /// Columns sampled at t, linearly interpolated at other instants (ascending).
 Eigen::MatrixXd interpolate(const Eigen::MatrixXd& columns, const Eigen::VectorXd& t, const Eigen::VectorXd& at);

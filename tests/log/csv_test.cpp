@@ -165,6 +165,20 @@ TEST(Csv, IrregularStampsAreResampled) {
   EXPECT_LT((log.tau.col(0).array() - 1 + log.t.array()).abs().maxCoeff(), 1e-12);
 }
 
+TEST(Csv, AnEncoderKeepsItsStepWhenItsLogIsResampled) {
+  const double step = 2 * std::numbers::pi / 4096;
+  std::string text = "t,q1,q2,tau1,tau2\n";
+  for (int i = 0; i < 400; ++i) {
+    const double t = 0.005 * i + (i % 7 == 3 ? 0.002 : 0.0), q = std::sin(3 * t);
+    text += fmt::format("{},{:.6g},{},0,0\n", t, step * std::round(q / step), q);
+  }
+  const Log log = read_log(write("steps.csv", text), 2, {true, true}, {}, {}, {});
+  ASSERT_TRUE(log.resampled);
+  EXPECT_NEAR(log.encoder_step[0], step, 1e-5);
+  EXPECT_EQ(log.encoder_step[1], 0);
+  EXPECT_LT(encoder_step(log.q.col(0)), 0.5 * step);  // of what stands between the samples
+}
+
 TEST(Csv, WholeTurnsAreUnwrapped) {
   std::string text = "t,q1,tau1\n";
   for (int i = 0; i < 300; ++i)
