@@ -204,7 +204,9 @@ std::size_t weakest(const Gate& gate, const Outcome& outcome, const VectorXd& be
   for (std::size_t i = 0; i < none; ++i) {
     const Group& group = outcome.at->groups()[gate.groups[i]];
     bool spoils = !group.on_body && rises(static_cast<Index>(group.candidate.joint));
-    for (Index j = 0; group.on_body && j < after.size(); ++j) spoils |= gate.held.alone[i][j] > least_felt && rises(j);
+    // Whatever it brings there: a load that others make up for in the linear fit may be far off in the model.
+    for (std::size_t j = 0; group.on_body && j < outcome.at->joints(); ++j)
+      spoils |= outcome.at->rows(j).local[static_cast<std::size_t>(group.first)] >= 0 && rises(static_cast<Index>(j));
     if (!spoils && holds(outcome, group, gate.held, i)) continue;
     // An effect on the robot that spoils joints goes before theirs, which may have been bent by it.
     const bool on_body = spoils && group.on_body;
