@@ -388,6 +388,8 @@ double Linearised::log_scale(std::size_t joint) const {
 ///   u = E[(tau(dq + sigma_dq n) - tau(dq))^2] / sigma^2, n of variance 1:
 /// while sigma_dq is small beside the sign's width its slope counts; else the chance of the wrong sign,
 ///   4 F^2 Phi(-|dq| / sigma_dq), F the friction that turns with it.
+/// A joint that stands still (|dq| < sigma_dq) bears any friction up to F, and for as long: its rows have one error
+/// between them, so that of N rows each counts like one of N times the variance.
 /// sigma_dq is what the position filter leaves of the encoder's noise. An encoder that steps more slowly than the
 /// filter is a staircase, no white noise: its velocity is wrong by sqrt(2) cutoff step.
 VectorXd Linearised::doubt(std::size_t log, std::size_t joint, double sigma) const {
@@ -407,6 +409,12 @@ VectorXd Linearised::doubt(std::size_t log, std::size_t joint, double sigma) con
   if (const EffectFit* stribeck = fit.find(Stribeck::name)) amplitude += std::fabs(stribeck->linear[0]);
   if (const EffectFit* load = fit.find(LoadFriction::name)) of_load = std::fabs(load->linear[0]);
   VectorXd uncertain(l.samples());
+  Index still = 0;  // samples so far
+  const auto come_loose = [&](Index at) {
+    if (still > l.decimation)
+      uncertain.segment(at - still, still) *= static_cast<double>(still) / static_cast<double>(l.decimation);
+    still = 0;
+  };
   for (Index k = 0; k < l.samples(); ++k) {
     const double dq = std::fabs((*motions_[log]).dq(k, static_cast<Index>(joint)));
     const double stairs = slow > 0 ? slow * std::exp(-0.125 * dq * dq / (slow * slow)) : 0;
@@ -417,7 +425,13 @@ VectorXd Linearised::doubt(std::size_t log, std::size_t joint, double sigma) con
     const double load = std::fabs(robot_[log]->structural()(k, static_cast<Index>(joint)));
     const double friction = (amplitude + of_load * load) / sigma;
     uncertain[k] = friction * friction * std::max(slope * slope, wrong);
+    if (dq < s) {
+      ++still;
+    } else {
+      come_loose(k);
+    }
   }
+  come_loose(l.samples());
   return l.decimate(l.filter_columns(uncertain)).col(0).cwiseMax(0);
 }
 

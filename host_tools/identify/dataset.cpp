@@ -179,6 +179,9 @@ FilterFit choose_filter(const std::vector<Log>& logs, const SignalSettings& sett
   filter.position_noise.assign(static_cast<std::size_t>(n), 0.0);
   double rate = 1e30;
   bool noisy = false;
+  // All logs together: in a slow one of a controlled robot the share of the jerks with which a joint comes loose is
+  // large, the share of the noise too.
+  std::vector<EnergyByFrequency> moved(static_cast<std::size_t>(n));
   for (const Log& log : logs) rate = std::min(rate, 1 / log.step_s);
   for (const Log& log : logs) {
     for (Index j = 0; j < n; ++j) {
@@ -199,13 +202,16 @@ FilterFit choose_filter(const std::vector<Log>& logs, const SignalSettings& sett
       // Above the frequency at which the motion sinks into the noise there is none.
       const double crossing = crossing_frequency(position);
       const double ceiling = std::min({30.0, 0.4 * rate, log.dq.size() == 0 ? crossing : 30.0});
-      filter.excited_hz = std::max(filter.excited_hz, velocity.frequency_of_share(0.999, ceiling));
+      moved[k].add(velocity, ceiling, static_cast<double>(log.samples()) * log.step_s);
       const double step = log.encoder_step.size() > 0 ? log.encoder_step[j] : encoder_step(q);
       filter.encoder_step[k] = std::max(filter.encoder_step[k], step);
       filter.position_noise[k] = std::max(filter.position_noise[k], position.noise_rms());
       filter.crossing_hz = std::max(filter.crossing_hz, crossing);
     }
   }
+  EnergyByFrequency motion;
+  for (const EnergyByFrequency& joint : moved) motion.add_shares(joint);
+  filter.excited_hz = motion.frequency_of_share(0.999);
   const double position = std::min(0.4 * rate, std::max(10.0, 2 * filter.crossing_hz));
   if (!settings.position_cutoff_hz) {
     for (const Log& log : logs) {

@@ -78,8 +78,11 @@ std::vector<RowBlock> row_blocks(const ProcessedLog& log);
 /// is not a wall; at least 10 Hz, at most 0.4 of the sampling rate. Motion without noise (simulated, exact) is not
 /// filtered.
 ///
-/// Torque and every column: five times the frequency that holds 99.9 % of the velocity's power (friction reverses
-/// faster than the motion), at least 10 Hz, at most 0.4 of the sampling rate.
+/// Torque and every column: five times the frequency that holds 99.9 % of the velocities' energy (friction reverses
+/// faster than the motion), at least 10 Hz, at most 0.4 of the sampling rate. Over all logs and, as shares of each
+/// joint's own, over all joints: chosen for the fastest log of the fastest joint, the band of a controlled robot that
+/// sticks and comes loose in a slow one is three times as wide. Up there its motion is little more than the encoder's
+/// noise, to which the controller answers: regressors and torque share an error, and that looks like structure.
 FilterFit choose_filter(const std::vector<Log>& logs, const SignalSettings& settings);
 
 /// What fits need to know beside the filter.

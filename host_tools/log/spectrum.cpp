@@ -12,15 +12,34 @@ namespace fxdyn {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-double Spectrum::frequency_of_share(double share, double ceiling_hz) const {
-  const Index bins = std::min<Index>(density.size(), static_cast<Index>(ceiling_hz / resolution_hz) + 1);
-  const double total = density.segment(1, bins - 1).sum();
-  double sum = 0;
-  for (Index k = 1; k < bins; ++k) {
-    sum += density[k];
-    if (sum >= share * total) return frequency(k);
+void EnergyByFrequency::add(const Spectrum& spectrum, double ceiling_hz, double duration_s) {
+  const Index bins =
+      std::min<Index>(spectrum.density.size(), static_cast<Index>(ceiling_hz / spectrum.resolution_hz) + 1);
+  for (Index k = 1; k < bins; ++k)
+    energy_[spectrum.frequency(k)] += spectrum.density[k] * spectrum.resolution_hz * duration_s;
+}
+
+void EnergyByFrequency::add_shares(const EnergyByFrequency& other) {
+  const double all = other.whole();
+  if (!(all > 0)) return;
+  for (const auto& [frequency, energy] : other.energy_) energy_[frequency] += energy / all;
+}
+
+double EnergyByFrequency::frequency_of_share(double share) const {
+  const double all = whole();
+  double sum = 0, last = 0;
+  for (const auto& [frequency, energy] : energy_) {
+    sum += energy;
+    last = frequency;
+    if (sum >= share * all) break;
   }
-  return frequency(bins - 1);
+  return last;
+}
+
+double EnergyByFrequency::whole() const {
+  double sum = 0;
+  for (const auto& [frequency, energy] : energy_) sum += energy;
+  return sum;
 }
 
 double Spectrum::noise_rms() const {

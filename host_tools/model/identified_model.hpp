@@ -74,7 +74,7 @@ struct FilterFit {
   /// drive that answers a command a while later has it, or signals that were sampled at different moments.
   double torque_lead_s = 0;
   // Why: see choose_filter().
-  double excited_hz = 0;                             ///< holds 99.9 % of the velocity's power on every joint
+  double excited_hz = 0;                             ///< holds 99.9 % of the velocities' energy, joints alike
   double crossing_hz = 0;                            ///< where the last joint's motion sinks into its noise
   std::vector<double> encoder_step, position_noise;  ///< per joint; no step found: 0; RMS of white noise [rad | m]
 };

@@ -38,6 +38,7 @@ enum class Group {
   no_baseline,
   background,
   dual_encoder,
+  controlled,  ///< moved by a controller, on the internal plant
 };
 std::string to_string(Group group);
 

@@ -138,6 +138,18 @@ void add_others(List& list) {
   }
 }
 
+/// Joints that a controller moves stick, come loose and shake; its torque answers the encoder's noise.
+void add_controlled(List& list) {
+  for (const std::string& effect : effects) {
+    list.add(Group::controlled, list.next_robot(), {{effect, 0.006}}, label(effect, 0.006)).closed_loop = true;
+  }
+  for (int i = 0; i < 12; ++i) {
+    Case& one = list.add(Group::clean, list.next_robot(), {}, "controlled");
+    one.closed_loop = true;
+    one.mujoco = i % 2 == 0;
+  }
+}
+
 }  // namespace
 
 std::vector<Case> all_cases() {
@@ -148,6 +160,7 @@ std::vector<Case> all_cases() {
   add_pairs(list);
   add_outside(list);
   add_others(list);
+  add_controlled(list);
   return list.take();
 }
 
@@ -167,6 +180,8 @@ std::vector<Case> small_cases() {
   list.add(Group::mujoco, scara, {{"presliding", 0.02}}, "presliding").mujoco = true;
   Case& spring = list.add(Group::mujoco, scara, {{"spring", 0.02}}, "spring");
   spring.mujoco = spring.closed_loop = true;
+  Case& cubic = list.add(Group::mujoco, puma, {{"viscous_cubic", 0.006, 3}}, "viscous_cubic");
+  cubic.mujoco = cubic.closed_loop = true;
   Case& dual = list.add(Group::dual_encoder, scara, {{"elasticity", 0, {}, false, 5e-4}}, "elasticity");
   dual.link_encoders = true;
   return list.take();

@@ -55,6 +55,8 @@ std::string to_string(Group group) {
       return "background";
     case Group::dual_encoder:
       return "dual_encoder";
+    case Group::controlled:
+      return "controlled";
   }
   return "";
 }

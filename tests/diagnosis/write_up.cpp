@@ -238,6 +238,17 @@ std::vector<Figure> figures(const std::vector<json>& results) {
                                 "top1"),
                             0.95));
   }
+  const auto one_of = [](const char* group, bool closed_loop) {
+    return [=](const json& r) {
+      return in(r, group) && expected(r) == "visible" && r.at("truth").at("closed_loop").get<bool>() == closed_loop;
+    };
+  };
+  list.push_back(at_least("moved by a controller, visible, 0.6 %: top-1",
+                          rate(results, one_of("controlled", true), "top1"), 0.95));
+  list.push_back(at_least("MuJoCo's plant, prescribed motion, visible: top-1",
+                          rate(results, one_of("mujoco", false), "top1"), 0.95));
+  list.push_back(at_least("MuJoCo's plant, moved by a controller, visible: top-1",
+                          rate(results, one_of("mujoco", true), "top1"), 0.95));
   return list;
 }
 
@@ -280,6 +291,7 @@ std::string write_up(const std::vector<json>& results, const std::string& comman
   const std::vector<std::pair<const char*, const char*>> groups{{"mujoco", "The MuJoCo plant"},
                                                                 {"no_baseline", "Without a baseline"},
                                                                 {"background", "With a background"},
+                                                                {"controlled", "Moved by a controller"},
                                                                 {"dual_encoder", "Link encoders"}};
   for (const auto& [group, title] : groups) {
     const Filter of_group = [&](const json& r) { return in(r, group); };

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 #include "host_tools/excite/fourier.hpp"
 #include "host_tools/identify/essential.hpp"
 #include "host_tools/identify/identify.hpp"
@@ -369,6 +371,34 @@ TEST(Statistics, TorqueThatRunsAheadIsAligned) {
   const double off = fitter.held_out()[1].rmse;
   fitter.set_torque_lead(0.0024, fitter.filtered_torque());
   EXPECT_LT(fitter.held_out()[1].rmse, 0.05 * off);
+}
+
+/// 20 s of one joint at `hz` with `amplitude` rad, and 17 bits.
+Log swing(const std::vector<std::pair<double, double>>& hz_and_amplitude) {
+  Log log;
+  log.step_s = 0.002;
+  constexpr Index samples = 10000;
+  log.t = VectorXd::LinSpaced(samples, 0, log.step_s * (samples - 1));
+  log.q = VectorXd::Zero(samples);
+  for (const auto& [hz, amplitude] : hz_and_amplitude)
+    log.q.col(0) += amplitude * (2 * std::numbers::pi * hz * log.t.array()).sin().matrix();
+  const double step = 2 * std::numbers::pi / (1 << 17);
+  log.q = (log.q / step).array().round() * step;
+  return log;
+}
+
+// A slow log in which the joint jerks now and then does not open the band for its noise; what is fast and large does.
+TEST(Filter, BandIsThatOfAllLogsTogether) {
+  std::vector<std::pair<double, double>> jerks{{0.2, 0.05}};
+  for (double hz = 0.6; hz < 12; hz += 0.4) jerks.emplace_back(hz, 1e-4);
+  const Log fast = swing({{2, 0.5}}), slow = swing(jerks),
+            both = swing({{2, 0.5}, {2.4, 0.05}, {2.8, 0.05}, {3.2, 0.05}, {3.6, 0.05}, {4, 0.05}});
+  const auto band = [](const std::vector<Log>& logs) { return choose_filter(logs, {}); };
+  EXPECT_GT(band({slow}).excited_hz, 10);
+  EXPECT_NEAR(band({fast}).excited_hz, 2, 0.5);
+  EXPECT_NEAR(band({fast, slow}).excited_hz, 2, 0.5);
+  EXPECT_NEAR(band({fast, slow}).torque_cutoff_hz, 5 * band({fast, slow}).excited_hz, 1e-9);
+  EXPECT_NEAR(band({both, slow}).excited_hz, 4, 0.5);
 }
 
 }  // namespace

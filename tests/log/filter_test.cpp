@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "host_tools/log/log.hpp"
+#include "host_tools/log/spectrum.hpp"
 
 namespace fxdyn {
 namespace {
@@ -106,6 +107,32 @@ TEST(Differentiate, PolynomialsAreExactEvenInShortLogs) {
     EXPECT_LT((differentiate_twice(x, 0.1).array() - 6).abs().maxCoeff(), 1e-9) << n;
   }
   EXPECT_EQ(differentiate(VectorXd::Ones(1), 0.1)(0), 0);
+}
+
+// Two recordings of one joint, each with its own spacing of frequencies: 9 J at 2 Hz, 0.9 J at 10 Hz.
+TEST(Energy, AddsUpOverRecordings) {
+  const auto density = [](double resolution_hz, double hz) {
+    Spectrum s{resolution_hz, VectorXd::Zero(static_cast<Index>(20 / resolution_hz))};
+    s.density[static_cast<Index>(std::lround(hz / resolution_hz))] = 1 / resolution_hz;
+    s.density[0] = 1e6;  // a mean is no motion
+    return s;
+  };
+  EnergyByFrequency both;
+  both.add(density(0.5, 2), 30, 9);
+  both.add(density(0.25, 10), 30, 0.9);
+  EXPECT_DOUBLE_EQ(both.frequency_of_share(0.9), 2);
+  EXPECT_DOUBLE_EQ(both.frequency_of_share(0.92), 10);
+  both.add(density(0.5, 15), 14, 100);  // above its ceiling
+  EXPECT_DOUBLE_EQ(both.frequency_of_share(0.999), 10);
+
+  EnergyByFrequency weak, joints, nothing;
+  weak.add(density(0.5, 12), 30, 1e-6);
+  joints.add_shares(both);
+  joints.add_shares(weak);  // counts as much as the other
+  joints.add_shares(nothing);
+  EXPECT_DOUBLE_EQ(joints.frequency_of_share(0.49), 10);
+  EXPECT_DOUBLE_EQ(joints.frequency_of_share(0.51), 12);
+  EXPECT_EQ(nothing.frequency_of_share(0.5), 0);
 }
 
 }  // namespace
