@@ -216,6 +216,12 @@ VectorXd residual(const MatrixXd& x, const VectorXd& y) {
   return y - x * SymmetricSolver(x.transpose() * x).solve(x.transpose() * y);
 }
 
+double largest_load(const Rows& rows) {
+  double most = 1e-6;
+  for (const JointSeries& s : rows.series) most = std::max(most, s.structural.cwiseAbs().maxCoeff());
+  return most;
+}
+
 /// Fits a set in whitened rows.
 void fit(const Rows& rows, const VectorXd& a, Set& set) {
   const MatrixXd x = rows.whiten(design(rows, set.parts), a);
@@ -236,6 +242,8 @@ void fit(const Rows& rows, const VectorXd& a, Set& set) {
     penalty += static_cast<double>(info.linear.size() + info.shape.size()) * std::log(n) +
                2 * std::log(part.shape.empty() ? 1.0 : 4.0);
     for (const ParameterInfo& p : info.linear) possible &= set.theta[at++] >= p.lower;
+    // A gap whose flanks no load reaches is in proportion to it: an elasticity.
+    if (part.effect == Backlash::name) possible &= part.shape[0] <= largest_load(rows);
   }
   set.likelihood = -n * std::log(std::max(set.square, 1e-300) / n) - penalty;
   set.score = possible ? set.likelihood : -1e300;
@@ -246,12 +254,6 @@ std::vector<Part> all_parts(double largest) {
   return {{std::string(Elasticity::name), {1e-3}},
           {std::string(Backlash::name), {0.03 * largest}},
           {std::string(Eccentricity::name), {}}};
-}
-
-double largest_load(const Rows& rows) {
-  double most = 1e-6;
-  for (const JointSeries& s : rows.series) most = std::max(most, s.structural.cwiseAbs().maxCoeff());
-  return most;
 }
 
 /// Shapes one after the other: over a grid, then around.
