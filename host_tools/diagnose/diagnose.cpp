@@ -152,8 +152,14 @@ class Work {
     // The model before: no effect that is to be found, its parameters the best without.
     Models before = models_;
     refit(before, logs_, plain(), 8);
-    check_judges(before.current, data_.logs, still_);
-    check_judges(before.current, test_, still_);
+    // What of the background is no longer what it was is a finding: it stays what it was, and the rest is looked for.
+    models_.held = changed_effects(Linearised(before, logs_, plain()));
+    if (!models_.held.empty()) {
+      before = models_;
+      refit(before, logs_, plain(), 8);
+    }
+    add_notes(check_judges(before.current, data_.logs, still_));
+    add_notes(check_judges(before.current, test_, still_));
     if (deflections_.found.empty()) {
       models_ = before;
     } else {
@@ -188,10 +194,7 @@ class Work {
     }
     believe(found.current, gate, *outcome.at);
     result.model = found.current;
-    if (models_.has_baseline) {
-      const auto changed = changed_parameters(*outcome.at);
-      notes_.insert(notes_.end(), changed.begin(), changed.end());
-    }
+    if (models_.has_baseline) add_notes(changed_parameters(*outcome.at));
     result.report = verdicts({result.nominal, result.model, outcome, gate, deflections_, still_, data_.logs, test_});
     for (std::size_t j = 0; j < joints(); ++j) {
       // What stands still has no friction that these logs tell.
@@ -208,6 +211,7 @@ class Work {
  private:
   std::size_t joints() const { return project_.robot.size(); }
   std::vector<VectorXd> plain() const { return std::vector<VectorXd>(joints(), VectorXd::Zero(1)); }
+  void add_notes(const std::vector<std::string>& notes) { notes_.insert(notes_.end(), notes.begin(), notes.end()); }
   const std::string& name_of(std::size_t j) const { return project_.robot.joints[j].name; }
 
   /// The rotor that a link encoder told from the link.
@@ -238,7 +242,7 @@ class Work {
     }
     std::vector<DeflectionEffect> already;
     deflections_ = find_deflections(model, covariance, data_.logs, baseline_, already);
-    notes_.insert(notes_.end(), deflections_.notes.begin(), deflections_.notes.end());
+    add_notes(deflections_.notes);
     if (!baseline_.empty() && std::none_of(baseline_.begin(), baseline_.end(), linked) && !deflections_.found.empty())
       notes_.push_back("the baseline has no qlink columns: what the link encoders show may have been there before");
     std::vector<bool> judged(joints(), false);
@@ -383,7 +387,7 @@ class Work {
     }
     models_.healthy = models_.current = alone.current;
     models_.rotors = alone.rotors;
-    check_same_robot(models_, logs_, still_);
+    add_notes(check_same_robot(models_, logs_, still_));
     data_.notes.insert(data_.notes.end(), healthy.notes.begin(), healthy.notes.end());
   }
 

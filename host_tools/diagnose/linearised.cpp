@@ -173,10 +173,11 @@ void Linearised::make_blocks() {
 void Linearised::make_unknowns() {
   const IdentifiedModel& now = models_.current;
   const bool two = models_.has_baseline;
-  const auto fixed = [&](std::size_t j, const EffectFit& fit) {
-    return std::any_of(models_.fixed.begin(), models_.fixed.end(),
+  const auto is_in = [](const std::vector<EffectCandidate>& list, std::size_t j, const EffectFit& fit) {
+    return std::any_of(list.begin(), list.end(),
                        [&](const EffectCandidate& c) { return c.joint == j && c.effect == fit.effect; });
   };
+  const auto fixed = [&](std::size_t j, const EffectFit& fit) { return is_in(models_.fixed, j, fit); };
   const auto upper_of = [&](const ParameterInfo& p) {
     // A delay is so many steps of the finest log.
     return p.name == "time" ? std::min(p.upper, Delay::largest * models_.smallest_step_s) : p.upper;
@@ -228,7 +229,7 @@ void Linearised::make_unknowns() {
         }
         unknowns_.push_back(u);
         u.prior_std = 0;
-        if (!two || fit.effect == RotorInertia::name) continue;
+        if (!two || fit.effect == RotorInertia::name || is_in(models_.held, j, fit)) continue;
         u.change = true;
         // Of motions of unit size: a coefficient's own scale.
         double scale = friction_change * std::fabs(u.value);

@@ -146,8 +146,10 @@ void mute(std::vector<SessionLog>& logs, const IdentifiedModel& model, const std
   }
 }
 
-void check_same_robot(Models models, const std::vector<SessionLog>& logs, const std::vector<bool>& still) {
+std::vector<std::string> check_same_robot(Models models, const std::vector<SessionLog>& logs,
+                                          const std::vector<bool>& still) {
   constexpr double most = 0.2;  // of the torque's power that no fit explains
+  constexpr double apart = 4;   // .. and times the noise: where a joint carries little that is most of it
   models.background.clear();    // explains anything
   Linearised at(models, logs, std::vector<VectorXd>(models.current.joints.size(), VectorXd::Zero(1)));
   const auto first = static_cast<Index>(at.nuisance().size());
@@ -161,36 +163,51 @@ void check_same_robot(Models models, const std::vector<SessionLog>& logs, const 
   std::vector<Index> columns = at.nuisance();
   for (Index c = first; c < at.columns(); ++c) columns.push_back(c);
   const LinearFit fit = at.solve(columns);
-  std::size_t strange = 0, judged = 0;
+  std::vector<bool> strange(at.joints(), false);
+  for (const bool healthy : {false, true}) {
+    std::vector<std::size_t> blocks;
+    for (const std::size_t b : at.fit_blocks()) {
+      if (at.blocks()[b].healthy == healthy) blocks.push_back(b);
+    }
+    const VectorXd left = at.square(fit, blocks);
+    for (std::size_t j = 0; j < at.joints(); ++j) {
+      const auto k = static_cast<Index>(j);
+      double whole = 0, noise = 0;
+      for (const SessionLog& entry : logs) {
+        if (entry.healthy != healthy || !entry.fits) continue;
+        const MatrixXd rows = entry.log.decimate(entry.log.filter_columns(entry.log.tau.col(k)));
+        whole += rows.squaredNorm();
+        noise += static_cast<double>(rows.rows()) * entry.log.torque_noise[k] * entry.log.torque_noise[k];
+      }
+      if (left[k] > std::max(most * whole, apart * noise)) strange[j] = true;
+    }
+  }
+  std::size_t count = 0, judged = 0;
+  std::vector<std::string> notes;
   for (std::size_t j = 0; j < at.joints(); ++j) {
     if (still[j]) continue;
     ++judged;
-    bool explained = true;
-    for (const bool healthy : {false, true}) {
-      std::vector<std::size_t> blocks;
-      double whole = 0;
-      for (const std::size_t b : at.fit_blocks()) {
-        if (at.blocks()[b].healthy == healthy) blocks.push_back(b);
-      }
-      for (const SessionLog& entry : logs) {
-        if (entry.healthy != healthy || !entry.fits) continue;
-        whole += entry.log.decimate(entry.log.filter_columns(entry.log.tau.col(static_cast<Index>(j)))).squaredNorm();
-      }
-      explained &= at.square(fit, blocks)[static_cast<Index>(j)] <= most * whole;
-    }
-    strange += !explained;
+    if (!strange[j]) continue;
+    ++count;
+    notes.push_back(
+        fmt::format("{}: nothing explains the baseline and these logs together: another unit, gain or column in one of "
+                    "them? What is found there may be that",
+                    models.current.robot.joints[j].name));
   }
-  if (2 * strange >= judged) {
+  if (2 * count >= judged && count > 0) {
     throw DataError(fmt::format(
         "the baseline and these logs can't be of one robot: nothing explains both at {} of {} joints; other "
         "units, columns or gains? Correct the baseline or remove it (role = \"baseline\")",
-        strange, judged));
+        count, judged));
   }
+  return notes;
 }
 
-void check_judges(const IdentifiedModel& model, const std::vector<ProcessedLog>& logs, const std::vector<bool>& still) {
+std::vector<std::string> check_judges(const IdentifiedModel& model, const std::vector<ProcessedLog>& logs,
+                                      const std::vector<bool>& still) {
   constexpr double alike = 0.9;  // of the torque's power is the model's times a factor
   constexpr double factor = 3;   // more than any load or change makes of all joints
+  std::vector<std::string> notes;
   for (const ProcessedLog& log : logs) {
     if (log.role != Role::validate && log.role != Role::test) continue;
     const MatrixXd ours = log.filter_columns(predict(model, log)), theirs = log.filter_columns(log.tau);
@@ -208,6 +225,10 @@ void check_judges(const IdentifiedModel& model, const std::vector<ProcessedLog>&
       if (!scaled || xy * xy < alike * xx * yy) continue;
       ++odd;
       last = times;
+      notes.push_back(
+          fmt::format("{}: its torque of {} is {:.3g} times that of the train logs' motion: other units, "
+                      "gain or sign?",
+                      log.name, model.robot.joints[j].name, times));
     }
     if (judged == 0 || odd < judged) continue;
     throw DataError(fmt::format(
@@ -215,6 +236,7 @@ void check_judges(const IdentifiedModel& model, const std::vector<ProcessedLog>&
         "Correct it or remove it (role = \"{}\")",
         log.name, last, log.role == Role::test ? "test" : "validate"));
   }
+  return notes;
 }
 
 }  // namespace fxdyn::diagnosis

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "host_tools/diagnose/linearised.hpp"
@@ -30,10 +31,13 @@ void leave_out(std::vector<ProcessedLog>& logs, const std::vector<bool>& joints)
 void mute(std::vector<SessionLog>& logs, const IdentifiedModel& model, const std::vector<bool>& joints);
 
 /// Base parameters of the baseline with friction, load and tilt of their own against what both sessions measured.
-/// @throws DataError: nothing explains both
-void check_same_robot(Models models, const std::vector<SessionLog>& logs, const std::vector<bool>& still);
+/// @returns a note for each joint at which nothing explains both @throws DataError: at half of the joints
+std::vector<std::string> check_same_robot(Models models, const std::vector<SessionLog>& logs,
+                                          const std::vector<bool>& still);
 
-/// @throws DataError: at every joint a validate or test log has the train logs' torque times some factor: other units.
-void check_judges(const IdentifiedModel& model, const std::vector<ProcessedLog>& logs, const std::vector<bool>& still);
+/// A validate or test log that has the train logs' torque times some factor at a joint: other units.
+/// @returns a note for each such joint @throws DataError: it is so at every joint
+std::vector<std::string> check_judges(const IdentifiedModel& model, const std::vector<ProcessedLog>& logs,
+                                      const std::vector<bool>& still);
 
 }  // namespace fxdyn::diagnosis

@@ -22,6 +22,8 @@ using nlohmann::json;
 
 /// Times the error before: what test logs say against a name.
 constexpr double risen = 1.05;
+/// Times the error of the logs that judged: the test logs hold something else.
+constexpr double much_larger = 2;
 /// Share of rows.
 constexpr double much_doubt = 0.1;
 
@@ -64,9 +66,18 @@ class Teller {
       figures_on_ = gate_of(t_.now);
       for (const ProcessedLog& log : t_.now) shown_.push_back(&log);
     }
+    const bool judged_alone = std::any_of(t_.now.begin(), t_.now.end(), is_validate);
+    for (const ProcessedLog& log : t_.now) {
+      if (!judged_alone || is_validate(log)) judges_.push_back(&log);
+    }
     before_.resize(shown_.size());
     after_.resize(shown_.size());
-    parallel_for(shown_.size(), [&](std::size_t l) {
+    judged_.resize(judges_.size());
+    parallel_for(shown_.size() + judges_.size(), [&](std::size_t l) {
+      if (l >= shown_.size()) {
+        judged_[l - shown_.size()] = predict(t_.model, *judges_[l - shown_.size()]);
+        return;
+      }
       before_[l] = predict(t_.nominal, *shown_[l]);
       after_[l] = predict(t_.model, *shown_[l]);
     });
@@ -83,6 +94,12 @@ class Teller {
         return std::find(r["joints"].begin(), r["joints"].end(), joint["index"]) != r["joints"].end();
       });
       if (reached && joint["verdict"] == "nothing_missing") joint["verdict"] = "effects_found";
+    }
+    for (const std::string& effect : t_.outcome.not_identifiable.back()) {
+      // What of a load or a tilt is not part of the base parameters, the poses show.
+      advise(fmt::format("{}: {}", effect,
+                         at_.models().has_baseline ? "other poses and loads"
+                                                   : "the same motions recorded without it (role = \"baseline\")"));
     }
     const auto any = [&](const char* verdict) {
       return std::any_of(joints.begin(), joints.end(), [&](const json& joint) { return joint["verdict"] == verdict; });
@@ -105,6 +122,26 @@ class Teller {
   }
 
  private:
+  /// Errors of what was fitted come out too small by the square root of this.
+  double judged_over_fitted(Index joint) const {
+    const HeldOut& held = t_.gate.held;
+    return held.fitted_rows[joint] / std::max(held.rows[joint], 1.0) * held.after[joint] /
+           std::max(held.fitted_after[joint], 1e-300);
+  }
+
+  /// RMS error of a joint on the logs that judged the names.
+  double gate_error(std::size_t j) const {
+    double square = 0, count = 0;
+    for (std::size_t l = 0; l < judges_.size(); ++l) {
+      const ProcessedLog& log = *judges_[l];
+      const Index samples = log.last - log.first;
+      square += error_of(log, judged_[l], j).segment(log.first, samples).squaredNorm();
+      count += static_cast<double>(samples);
+    }
+    if (!is_validate(*judges_.front())) square *= judged_over_fitted(static_cast<Index>(j));
+    return std::sqrt(square / std::max(count, 1.0));
+  }
+
   const Joint& joint_of(std::size_t j) const { return t_.model.robot.joints[j]; }
 
   void advise(const std::string& text) {
@@ -118,6 +155,17 @@ class Teller {
     const MatrixXd without = predict(less, *shown_.front());
     const auto k = static_cast<Index>(j);
     return (after_.front() - without).col(k).norm() / std::max(after_.front().col(k).norm(), 1e-300);
+  }
+
+  /// .. an effect on the robot, at the joint where it is largest.
+  double body_share(std::size_t e) const {
+    IdentifiedModel less = t_.model;
+    less.body.erase(less.body.begin() + static_cast<std::ptrdiff_t>(e));
+    const MatrixXd change = after_.front() - predict(less, *shown_.front());
+    double most = 0;
+    for (Index k = 0; k < change.cols(); ++k)
+      most = std::max(most, change.col(k).norm() / std::max(after_.front().col(k).norm(), 1e-300));
+    return most;
   }
 
   /// A tilted base makes the masses about a first joint that stood upright felt, as a balancer there would be: with a
@@ -168,7 +216,8 @@ class Teller {
             {"where", json::array()},
             {"effects", json::array()},
             {"resembles", json::array()},
-            {"not_identifiable", unseen}};
+            {"not_identifiable", unseen},
+            {"lack_of_fit", {{"state_p", nullptr}, {"time_p", nullptr}}}};
   }
 
   json moving(std::size_t j) {
@@ -188,11 +237,13 @@ class Teller {
       // Errors of what was fitted, by the ratio of judged to fitted ones.
       const double rows = held.fitted_rows[k] / std::max(held.rows[k], 1.0);
       before *= rows * held.before[k] / std::max(held.fitted_before[k], 1e-300);
-      after *= rows * held.after[k] / std::max(held.fitted_after[k], 1e-300);
+      after *= judged_over_fitted(k);
     }
     const double rms_before = std::sqrt(before / std::max(count, 1.0)),
                  rms_after = std::sqrt(after / std::max(count, 1.0));
-    const double floor = rms_after * std::sqrt(std::max(0.0, 1 - held.leftover[k] / std::max(held.after[k], 1e-300)));
+    // Of the logs that judged: what another motion shows on top is no noise.
+    const double rms_gate = blocks_only_ ? rms_after : gate_error(j),
+                 floor = rms_gate * std::sqrt(std::max(0.0, 1 - held.leftover[k] / std::max(held.after[k], 1e-300)));
     json effects = json::array(), resembles = json::array();
     const auto& fits = t_.model.joints[j].effects;
     for (std::size_t e = 0; e < fits.size(); ++e) {
@@ -227,6 +278,12 @@ class Teller {
                          {"model_share", model_share(j, static_cast<std::size_t>(at - fits.begin()))}});
     }
     const LackOfFit& lack = t_.outcome.lack[j];
+    if (!t_.test.empty() && rms_after > much_larger * rms_gate) {
+      notes_.push_back(fmt::format(
+          "{}: the error is {:.3g} {} on the test logs and {:.3g} on the logs that judged: another load, tool "
+          "or motion that these did not have?",
+          joint_of(j).name, rms_after, joint_of(j).torque_unit(), rms_gate));
+    }
     const bool nothing_found = effects.empty() && !robot_reaches(k);
     const bool unexplained = (lack.structured() && (nothing_found || t_.gate.remains[j])) || !resembles.empty();
     const std::string verdict = unexplained ? "unexplained" : !effects.empty() ? "effects_found" : "nothing_missing";
@@ -236,7 +293,8 @@ class Teller {
         !resembles.empty() || robot_reaches(k) || unexplained ||
         std::any_of(effects.begin(), effects.end(), [](const json& e) { return !e.contains("signal"); });
     const json closure = of_torque ? json(t_.gate.closure[k]) : json(nullptr);
-    if (!effects.empty() && !blocks_only_ && !t_.test.empty() && rms_after > risen * rms_before) {
+    const bool anything = !effects.empty() || !resembles.empty() || robot_reaches(k);
+    if (anything && !t_.test.empty() && rms_after > risen * rms_before) {
       notes_.push_back(
           fmt::format("{}: on the test logs the error rises from {:.3g} to {:.3g} {}: what was found does not carry "
                       "over to their motion",
@@ -244,7 +302,7 @@ class Teller {
     }
     std::sort(effects.begin(), effects.end(), [](const json& a, const json& b) { return a["score"] > b["score"]; });
     json regions = json::array();
-    if (verdict != "nothing_missing" || rms_before >= 1.05 * floor)
+    if (verdict != "nothing_missing" || rms_before >= much_larger * floor)
       regions = where(t_.nominal, shown_, j, errors, std::min(floor, rms_before));
     const double doubtful = at_.doubtful(j);
     if (unexplained && doubtful > much_doubt) {
@@ -306,6 +364,7 @@ class Teller {
         if (t_.gate.held.alone[i][static_cast<Index>(j)] > least_felt) which.push_back(j + 1);
       }
       one["joints"] = which;
+      one["model_share"] = body_share(e);
       robot.push_back(std::move(one));
     }
     return robot;
@@ -318,6 +377,8 @@ class Teller {
   std::vector<std::string> notes_;
   bool blocks_only_ = false, any_effect_ = false;
   std::vector<MatrixXd> before_, after_;
+  std::vector<const ProcessedLog*> judges_;  ///< what accepted the names: validate logs, or the train logs
+  std::vector<MatrixXd> judged_;             ///< .. and the model's torque on them
 };
 
 }  // namespace
@@ -328,12 +389,33 @@ std::string gate_of(const std::vector<ProcessedLog>& now) {
                          : "train logs, each judged by coefficients fitted to the others";
 }
 
-std::vector<std::string> changed_parameters(const Linearised& at) {
+namespace {
+
+bool is_changed(const Unknown& u) {
   constexpr double beyond = 2;  // times what sessions differ by
+  return u.change && u.kind == Unknown::Kind::linear && std::fabs(u.value) >= beyond * u.prior_std;
+}
+
+}  // namespace
+
+std::vector<EffectCandidate> changed_effects(const Linearised& at) {
+  std::vector<EffectCandidate> out;
+  for (const Unknown& u : at.unknowns()) {
+    if (!is_changed(u)) continue;
+    const EffectFit& fit = at.models().current.joints[u.joint].effects[u.effect];
+    // Of these, one that comes on top is the change: torques that add up, with shapes of their own.
+    const bool adds = fit.effect == Ripple::name || fit.effect == Spring::name ||
+                      fit.effect == GravityCompensator::name || fit.effect == JointCoupling::name;
+    if (adds) out.push_back({fit.effect, u.joint, fit.shape});
+  }
+  return out;
+}
+
+std::vector<std::string> changed_parameters(const Linearised& at) {
   std::vector<std::string> out;
   const Models& models = at.models();
   for (const Unknown& u : at.unknowns()) {
-    if (!u.change || u.kind != Unknown::Kind::linear || std::fabs(u.value) < beyond * u.prior_std) continue;
+    if (!is_changed(u)) continue;
     const EffectFit& now = models.current.joints[u.joint].effects[u.effect];
     const Joint& joint = models.current.robot.joints[u.joint];
     const ParameterInfo& p = find_effect(now.effect)->linear[u.index];

@@ -21,10 +21,17 @@ constexpr std::size_t most_regions = 4;
 struct Region {
   std::string signal;
   double from = 0, to = 0, share = 0, contrast = 0;
+  std::string log{};  ///< empty: of all logs
+};
+
+/// What shares are of: the gap's power, and samples.
+struct Whole {
+  double power = 0, samples = 0;
 };
 
 /// The interval with the largest share of the gap beyond its share of the samples.
-Region concentrated(const std::string& signal, const VectorXd& values, const VectorXd& square, double noise) {
+Region concentrated(const std::string& signal, const VectorXd& values, const VectorXd& square, double noise,
+                    const Whole& of) {
   Region best{signal};
   std::vector<double> sorted(values.begin(), values.end());
   std::sort(sorted.begin(), sorted.end());
@@ -36,17 +43,16 @@ Region concentrated(const std::string& signal, const VectorXd& values, const Vec
     power[bin] += square[k] - noise * noise;
     count[bin] += 1;
   }
-  const double whole = power.sum(), samples = count.sum();
-  if (!(whole > 0)) return best;
+  if (!(of.power > 0)) return best;
   for (Index a = 0; a < bins; ++a) {
     double p = 0, c = 0;
     for (Index b = a; b < bins; ++b) {
       p += power[b];
       c += count[b];
-      const double contrast = p / whole - c / samples;
+      const double contrast = p / of.power - c / of.samples;
       if (contrast <= best.contrast) continue;
       best.contrast = contrast;
-      best.share = std::min(1.0, p / whole);
+      best.share = std::min(1.0, p / of.power);
       best.from = from + (to - from) * static_cast<double>(a) / bins;
       best.to = from + (to - from) * static_cast<double>(b + 1) / bins;
     }
@@ -83,15 +89,25 @@ nlohmann::json where(const IdentifiedModel& model, const std::vector<const Proce
     }
   }
   std::vector<Region> regions;
+  const Whole all{square.sum() - noise * noise * static_cast<double>(total), static_cast<double>(total)};
   const auto look = [&](const std::string& signal, const VectorXd& values) {
-    Region region = concentrated(signal, values, square, noise);
+    Region region = concentrated(signal, values, square, noise, all);
     if (region.share > 0) regions.push_back(region);
   };
   look("dq", dq);
   look("q", q);
   look("ddq", ddq);
   look("load", load);
-  look("t", t);
+  // Clocks start anywhere: time is a log's own.
+  Region when{"t"};
+  at = 0;
+  for (const ProcessedLog* log : logs) {
+    Region region = concentrated("t", t.segment(at, log->rows()), square.segment(at, log->rows()), noise, all);
+    if (logs.size() > 1) region.log = log->name;
+    if (region.contrast > when.contrast) when = region;
+    at += log->rows();
+  }
+  if (when.share > 0) regions.push_back(when);
   {
     // direction of motion
     double forward = 0, backward = 0, ahead = 0;
@@ -108,7 +124,8 @@ nlohmann::json where(const IdentifiedModel& model, const std::vector<const Proce
     }
   }
   {
-    // octaves of frequency; contrast against the band
+    // octaves of frequency, without a white noise of that size; contrast against the band
+    const double cutoff = logs.front()->filter.torque_cutoff_hz;
     VectorXd power;
     double step = 0;
     for (std::size_t l = 0; l < logs.size(); ++l) {
@@ -118,14 +135,17 @@ nlohmann::json where(const IdentifiedModel& model, const std::vector<const Proce
       if (power.size() != spectrum.density.size()) continue;
       power += spectrum.density * static_cast<double>(log.rows());
       step = spectrum.frequency(1) - spectrum.frequency(0);
+      const auto inside = std::min<Index>(power.size(), static_cast<Index>(cutoff / step));
+      power.head(inside).array() -= noise * noise / cutoff * static_cast<double>(log.rows());
     }
-    const double cutoff = logs.front()->filter.torque_cutoff_hz, whole = power.sum();
+    const double whole = power.sum();
     Region best{"frequency"};
     for (double from = 0; from < cutoff && whole > 0 && step > 0; from = std::max(2 * from, 0.5)) {
       const double to = std::max(2 * from, 0.5);
       const auto a = static_cast<Index>(from / step), b = std::min<Index>(power.size(), static_cast<Index>(to / step));
       if (b <= a) continue;
-      const double share = power.segment(a, b - a).sum() / whole, contrast = share - (to - from) / cutoff;
+      const double share = std::min(1.0, power.segment(a, b - a).sum() / whole),
+                   contrast = share - (to - from) / cutoff;
       if (contrast > best.contrast) best = {"frequency", from, to, share, contrast};
     }
     if (best.share > 0) regions.push_back(best);
@@ -136,6 +156,7 @@ nlohmann::json where(const IdentifiedModel& model, const std::vector<const Proce
     if (out.size() >= most_regions || (region.contrast < telling && !out.empty())) break;
     out.push_back(
         {{"signal", region.signal}, {"from", region.from}, {"to", region.to}, {"share_of_gap", region.share}});
+    if (!region.log.empty()) out.back()["log"] = region.log;
   }
   return out;
 }

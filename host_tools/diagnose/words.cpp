@@ -88,6 +88,7 @@ std::string where(const json& of, const std::string& torque_unit) {
     out += fmt::format(" {} .. {}{}", figure(of, "from"), figure(of, "to"), unit.empty() ? "" : " " + unit);
   else if (of.contains("value"))
     out += " " + (of.at("value").is_string() ? text(of, "value") : figure(of, "value"));
+  if (of.contains("log")) out += " of " + text(of, "log");
   return out;
 }
 

@@ -195,8 +195,10 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
   }
   if (logs.size() == 1) {
     data.notes.push_back(
-        "one trajectory fits and judges: five blocks of it are judged by fits of the others, and they resemble each other, "
-        "so that errors come out too small and effects that do not carry over can stay; record another trajectory with role "
+        "one trajectory fits and judges: five blocks of it are judged by fits of the others, and they resemble each "
+        "other, "
+        "so that errors come out too small and effects that do not carry over can stay; record another trajectory with "
+        "role "
         "= \"validate\"");
   }
   if (project.rated_torque.empty())
@@ -245,8 +247,10 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
 }
 
 void check_torque(const Log& log, const Robot& robot) {
+  constexpr double parked = 1e-3;  // rad or m; a brake may hold the joint, its drive off
   for (Eigen::Index j = 0; j < log.tau.cols(); ++j) {
     if (log.tau.col(j).maxCoeff() > log.tau.col(j).minCoeff()) continue;
+    if (log.q.col(j).maxCoeff() - log.q.col(j).minCoeff() < parked) continue;
     throw DataError(fmt::format("{}: torque of joint {} ({}) never changes: check the column and its gain",
                                 log.file.string(), j + 1, robot.joints[static_cast<std::size_t>(j)].name));
   }

@@ -21,7 +21,7 @@ struct GateData {
 /// @throws InputError where the project names no train log.
 GateData read_gate_data(const Project& project, const std::filesystem::path& directory);
 
-/// @throws DataError: a torque column that never changes
+/// @throws DataError: a torque column that never changes, of a joint that moves
 void check_torque(const Log& log, const Robot& robot);
 
 /// Limits and ratings of each joint: the project's, else 1.2 times the largest in the logs; URDF limits where the logs

@@ -148,9 +148,26 @@ void Pipeline::check_motion() {
   }
 }
 
+void Pipeline::check_excited() const {
+  const fs::path file = directory_ / "diagnosis.json";
+  if (!fs::exists(file)) return;
+  const json report = json::parse(read_file(file));
+  for (const json& joint : report.at("joints")) {
+    if (joint.at("verdict") != "not_excited") continue;
+    throw DataError(fmt::format(
+        "joint {} ({}) is not_excited: it rests in the baseline or moves no more than its encoder's noise, and "
+        "its friction is not in the model; record a baseline or train log in which it moves, or leave the "
+        "baseline out",
+        joint.at("index").get<int>(), joint.at("joint").get<std::string>()));
+  }
+}
+
 std::vector<ProcessedLog> Pipeline::logs(Role role) {
   std::vector<ProcessedLog> out;
-  for (Log& log : read_logs(project_, role, directory_)) out.push_back(process(std::move(log), data().filter));
+  for (Log& log : read_logs(project_, role, directory_)) {
+    check_torque(log, project_.robot);
+    out.push_back(process(std::move(log), data().filter));
+  }
   return out;
 }
 
@@ -230,6 +247,7 @@ void Pipeline::diagnose() {
   std::vector<ProcessedLog> baseline;
   for (Log& log : read_logs(project_, Role::baseline, directory_)) {
     log.role = Role::train;  // what the healthy session is fitted on
+    check_torque(log, project_.robot);
     baseline.push_back(process(std::move(log), data().filter));
   }
   const Diagnosis diagnosis = fxdyn::diagnose(project_, data(), baseline, logs(Role::test), progress_);
@@ -280,6 +298,7 @@ void Pipeline::train() {
   // Always from the files: `fxdyn run` gives the same bytes as the verbs one by one.
   const auto start = Clock::now();
   const IdentifiedModel diagnosed = read_model(directory_ / "model.json");
+  check_excited();
   json stages = json::array();
   if (const fs::path file = directory_ / "metrics.json"; fs::exists(file)) {
     const json before = json::parse(read_file(file));

@@ -49,6 +49,8 @@ class Pipeline {
   /// DIR/model.json, if it is current and one of these stages made it.
   std::optional<IdentifiedModel> written(std::initializer_list<std::string_view> stages);
   void check_motion();
+  /// @throws DataError: diagnosis could tell nothing of a joint
+  void check_excited() const;
   nlohmann::json rigid_metrics(Fitter fitter);
   /// Of a fit: what metrics.json and DIR hold beside the model.
   nlohmann::json fit_metrics(const Fitter& fitter, const Estimate& estimate, const nlohmann::json& stages);

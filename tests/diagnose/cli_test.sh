@@ -138,6 +138,14 @@ baseline milli 'NR > 1 { $4 *= 1000; $5 *= 1000 } { print }'
 expect 1 "baseline" diagnose milli
 baseline another 'NR > 1 { $4 = 20 * sin(NR / 300); $5 = 9 * sin(NR / 170) } { print }'
 expect 1 "baseline" diagnose another
+baseline dead 'NR > 1 { $5 = 1.5 } { print }'
+expect 1 "dead.csv: torque of joint 2 (elbow) never changes" diagnose dead
+# Diagnosed all the same, but its friction is not in the model.
+baseline parked 'NR > 1 { $3 = 0.3 } { print }'
+"$fxdyn" diagnose parked.toml --out parked >parked.txt 2>&1 || fail "parked: $(tail -1 parked.txt)"
+grep -q 'elbow *not excited' parked.txt || fail "parked: the elbow's verdict"
+"$fxdyn" run parked.toml --out parked >parked.txt 2>&1 && fail "run goes on with a joint that is not excited"
+grep -q '^fxdyn: joint 2 (elbow) is not_excited' parked.txt || fail "parked: $(tail -1 parked.txt)"
 baseline nan 'NR == 500 { $5 = "nan" } { print }'
 expect 2 "nan.csv:500" diagnose nan
 baseline cut '{ print } END { print "507,0.1" }'

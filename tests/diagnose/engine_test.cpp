@@ -57,11 +57,55 @@ TEST(Diagnosis, WhatTheHealthyRobotHasAlreadyIsNoFinding) {
   EXPECT_FALSE(report.at("notes").empty());
 }
 
+TEST(Diagnosis, WhatGrewSinceTheHealthySessionIsAFinding) {
+  // Wear: the ripple of the healthy gear is half of today's.
+  const std::string ripple = effect("ripple", 1, "wavenumber = 12.0, cos = 0.6, sin = 0.2");
+  const json report = diagnosed("grown", {.missing = ripple, .already = ripple});
+  EXPECT_EQ(report.at("verdict"), "effects_found");
+  const json& found = only(report, 0, "ripple");
+  EXPECT_NEAR(parameter(found, "wavenumber"), 12, 0.3);
+  EXPECT_NEAR(parameter(found, "cos"), 0.6, 0.1);
+  EXPECT_NEAR(parameter(found, "sin"), 0.2, 0.1);
+}
+
+TEST(Diagnosis, NoiseIsNotWhatTheTestLogsHaveOnTop) {
+  if (test::sanitized) GTEST_SKIP() << "other cases run the same code";
+  // Another tool in the test logs only
+  const json report = diagnosed("other_tool", {.tamper = [](Log& log) {
+                                  if (log.file.filename().string()[0] == 'c') log.tau.col(1).array() += 5;
+                                }});
+  const json& elbow = report.at("joints").at(1);
+  EXPECT_GT(elbow.at("gap_after"), 4.5);
+  EXPECT_LT(elbow.at("noise_floor"), 0.5);
+  EXPECT_NE(report.at("notes").dump().find("on the logs that judged"), std::string::npos) << report.at("notes");
+}
+
 TEST(Diagnosis, ALinkEncoderShowsWhatBends) {
   const json report = diagnosed("gear", {.missing = effect("elasticity", 2, "compliance = 1e-4, relaxation = 0.002"),
                                          .sensors = "link_encoders = \"all\"\nlink_encoder_bits = 19"});
   const json& gear = only(report, 1, "elasticity");
   EXPECT_NEAR(parameter(gear, "compliance"), 1e-4, 1e-5);
+}
+
+TEST(Diagnosis, ALinkEncoderTellsAGapFromAnElasticity) {
+  if (test::sanitized) GTEST_SKIP() << "other cases run the same code";
+  const std::string sensors = "link_encoders = \"all\"\nlink_encoder_bits = 19";
+  const json gap =
+      diagnosed("gap", {.missing = effect("backlash", 2, "torque_scale = 0.3, half_gap = 3e-4"), .sensors = sensors});
+  EXPECT_NEAR(parameter(only(gap, 1, "backlash"), "half_gap"), 3e-4, 3e-5);
+  // Flanks that no load reaches: in proportion to it.
+  const json slope = diagnosed(
+      "slope", {.missing = effect("backlash", 2, "torque_scale = 300.0, half_gap = 0.03"), .sensors = sensors});
+  EXPECT_NEAR(parameter(only(slope, 1, "elasticity"), "compliance"), 1e-4, 1e-5);
+}
+
+TEST(Diagnosis, ALinkEncoderShowsARunOut) {
+  if (test::sanitized) GTEST_SKIP() << "other cases run the same code";
+  const json report = diagnosed("run_out", {.missing = effect("eccentricity", 2, "cos = 3e-4, sin = -2e-4"),
+                                            .sensors = "link_encoders = \"all\"\nlink_encoder_bits = 19"});
+  const json& wheel = only(report, 1, "eccentricity");
+  EXPECT_NEAR(parameter(wheel, "cos"), 3e-4, 2e-5);
+  EXPECT_NEAR(parameter(wheel, "sin"), -2e-4, 2e-5);
 }
 
 TEST(Diagnosis, ALinkEncoderShowsWhatBendsUnderALoadTooSmallForTheTorque) {

@@ -186,6 +186,19 @@ TEST(CampaignScore, PairsOutsideAndClean) {
   EXPECT_FALSE(score(quiet, diagnosis, {}).at("false_alarm"));
 }
 
+TEST(CampaignScore, WhatGrewIsNotTheBackground) {
+  const json diagnosis = json::parse(diagnosis_text);
+  json grown = truth_with({{{"effect", "spring"}, {"joint", 2}, {"feels", 2}}});
+  grown["background"] = {{{"effect", "spring"}, {"joint", 2}}, {{"effect", "payload"}}};
+  const json scored = score(grown, diagnosis, {});
+  EXPECT_TRUE(scored.at("top1"));
+  EXPECT_EQ(scored.at("spurious"), 1);  // Stribeck; the load was there before
+  EXPECT_TRUE(scored.at("too_many"));
+  EXPECT_TRUE(scored.at("flagged_elsewhere"));  // joint 3
+  grown["effects"][0]["feels"] = 3;
+  EXPECT_FALSE(score(grown, diagnosis, {}).at("flagged_elsewhere"));
+}
+
 // The truth as the model closes the gap entirely, the healthy model not at all. Drift runs on through the session.
 TEST(CampaignScore, ClosureAgainstTheNoiseFreeTorque) {
   const fs::path folder = test::folder() / "closure";

@@ -26,6 +26,7 @@ struct Wanted {
   std::optional<std::size_t> joint{};  ///< from 0
   bool same_joint_as_first = false;    ///< second of a pair
   double deflection = 0;               ///< > 0: scaled to this RMS deflection [rad | m] instead of to `share`
+  bool grows = false;                  ///< the background's first effect, on top of itself
 };
 
 enum class Group {

@@ -138,6 +138,18 @@ void add_others(List& list) {
   }
 }
 
+/// What the healthy robot has already, at least twice as large today: wear.
+void add_grown(List& list) {
+  for (const char* effect : {"ripple", "spring", "joint_coupling"}) {
+    for (std::size_t robot = 0; robot < test_robots().size(); ++robot) {
+      Wanted more{effect, 0.006};
+      more.grows = true;
+      list.add(Group::background, robot, {more}, label(std::string("grown_") + effect, 0.006)).background = {
+          {effect, 0.005}};
+    }
+  }
+}
+
 /// Joints that a controller moves stick, come loose and shake; its torque answers the encoder's noise.
 void add_controlled(List& list) {
   for (const std::string& effect : effects) {
@@ -161,6 +173,7 @@ std::vector<Case> all_cases() {
   add_outside(list);
   add_others(list);
   add_controlled(list);
+  add_grown(list);
   return list.take();
 }
 

@@ -1,5 +1,5 @@
+#include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "host_tools/model/evaluator.hpp"
 #include "tests/diagnosis/score.hpp"
@@ -27,13 +27,8 @@ std::optional<double> true_closure(const nlohmann::json& truth, const fs::path& 
                                    const fs::path& diagnosis_folder) {
   const fs::path exact = truth_folder / "exact";
   if (truth.at("effects").empty() || !fs::exists(exact)) return {};
-  std::set<std::size_t> joints;
-  bool large = false;
-  for (const auto& effect : truth.at("effects")) {
-    joints.insert(effect.at("feels").get<std::size_t>());
-    large |= effect.at("share").get<double>() >= smallest_gap;
-  }
-  if (!large) return {};
+  const auto is_large = [](const auto& effect) { return effect.at("share").template get<double>() >= smallest_gap; };
+  if (std::none_of(truth.at("effects").begin(), truth.at("effects").end(), is_large)) return {};
   const IdentifiedModel before = read_model(diagnosis_folder / "nominal.json");
   const IdentifiedModel after = read_model(diagnosis_folder / "model.json");
   const auto rated = truth.at("rated_torque").get<std::vector<double>>();
@@ -46,10 +41,10 @@ std::optional<double> true_closure(const nlohmann::json& truth, const fs::path& 
     const double since_start = log.t[0] - truth.at("clock_s").get<double>();
     const MatrixXd error_before = torque_of(before, log, since_start) - torque;
     const MatrixXd error_after = torque_of(after, log, since_start) - torque;
-    for (const std::size_t joint : joints) {
-      const auto j = static_cast<Index>(joint - 1);
-      power_before += error_before.col(j).squaredNorm() / std::pow(rated[joint - 1], 2);
-      power_after += error_after.col(j).squaredNorm() / std::pow(rated[joint - 1], 2);
+    for (std::size_t joint = 0; joint < rated.size(); ++joint) {
+      const auto j = static_cast<Index>(joint);
+      power_before += error_before.col(j).squaredNorm() / std::pow(rated[joint], 2);
+      power_after += error_after.col(j).squaredNorm() / std::pow(rated[joint], 2);
     }
   }
   if (power_before == 0) return {};  // nothing was missing

@@ -89,6 +89,20 @@ std::pair<std::optional<std::size_t>, EffectFit> find(const Wanted& wanted, std:
                                 wanted.deflection > 0 ? wanted.deflection : wanted.share, wanted.effect));
 }
 
+/// An effect that is there already, so much larger.
+std::pair<std::optional<std::size_t>, EffectFit> grown(const std::pair<std::optional<std::size_t>, EffectFit>& first,
+                                                       double share, const Plan& plan) {
+  Drawn more{first.second.effect, first.first, {}, 1, 1e3};
+  more.at = [fit = first.second](double size) {
+    EffectFit larger = fit;
+    for (double& value : larger.linear) value *= size;
+    return larger;
+  };
+  const auto fit = scaled(more, share, plan);
+  if (!fit) throw NotPossible(fmt::format("no more {} on top of itself", first.second.effect));
+  return {first.first, *fit};
+}
+
 void change_friction(Session& session, double by, std::uint64_t seed) {
   Random random(seed * 977 + 5);
   for (auto* values : {&session.viscous, &session.coulomb}) {
@@ -143,7 +157,16 @@ std::string project_toml(const Case& wanted, const std::vector<std::pair<std::st
 Session measured_session(const Case& wanted, const Ground& ground) {
   Session session = healthy_session(wanted);
   session.effects = ground.background;
-  session.effects.insert(session.effects.end(), ground.effects.begin(), ground.effects.end());
+  for (const auto& [joint, fit] : ground.effects) {
+    const auto same = std::find_if(session.effects.begin(), session.effects.end(), [&](const auto& there) {
+      return there.first == joint && there.second.effect == fit.effect && there.second.shape == fit.shape;
+    });
+    if (same == session.effects.end()) {
+      session.effects.emplace_back(joint, fit);
+      continue;
+    }
+    for (std::size_t i = 0; i < fit.linear.size(); ++i) same->second.linear[i] += fit.linear[i];
+  }
   if (wanted.friction_change > 0) change_friction(session, wanted.friction_change, wanted.seed);
   session.seed = wanted.seed * 2 + 1;
   session.logs = measured_logs(wanted);
@@ -265,7 +288,8 @@ Ground plan_case(const Case& wanted, const fs::path& folder) {
       ground.outside.push_back(outside);
       continue;
     }
-    const auto [joint, fit] = find(one, first, ground.plan, random);
+    const auto [joint, fit] =
+        one.grows ? grown(ground.background.front(), one.share, ground.plan) : find(one, first, ground.plan, random);
     if (!first) first = joint;
     ground.effects.emplace_back(joint, fit);
     ground.measured = with_effect(ground.measured, joint, fit);

@@ -79,12 +79,12 @@ json score(const json& truth, const json& diagnosis, std::optional<double> closu
   out["unexplained_joints"] = unexplained;
   if (closure) out["closure"] = *closure;
 
-  // What a healthy robot has anyway may be named: it is there.
-  std::erase_if(named, [&](const Named& one) {
-    return std::any_of(truth.at("background").begin(), truth.at("background").end(),
-                       [&](const json& effect) { return is_right(one, effect); });
-  });
   const json& effects = truth.at("effects");
+  // What a healthy robot has anyway may be named: it is there. Unless there is more of it.
+  const auto is_of = [](const Named& one, const json& list) {
+    return std::any_of(list.begin(), list.end(), [&](const json& effect) { return is_right(one, effect); });
+  };
+  std::erase_if(named, [&](const Named& one) { return is_of(one, truth.at("background")) && !is_of(one, effects); });
   if (effects.empty()) {
     out["false_alarm"] = !named.empty() || verdict == "unexplained" || verdict == "not_excited";
     out["passed"] = !out["false_alarm"];
@@ -101,11 +101,18 @@ json score(const json& truth, const json& diagnosis, std::optional<double> closu
                                        unexplained.contains(joint));
   }
   std::size_t spurious = 0;
-  for (const Named& one : named) {
-    spurious += static_cast<std::size_t>(
-        std::none_of(effects.begin(), effects.end(), [&](const json& effect) { return is_right(one, effect); }));
-  }
+  for (const Named& one : named) spurious += static_cast<std::size_t>(!is_of(one, effects));
   out["spurious"] = spurious;
+  out["too_many"] = spurious > 0;
+  // A flag at a joint that nothing was added to and that feels nothing of it
+  std::set<std::size_t> felt;
+  for (const json& effect : effects) {
+    felt.insert(true_joint(effect));
+    if (effect.contains("feels")) felt.insert(effect.at("feels").get<std::size_t>());
+  }
+  const bool on_body = felt.contains(0);
+  out["flagged_elsewhere"] =
+      !on_body && !std::includes(felt.begin(), felt.end(), unexplained.begin(), unexplained.end());
   out["detected"] = verdict == "effects_found" || verdict == "unexplained";
 
   const json& first = effects.front();

@@ -20,7 +20,7 @@ std::vector<Named> named_effects(const nlohmann::json& diagnosis);
 nlohmann::json score(const nlohmann::json& truth, const nlohmann::json& diagnosis, std::optional<double> closure);
 
 /// 1 - (error after / error before)^2 of the models' torque against the noise-free one, over the test logs with exact
-/// motion, in the joints that feel the effects (errors in shares of rated torque). Nothing where the case has no effect
+/// motion, of all joints together (errors in shares of rated torque). Nothing where the case has no effect
 /// of the catalogue or its torque changes by less than 0.05 % of rated.
 std::optional<double> true_closure(const nlohmann::json& truth, const std::filesystem::path& truth_folder,
                                    const std::filesystem::path& diagnosis_folder);

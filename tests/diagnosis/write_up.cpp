@@ -29,6 +29,9 @@ std::string expected(const json& r) {
   const json* effect = first_effect(r);
   return effect == nullptr ? "" : effect->at("expected").at("verdict").get<std::string>();
 }
+std::string plant_of(const json& r) {
+  return r.contains("truth") ? r.at("truth").value("plant", std::string()) : std::string();
+}
 double share(const json& r) {
   const json* effect = first_effect(r);
   return effect == nullptr ? 0 : effect->value("wanted_share", 0.0);
@@ -68,6 +71,8 @@ std::vector<double> values_of(const std::vector<json>& results, const Filter& fi
   return values;
 }
 
+/// A figure without a goal of its own.
+Figure plain(const std::string& what, Rate rate) { return {what, "", rate.value(), rate.of, true}; }
 Figure at_least(const std::string& what, Rate rate, double goal) {
   return {what, fmt::format(">= {:.2f}", goal), rate.value(), rate.of, rate.of > 0 && rate.value() >= goal};
 }
@@ -146,10 +151,10 @@ std::string summary_line(const std::vector<json>& results, const Filter& filter)
                      median(values_of(results, filter, "closure")));
 }
 
-std::string failed_cases(const std::vector<json>& results) {
+std::string table_of(const std::vector<json>& results, const Filter& filter) {
   std::string text = "| case | what it is | what was said |\n|---|---|---|\n";
   for (const json& r : results) {
-    if (ran(r) && !r.at("passed").get<bool>())
+    if (ran(r) && filter(r))
       text += fmt::format("| `{}` | {} | {} |\n", r.at("name").get<std::string>(), truth_text(r), named_text(r));
   }
   return text;
@@ -190,6 +195,12 @@ std::vector<Figure> figures(const std::vector<json>& results) {
       at_least("top-1 name, visible effects, 0.6 %", rate(results, visible(0.006), "top1"), 0.95),
       at_least("top-1 name, visible effects, 0.2 %", rate(results, visible(0.002), "top1"), 0.85),
       at_least("top-3, visible effects, 0.6 %", rate(results, visible(0.006), "top3"), 0.99),
+      plain("top-1 name, all effects, hidden and ambiguous too, 0.6 %",
+            rate(
+                results, [](const json& r) { return single(r, 0.006); }, "top1")),
+      plain("top-1 name, all effects, hidden and ambiguous too, 0.2 %",
+            rate(
+                results, [](const json& r) { return single(r, 0.002); }, "top1")),
       at_least("right joint, visible effects",
                rate(
                    results, [&](const json& r) { return any_single(r) && expected(r) == "visible"; }, "right_joint"),
@@ -238,6 +249,14 @@ std::vector<Figure> figures(const std::vector<json>& results) {
                                 "top1"),
                             0.95));
   }
+  const auto has_name = [](const char* plant) {
+    return [=](const json& r) { return first_effect(r) != nullptr && !in(r, "outside") && plant_of(r) == plant; };
+  };
+  list.push_back(plain("a name too many, one or two effects", rate(results, has_name("internal"), "too_many")));
+  list.push_back(plain("a joint without an effect flagged", rate(results, has_name("internal"), "flagged_elsewhere")));
+  list.push_back(plain("MuJoCo's plant: a name too many", rate(results, has_name("mujoco"), "too_many")));
+  list.push_back(plain("MuJoCo's plant: a joint without an effect flagged",
+                       rate(results, has_name("mujoco"), "flagged_elsewhere")));
   const auto one_of = [](const char* group, bool closed_loop) {
     return [=](const json& r) {
       return in(r, group) && expected(r) == "visible" && r.at("truth").at("closed_loop").get<bool>() == closed_loop;
@@ -304,7 +323,18 @@ std::string write_up(const std::vector<json>& results, const std::string& comman
       "gap "
       "before holds more than the effect.\n";
   text += "\n## What this recording can't tell apart in principle\n\n" + ambiguous_cases(results);
-  text += "\n## Every case that failed\n\n" + failed_cases(results);
+  text +=
+      "\n## Every case that failed\n\n" + table_of(results, [](const json& r) { return !r.at("passed").get<bool>(); });
+  text +=
+      "\n## Passed, with a name too many or a flag at another joint\n\n" + table_of(results, [](const json& r) {
+        return r.at("passed").get<bool>() && !in(r, "outside") && (has(r, "too_many") || has(r, "flagged_elsewhere"));
+      });
+  std::vector<std::string> missing_names;
+  for (const json& r : results) {
+    if (!ran(r)) missing_names.push_back(fmt::format("`{}`", r.at("name").get<std::string>()));
+  }
+  if (!missing_names.empty())
+    text += fmt::format("\n## Not possible on these robots\n\n{}\n", fmt::join(missing_names, ", "));
   return text;
 }
 
