@@ -195,7 +195,9 @@ class Work {
     believe(found.current, gate, *outcome.at);
     result.model = found.current;
     if (models_.has_baseline) add_notes(changed_parameters(*outcome.at));
-    result.report = verdicts({result.nominal, result.model, outcome, gate, deflections_, still_, data_.logs, test_});
+    const auto jolts = find_jolts(result.model, data_.logs, found.healthy, baseline_);
+    result.report =
+        verdicts({result.nominal, result.model, outcome, gate, deflections_, jolts, still_, data_.logs, test_});
     for (std::size_t j = 0; j < joints(); ++j) {
       // What stands still has no friction that these logs tell.
       if (!still_[j]) continue;

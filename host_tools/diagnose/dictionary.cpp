@@ -59,6 +59,7 @@ std::vector<std::vector<double>> grids(const EffectInfo& info, std::size_t joint
   std::vector<std::vector<double>> out;
   for (const ParameterInfo& shape : info.shape) {
     std::vector<double> values;
+    const auto [least, most] = shape_limits(at.models(), joint, shape);
     if (shape.name == "velocity") {
       // Narrower than the sign itself is the sign; wider is viscous friction.
       const double from = std::max(3e-3 * s.speed, 1.5 * width);
@@ -71,7 +72,7 @@ std::vector<std::vector<double>> grids(const EffectInfo& info, std::size_t joint
       for (const double share : {0.45, 0.55, 0.63, 0.7, 0.76, 0.82, 0.87, 0.91, 0.95})
         values.push_back(share * s.torque);
     } else if (shape.name == "time") {
-      values = geometric(5e-4, std::min(0.03, static_cast<double>(Delay::largest) * at.models().smallest_step_s), 5);
+      values = geometric(5e-4, std::min(0.03, most), 5);
     } else if (shape.name == "relaxation") {
       values = {1e-3, 8e-3};
     } else if (shape.name == "torque_scale") {
@@ -88,7 +89,7 @@ std::vector<std::vector<double>> grids(const EffectInfo& info, std::size_t joint
         if (k != joint && (info.name != MotorCoupling::name || mates)) values.push_back(static_cast<double>(k + 1));
       }
     }
-    for (double& value : values) value = std::clamp(value, shape.lower, shape.upper);
+    for (double& value : values) value = std::clamp(value, least, most);
     out.push_back(std::move(values));
   }
   return out;

@@ -82,7 +82,7 @@ void add_to(IdentifiedModel& model, const Unknown& u, double step) {
     case Unknown::Kind::shape: {
       const ParameterInfo& info = find_effect(fit_of(model, u).effect)->shape[u.index];
       double& value = value_of(model, u);
-      value = std::clamp(value * std::exp(step), info.lower, std::min(info.upper, u.upper));
+      value = std::clamp(value * std::exp(step), std::max(info.lower, u.lower), std::min(info.upper, u.upper));
       return;
     }
     case Unknown::Kind::linear: {
@@ -170,6 +170,16 @@ void Linearised::make_blocks() {
   }
 }
 
+std::pair<double, double> shape_limits(const Models& models, std::size_t joint, const ParameterInfo& shape) {
+  if (shape.name == "time") return {shape.lower, std::min(shape.upper, Delay::largest * models.smallest_step_s)};
+  const FilterFit& filter = models.current.filter;
+  if (shape.name == "distance" && joint < filter.position_noise.size()) {
+    const double step = std::max(filter.encoder_step[joint], std::sqrt(12.0) * filter.position_noise[joint]);
+    return {std::clamp(step, shape.lower, 0.1 * shape.upper), shape.upper};
+  }
+  return {shape.lower, shape.upper};
+}
+
 void Linearised::make_unknowns() {
   const IdentifiedModel& now = models_.current;
   const bool two = models_.has_baseline;
@@ -178,10 +188,6 @@ void Linearised::make_unknowns() {
                        [&](const EffectCandidate& c) { return c.joint == j && c.effect == fit.effect; });
   };
   const auto fixed = [&](std::size_t j, const EffectFit& fit) { return is_in(models_.fixed, j, fit); };
-  const auto upper_of = [&](const ParameterInfo& p) {
-    // A delay is so many steps of the finest log.
-    return p.name == "time" ? std::min(p.upper, Delay::largest * models_.smallest_step_s) : p.upper;
-  };
   const IdentifiedModel& common = two ? models_.healthy : now;
   for (std::size_t k = 0; k < now.base.size(); ++k) {
     Unknown u;
@@ -244,7 +250,7 @@ void Linearised::make_unknowns() {
       u.value = 0;
       u.kind = Unknown::Kind::shape;
       for (u.index = 0; u.index < info.shape.size(); ++u.index) {
-        u.upper = upper_of(info.shape[u.index]);
+        std::tie(u.lower, u.upper) = shape_limits(models_, j, info.shape[u.index]);
         if (is_shape_free(info, u.index)) unknowns_.push_back(u);
       }
     }
@@ -278,7 +284,7 @@ void Linearised::make_unknowns() {
     u.value = u.prior = u.prior_std = 0;
     for (u.index = 0; u.index < info.shape.size(); ++u.index) {
       if (!is_shape_free(info, u.index)) continue;
-      u.upper = upper_of(info.shape[u.index]);
+      std::tie(u.lower, u.upper) = shape_limits(models_, j, info.shape[u.index]);
       unknowns_.push_back(u);
       ++group.nonlinear;
       group.lower.push_back(-1e300);

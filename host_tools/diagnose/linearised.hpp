@@ -7,6 +7,7 @@
 #include <mutex>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "host_tools/excite/motion.hpp"
@@ -85,7 +86,7 @@ struct Unknown {
   std::size_t healthy_effect = 0;                ///< the same in the healthy model
   bool body = false;                             ///< effect of IdentifiedModel::body
   bool change = false;                           ///< what the current session has more than the healthy one
-  double upper = 1e300;                          ///< shape: what it may be at most
+  double lower = 0, upper = 1e300;               ///< shape: what it may be at least and at most
   Eigen::VectorXd in_base{};                     ///< rotor: see Rotor
   double value = 0;                              ///< in the model; 0 for logarithms, whose steps are fitted
   double prior = 0, prior_std = 0;               ///< std 0: none
@@ -267,6 +268,10 @@ class Linearised {
   Eigen::VectorXd weights_;
   std::vector<std::unique_ptr<Background>> background_;  ///< per joint
 };
+
+/// What a shape parameter may be at least and at most, as far as these logs can tell: a delay is so many steps of the
+/// finest log, and what happens within a step of the encoder does not show.
+std::pair<double, double> shape_limits(const Models& models, std::size_t joint, const ParameterInfo& shape);
 
 /// The base parameters of a model as a set of columns; its grouping is not there.
 BaseSet base_of(const IdentifiedModel& model);

@@ -359,15 +359,15 @@ std::size_t Search::refine(const Choice& state, std::size_t g) {
   if (searched >= 0) {
     const auto index = static_cast<std::size_t>(searched);
     const ParameterInfo& shape = info.shape[index];
-    double ratio = 1.5, most = shape.upper;
+    const auto [least, most] = shape_limits(at_.models(), start.candidate.joint, shape);
+    double ratio = 1.5;
     if (start.candidate.effect == Ripple::name) {
       const auto j = static_cast<Index>(start.candidate.joint);
       double range = 1e-9;
       for (std::size_t l = 0; l < at_.logs().size(); ++l) range = std::max(range, at_.logs()[l].log.q_range[j]);
       ratio = 1 + 1.0 / (range * start.candidate.shape[index]);
     }
-    if (shape.name == "time") most = std::min(most, static_cast<double>(Delay::largest) * at_.models().smallest_step_s);
-    search(fine.candidate.shape[index], ratio, shape.lower, most);
+    search(fine.candidate.shape[index], ratio, least, most);
   }
   if (fine.rotor_inertia > 0) search(fine.rotor_inertia, 1.25, 0, 1.1 * fine.rotor_inertia);
   return best > first ? at_.add(fine, best_columns) : g;

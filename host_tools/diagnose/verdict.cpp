@@ -285,7 +285,17 @@ class Teller {
           joint_of(j).name, rms_after, joint_of(j).torque_unit(), rms_gate));
     }
     const bool nothing_found = effects.empty() && !robot_reaches(k);
-    const bool unexplained = (lack.structured() && (nothing_found || t_.gate.remains[j])) || !resembles.empty();
+    const std::optional<Jolts>& jolts = t_.jolts[j];
+    if (jolts) {
+      notes_.push_back(
+          fmt::format("{}: {:.2g} blows a second that are shorter than the torque's band shows, {:.2g} in the "
+                      "baseline; the largest, "
+                      "{:.2g} {}, at {:.3f} s of {}: a gap that closes, something that strikes, a loose connector?",
+                      joint_of(j).name, jolts->per_second, jolts->healthy, jolts->largest, joint_of(j).torque_unit(),
+                      jolts->t, jolts->log));
+    }
+    const bool unexplained =
+        (lack.structured() && (nothing_found || t_.gate.remains[j])) || !resembles.empty() || (nothing_found && jolts);
     const std::string verdict = unexplained ? "unexplained" : !effects.empty() ? "effects_found" : "nothing_missing";
     any_effect_ |= !effects.empty();
     // What only bends leaves no gap in the torque, and noise alone has nothing to close.
@@ -302,8 +312,16 @@ class Teller {
     }
     std::sort(effects.begin(), effects.end(), [](const json& a, const json& b) { return a["score"] > b["score"]; });
     json regions = json::array();
-    if (verdict != "nothing_missing" || rms_before >= much_larger * floor)
+    const bool only_jolts = jolts && nothing_found && resembles.empty() && !lack.structured();
+    if (only_jolts) {
+      regions.push_back({{"signal", "t"},
+                         {"from", jolts->t - 0.05},
+                         {"to", jolts->t + 0.05},
+                         {"share_of_gap", nullptr},
+                         {"log", jolts->log}});
+    } else if (verdict != "nothing_missing" || rms_before >= much_larger * floor) {
       regions = where(t_.nominal, shown_, j, errors, std::min(floor, rms_before));
+    }
     const double doubtful = at_.doubtful(j);
     if (unexplained && doubtful > much_doubt) {
       const double step = t_.now.front().filter.encoder_step[j];
@@ -314,7 +332,9 @@ class Teller {
           joint_of(j).name, 100 * doubtful,
           step > 0 ? fmt::format(" (steps of {:.2g} {})", step, joint_of(j).position_unit()) : std::string()));
     }
-    if (unexplained) {
+    if (only_jolts) {
+      advise(fmt::format("look at the raw torque of joint {} there; an encoder on its link would show a gap", j + 1));
+    } else if (unexplained) {
       std::string which;
       if (!regions.empty())
         which = fmt::format(" where the gap sits ({} from {:.3g} to {:.3g})", regions[0]["signal"].get<std::string>(),

@@ -6,6 +6,7 @@
 
 #include "host_tools/diagnose/deflection.hpp"
 #include "host_tools/diagnose/gate.hpp"
+#include "host_tools/diagnose/jolts.hpp"
 
 namespace fxdyn::diagnosis {
 
@@ -16,6 +17,7 @@ struct Conclusion {
   const Outcome& outcome;
   const Gate& gate;
   const Deflections& deflections;
+  const std::vector<std::optional<Jolts>>& jolts;
   const std::vector<bool>& still;
   const std::vector<ProcessedLog>& now;   ///< train and validate
   const std::vector<ProcessedLog>& test;  ///< for figures only

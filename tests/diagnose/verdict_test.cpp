@@ -45,6 +45,24 @@ TEST(DiagnosisVerdict, ASlowStructureOfAnotherJointIsUnexplained) {
   EXPECT_EQ(report.at("joints").at(1).at("verdict"), "unexplained") << report.dump(1);
 }
 
+/// Every half second up and down within three samples: nothing of it is within the torque's band.
+void strike(Log& log) {
+  for (Eigen::Index k = 100; k + 2 < log.samples(); k += 250) {
+    log.tau(k, 1) += 4;
+    log.tau(k + 1, 1) -= 8;
+    log.tau(k + 2, 1) += 4;
+  }
+}
+
+TEST(DiagnosisVerdict, BlowsAboveTheTorquesBandAreSeen) {
+  const json report = diagnosed("blows", {.tamper = strike});
+  EXPECT_EQ(report.at("joints").at(0).at("verdict"), "nothing_missing") << report.dump(1);
+  const json& elbow = report.at("joints").at(1);
+  EXPECT_EQ(elbow.at("verdict"), "unexplained");
+  EXPECT_EQ(elbow.at("where").at(0).at("signal"), "t");
+  EXPECT_NE(report.at("notes").dump().find("1.9 blows a second"), std::string::npos) << report.at("notes");
+}
+
 TEST(DiagnosisVerdict, TestLogsDecideNothing) {
   if (test::sanitized) GTEST_SKIP() << "other cases run the same code";
   const std::string drift = effect("friction_drift", 1, "time_constant = 30.0, coulomb = -0.9, viscous = -0.5");
