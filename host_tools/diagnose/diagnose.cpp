@@ -139,6 +139,11 @@ class Work {
 
   Diagnosis run() {
     check_lengths(logs_);
+    const auto judges = [](const ProcessedLog& log) { return log.role == Role::validate; };
+    if (data_.logs.size() > 1 && std::none_of(data_.logs.begin(), data_.logs.end(), judges)) {
+      notes_.push_back("no log has role = \"validate\": names are accepted on the " + gate_of(data_.logs) +
+                       "; other trajectories would judge better");
+    }
     if (models_.has_baseline) {
       learn_baseline();
     } else {
@@ -425,12 +430,12 @@ class Work {
 
 Diagnosis diagnose(const Project& project, GateData& given, const std::vector<ProcessedLog>& given_baseline,
                    const std::vector<ProcessedLog>& test, Progress& progress) {
-  const std::vector<bool> still = still_joints(given, given_baseline);
+  const std::vector<bool> still = still_joints(given);
   if (std::find(still.begin(), still.end(), false) == still.end()) {
     throw DataError(
-        "not_excited: no joint moves in the train logs (and in the baseline) by more than its encoder's noise; record "
-        "logs in which they do");
+        "not_excited: no joint moves in the train logs by more than its encoder's noise; record logs in which they do");
   }
+  check_baseline_moves(project.robot, given, given_baseline);
   GateData data = given;
   std::vector<ProcessedLog> baseline = given_baseline;
   leave_out(data.logs, still);

@@ -211,7 +211,7 @@ void Linearised::make_unknowns() {
       const EffectFit& fit = joint.effects[e];
       if (fit.named) continue;
       const std::size_t before = two ? unnamed++ : e;  // both models have the unnamed ones in one order
-      if (fixed(j, fit)) continue;
+      if (fixed(j, fit) || is_in(models_.held, j, fit)) continue;
       const EffectInfo& info = *find_effect(fit.effect);
       Unknown u;
       u.joint = j;
@@ -235,7 +235,7 @@ void Linearised::make_unknowns() {
         }
         unknowns_.push_back(u);
         u.prior_std = 0;
-        if (!two || fit.effect == RotorInertia::name || is_in(models_.held, j, fit)) continue;
+        if (!two || fit.effect == RotorInertia::name) continue;
         u.change = true;
         // Of motions of unit size: a coefficient's own scale.
         double scale = friction_change * std::fabs(u.value);

@@ -35,7 +35,7 @@ struct Models {
   bool has_baseline = false;
   std::vector<EffectCandidate> fixed;   ///< what a link encoder gave: the torque does not change it
   std::vector<std::size_t> background;  ///< joints whose healthy session has structure that no effect explains
-  std::vector<EffectCandidate> held;    ///< unnamed effects that today are what they were in the healthy session
+  std::vector<EffectCandidate> held;    ///< unnamed effects that stay what the healthy session's fit gave
   std::vector<Rotor> rotors;
   double smallest_step_s = 1;  ///< of all logs and of the drive's tick: what bounds a delay
 };

@@ -1,6 +1,7 @@
 #include "host_tools/diagnose/sessions.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -98,17 +99,28 @@ void check_lengths(const std::vector<SessionLog>& logs) {
                   logs.front().log.name, seconds[0], blocks_of_one_log, 4 * blocks_of_one_log * shortest_block_s));
 }
 
-std::vector<bool> still_joints(const GateData& data, const std::vector<ProcessedLog>& baseline) {
+void check_baseline_moves(const Robot& robot, const GateData& data, const std::vector<ProcessedLog>& baseline) {
+  if (baseline.empty()) return;
+  const std::vector<bool> now = moving_joints(data.logs), before = moving_joints(baseline);
+  for (std::size_t j = 0; j < now.size(); ++j) {
+    if (!now[j] || before[j]) continue;
+    throw DataError(
+        fmt::format("role = \"baseline\": joint {} ({}) rests there and moves in the train logs: record a baseline in "
+                    "which it moves, or leave the baseline out",
+                    j + 1, robot.joints[j].name));
+  }
+}
+
+std::vector<bool> still_joints(const GateData& data) {
   constexpr double times_noise = 6;
   std::vector<bool> out = moving_joints(data.logs);
-  const std::vector<bool> before = baseline.empty() ? out : moving_joints(baseline);
   const ProcessedLog& log = data.logs.front();
   for (std::size_t j = 0; j < out.size(); ++j) {
     const FilterFit& filter = data.filter;
     const double noise = std::max(filter.position_noise[j], filter.encoder_step[j] / std::sqrt(12.0));
     const double cutoff = std::min(filter.position_cutoff_hz, 0.5 / log.step_s);
     const double noise_dq = 2 * std::numbers::pi * noise * std::sqrt(2 * log.step_s * cutoff * cutoff * cutoff / 3);
-    out[j] = !out[j] || !before[j] || !(data.dq[static_cast<Index>(j)] > times_noise * noise_dq);
+    out[j] = !out[j] || !(data.dq[static_cast<Index>(j)] > times_noise * noise_dq);
   }
   return out;
 }
@@ -183,12 +195,13 @@ std::vector<std::string> check_same_robot(Models models, const std::vector<Sessi
     }
   }
   std::size_t count = 0, judged = 0;
-  std::vector<std::string> notes;
+  std::vector<std::string> notes, names;
   for (std::size_t j = 0; j < at.joints(); ++j) {
     if (still[j]) continue;
     ++judged;
     if (!strange[j]) continue;
     ++count;
+    names.push_back(models.current.robot.joints[j].name);
     notes.push_back(
         fmt::format("{}: nothing explains the baseline and these logs together: another unit, gain or column in one of "
                     "them? What is found there may be that",
@@ -196,9 +209,9 @@ std::vector<std::string> check_same_robot(Models models, const std::vector<Sessi
   }
   if (2 * count >= judged && count > 0) {
     throw DataError(fmt::format(
-        "the baseline and these logs can't be of one robot: nothing explains both at {} of {} joints; other "
+        "the baseline and these logs can't be of one robot: nothing explains both at {} of {} joints ({}); other "
         "units, columns or gains? Correct the baseline or remove it (role = \"baseline\")",
-        count, judged));
+        count, judged, fmt::join(names, ", ")));
   }
   return notes;
 }

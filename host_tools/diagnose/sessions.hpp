@@ -21,7 +21,11 @@ void check_lengths(const std::vector<SessionLog>& logs);
 
 /// Joints that this motion tells nothing of: they stand still, or as good as, beside what the encoder's noise looks
 /// like.
-std::vector<bool> still_joints(const GateData& data, const std::vector<ProcessedLog>& baseline);
+std::vector<bool> still_joints(const GateData& data);
+
+/// @throws DataError: a joint that moves today rests in the baseline. That leaves open what its links weigh, and the
+/// gap would show at other joints.
+void check_baseline_moves(const Robot& robot, const GateData& data, const std::vector<ProcessedLog>& baseline);
 
 /// Keeps joints out of the fit. Where one stands still its encoder's noise is no motion.
 void leave_out(std::vector<ProcessedLog>& logs, const std::vector<bool>& joints);

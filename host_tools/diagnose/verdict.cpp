@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "host_tools/diagnose/where.hpp"
 #include "host_tools/excite/sight.hpp"
@@ -29,13 +30,16 @@ constexpr double much_doubt = 0.1;
 
 bool is_validate(const ProcessedLog& log) { return log.role == Role::validate; }
 
-json parameters_json(const EffectFit& fit, const Joint& joint) {
+/// @param rated torque [N*m | N]
+json parameters_json(const EffectFit& fit, const Joint& joint, double rated) {
   json out = json::array();
   const EffectInfo& info = *find_effect(fit.effect);
   const auto add = [&](const ParameterInfo& p, double value, const std::vector<double>& std, std::size_t i) {
     const bool turns = joint.type == JointType::revolute;
     json one = {{"name", p.name}, {"value", value}, {"unit", turns ? p.unit : p.unit_prismatic}};
-    one["std"] = i < std.size() && std[i] > 0 ? json(std[i]) : json(nullptr);
+    // A torque that is less known than the joint's whole is shared with another effect, as a spring's offset.
+    const bool known = i < std.size() && std[i] > 0 && !(p.unit == "N*m" && rated > 0 && std[i] > rated);
+    one["std"] = known ? json(std[i]) : json(nullptr);
     out.push_back(one);
   };
   for (std::size_t i = 0; i < info.shape.size(); ++i) add(info.shape[i], fit.shape[i], fit.shape_std, i);
@@ -195,7 +199,7 @@ class Teller {
           fmt::format("{} or {}{}: {}", fit.effect, a.candidate.effect, place, cure(fit.effect, a.candidate.effect)));
     }
     return {{"effect", fit.effect},
-            {"parameters", parameters_json(fit, joint_of(id.joint))},
+            {"parameters", parameters_json(fit, joint_of(id.joint), t_.model.joints[id.joint].rated_torque)},
             {"score", known ? found->score : 0.0},
             {"held_out_closure", closed},
             {"alternatives", alternatives}};
@@ -270,7 +274,7 @@ class Teller {
       const auto at = std::find_if(fits.begin(), fits.end(),
                                    [&](const EffectFit& fit) { return fit.named && fit.effect == seen.fit.effect; });
       effects.push_back({{"effect", seen.fit.effect},
-                         {"parameters", parameters_json(seen.fit, joint_of(j))},
+                         {"parameters", parameters_json(seen.fit, joint_of(j), t_.model.joints[j].rated_torque)},
                          {"score", seen.score},
                          {"held_out_closure", seen.held_out ? json(seen.closure) : json(nullptr)},
                          {"signal", "q - qlink"},
@@ -302,6 +306,7 @@ class Teller {
     const bool of_torque =
         !resembles.empty() || robot_reaches(k) || unexplained ||
         std::any_of(effects.begin(), effects.end(), [](const json& e) { return !e.contains("signal"); });
+    const bool of_torque_found = verdict != "nothing_missing" && of_torque;
     const json closure = of_torque ? json(t_.gate.closure[k]) : json(nullptr);
     const bool anything = !effects.empty() || !resembles.empty() || robot_reaches(k);
     if (anything && !t_.test.empty() && rms_after > risen * rms_before) {
@@ -319,7 +324,7 @@ class Teller {
                          {"to", jolts->t + 0.05},
                          {"share_of_gap", nullptr},
                          {"log", jolts->log}});
-    } else if (verdict != "nothing_missing" || rms_before >= much_larger * floor) {
+    } else if (unexplained || of_torque_found || rms_before >= much_larger * floor) {
       regions = where(t_.nominal, shown_, j, errors, std::min(floor, rms_before));
     }
     const double doubtful = at_.doubtful(j);
@@ -411,6 +416,12 @@ std::string gate_of(const std::vector<ProcessedLog>& now) {
 
 namespace {
 
+bool is_friction(std::string_view effect) {
+  return effect == Viscous::name || effect == Coulomb::name || effect == Offset::name ||
+         effect.find("friction") != std::string_view::npos || effect == Stribeck::name || effect == Presliding::name ||
+         effect.starts_with("viscous");
+}
+
 bool is_changed(const Unknown& u) {
   constexpr double beyond = 2;  // times what sessions differ by
   return u.change && u.kind == Unknown::Kind::linear && std::fabs(u.value) >= beyond * u.prior_std;
@@ -434,17 +445,27 @@ std::vector<EffectCandidate> changed_effects(const Linearised& at) {
 std::vector<std::string> changed_parameters(const Linearised& at) {
   std::vector<std::string> out;
   const Models& models = at.models();
+  std::set<std::size_t> joints;
   for (const Unknown& u : at.unknowns()) {
     if (!is_changed(u)) continue;
+    joints.insert(u.joint);
     const EffectFit& now = models.current.joints[u.joint].effects[u.effect];
     const Joint& joint = models.current.robot.joints[u.joint];
     const ParameterInfo& p = find_effect(now.effect)->linear[u.index];
     const double today = now.linear[u.index];
+    const std::string_view unit = joint.type == JointType::revolute ? p.unit : p.unit_prismatic;
+    out.push_back(fmt::format(
+        "{}: {} ({}) is {:.4g}{}, {:.4g} in the baseline: more than {} differs from session to session, and part of "
+        "the nominal model",
+        joint.name, now.effect, p.name, today, unit == "-" ? "" : " " + std::string(unit), today - u.value,
+        is_friction(now.effect) ? "friction" : "a healthy robot"));
+  }
+  const auto& body = models.current.body;
+  const bool load = std::any_of(body.begin(), body.end(), [](const EffectFit& fit) { return fit.named; });
+  if (load && 2 * joints.size() >= at.joints()) {
     out.push_back(
-        fmt::format("{}: {} ({}) is {:.4g} {}, {:.4g} in the baseline: more than friction differs from session to "
-                    "session, and part of the nominal model",
-                    joint.name, now.effect, p.name, today,
-                    joint.type == JointType::revolute ? p.unit : p.unit_prismatic, today - u.value));
+        fmt::format("friction at {} of {} joints and the load or tilt changed at once: is the baseline of this robot?",
+                    joints.size(), at.joints()));
   }
   return out;
 }

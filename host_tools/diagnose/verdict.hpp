@@ -25,9 +25,9 @@ struct Conclusion {
 
 /// What judged the names.
 std::string gate_of(const std::vector<ProcessedLog>& now);
-/// Nominal parameters that changed since the healthy session by more than sessions differ, one line each.
+/// Nominal parameters that changed since the healthy session by more than sessions differ, one line each; and a line
+/// where half of the joints have such ones beside a changed load or tilt: that may be another robot.
 std::vector<std::string> changed_parameters(const Linearised& at);
-
 /// Effects of the healthy session, no friction, that are not today what they were then: by more than sessions differ.
 std::vector<EffectCandidate> changed_effects(const Linearised& at);
 /// diagnosis.json; its notes are those that the figures ask for.

@@ -111,6 +111,8 @@ std::string joint(const json& of, std::size_t place) {
 
 std::string figures_on(const json& diagnosis) {
   std::string out = text(diagnosis, "figures_on");
+  if (const std::string gate = text(diagnosis, "gate"); !out.empty() && !gate.empty() && gate != out)
+    out += "; closed: on " + gate;
   if (diagnosis.value("baseline", false))
     out += out.empty() ? "change since the baseline" : "; change since the baseline";
   return out;

@@ -182,6 +182,7 @@ FilterFit choose_filter(const std::vector<Log>& logs, const SignalSettings& sett
   // All logs together: in a slow one of a controlled robot the share of the jerks with which a joint comes loose is
   // large, the share of the noise too.
   std::vector<EnergyByFrequency> moved(static_cast<std::size_t>(n));
+  std::vector<double> range(static_cast<std::size_t>(n), 0.0), crossing(static_cast<std::size_t>(n), 0.0);
   for (const Log& log : logs) rate = std::min(rate, 1 / log.step_s);
   for (const Log& log : logs) {
     for (Index j = 0; j < n; ++j) {
@@ -200,17 +201,26 @@ FilterFit choose_filter(const std::vector<Log>& logs, const SignalSettings& sett
         }
       }
       // Above the frequency at which the motion sinks into the noise there is none.
-      const double crossing = crossing_frequency(position);
-      const double ceiling = std::min({30.0, 0.4 * rate, log.dq.size() == 0 ? crossing : 30.0});
+      const double sinks = crossing_frequency(position);
+      const double ceiling = std::min({30.0, 0.4 * rate, log.dq.size() == 0 ? sinks : 30.0});
       moved[k].add(velocity, ceiling, static_cast<double>(log.samples()) * log.step_s);
       const double step = log.encoder_step.size() > 0 ? log.encoder_step[j] : encoder_step(q);
       filter.encoder_step[k] = std::max(filter.encoder_step[k], step);
       filter.position_noise[k] = std::max(filter.position_noise[k], position.noise_rms());
-      filter.crossing_hz = std::max(filter.crossing_hz, crossing);
+      range[k] = std::max(range[k], q.maxCoeff() - q.minCoeff());
+      crossing[k] = std::max(crossing[k], sinks);
     }
   }
   EnergyByFrequency motion;
-  for (const EnergyByFrequency& joint : moved) motion.add_shares(joint);
+  // The counts between which a parked joint flickers are no motion.
+  const auto moves = [&](std::size_t k) { return range[k] > std::max(1e-4, 20 * filter.position_noise[k]); };
+  bool any = false;
+  for (std::size_t k = 0; k < moved.size(); ++k) any |= moves(k);
+  for (std::size_t k = 0; k < moved.size(); ++k) {
+    if (any && !moves(k)) continue;
+    motion.add_shares(moved[k]);
+    filter.crossing_hz = std::max(filter.crossing_hz, crossing[k]);
+  }
   filter.excited_hz = motion.frequency_of_share(0.999);
   const double position = std::min(0.4 * rate, std::max(10.0, 2 * filter.crossing_hz));
   if (!settings.position_cutoff_hz) {

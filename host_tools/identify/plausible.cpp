@@ -106,7 +106,7 @@ class Rows {
   /// Twice as many rows as parameters: fewer prove nothing.
   bool enough() const { return tau_.size() >= 2 * (static_cast<Index>(base_.columns.size()) + own * n_); }
 
-  /// Weighted least squares with these signs of torque (one a joint) and of gravity.
+  /// Weighted least squares with these signs of torque (one a joint; a number other than 1 scales it) and of gravity.
   struct Fit {
     VectorXd solution;  ///< base, then `own` a joint
     MatrixXd covariance;
@@ -122,7 +122,7 @@ class Rows {
     Fit fit;
     fit.up = up;
     fit.signs = signs;
-    VectorXd residual = Eigen::Map<const VectorXd>(squares_.data(), n_);
+    VectorXd residual = Eigen::Map<const VectorXd>(squares_.data(), n_).cwiseProduct(signs.cwiseAbs2());
     MatrixXd information;
     for (int round = 0; round < 4; ++round) {
       information = MatrixXd::Zero(p, p);
@@ -143,9 +143,10 @@ class Rows {
       for (Index j = 0; j < n_; ++j) {
         const auto joint = static_cast<std::size_t>(j);
         const VectorXd x = of_joint(fit.solution, j);
-        const double square = squares_[joint] - 2 * signs[j] * x.dot(projections[joint]) + x.dot(grams[joint] * x);
-        residual[j] = std::max(square, perfect * perfect * squares_[joint]);
-        fit.score += std::log(residual[j] / squares_[joint]);
+        const double whole = signs[j] * signs[j] * squares_[joint];
+        const double square = whole - 2 * signs[j] * x.dot(projections[joint]) + x.dot(grams[joint] * x);
+        residual[j] = std::max(square, perfect * perfect * whole);
+        fit.score += std::log(residual[j] / whole);
       }
     }
     fit.covariance = SymmetricSolver(information).inverse();
@@ -290,6 +291,44 @@ void check_units(const Robot& robot, const Rows& rows, const Rows::Fit& fit, std
   }
 }
 
+/// One joint's torque in other units than the others': with it scaled, all fit together.
+void check_one_unit(const Robot& robot, const Rows& rows, const Rows::Fit& fit, std::vector<Suspicion>& out) {
+  constexpr double worth_a_unit = 2;  // of the score, as worth_a_flip
+  constexpr double as_good = 1;
+  struct Scaled {
+    std::size_t joint;
+    double times;
+    Rows::Fit fit;
+  };
+  std::vector<Scaled> all;
+  double best = fit.score - worth_a_unit;
+  for (std::size_t j = 0; j < robot.size(); ++j) {
+    for (const double times : {1e-3, 1e-2, 0.1, 10.0, 100.0, 1e3}) {
+      VectorXd signs = fit.signs;
+      signs[static_cast<Index>(j)] *= times;
+      all.push_back({j, times, rows.fit(fit.up, signs)});
+      best = std::min(best, all.back().fit.score);
+    }
+  }
+  std::erase_if(all, [&](const Scaled& one) {
+    return one.fit.score > best + as_good || one.fit.score >= fit.score - worth_a_unit;
+  });
+  if (all.empty()) return;
+  // Of two joints either may be the one: rather that with which the robot weighs what it may.
+  const auto possible = [&](const Scaled& one) {
+    std::vector<Suspicion> heavy;
+    check_units(robot, rows, one.fit, heavy);
+    return heavy.empty();
+  };
+  const auto it = std::find_if(all.begin(), all.end(), possible);
+  const Scaled& one = it == all.end() ? all.front() : *it;
+  out.push_back({Severity::error, one.joint,
+                 fmt::format("torque of {} is about {:g} times too {} beside the others': other units, or a gear left "
+                             "out? Set its torque_gain",
+                             title(robot, one.joint), one.times < 1 ? 1 / one.times : one.times,
+                             one.times < 1 ? "large" : "small")});
+}
+
 void check_against_urdf(const Robot& robot, const Rows& rows, const Rows::Fit& fit, std::vector<Suspicion>& out) {
   const DhChain chain = to_dh(robot);
   const auto n = static_cast<Index>(robot.size());
@@ -382,6 +421,7 @@ std::vector<Suspicion> check_plausible(const Robot& robot, const std::vector<Pro
   }
   const bool signs_differ = (signs - fit.signs).norm() > 0;
   const Rows::Fit final_fit = signs_differ ? rows.fit(fit.up, signs) : std::move(fit);
+  if (n > 1) check_one_unit(robot, rows, final_fit, out);
   check_units(robot, rows, final_fit, out);
   check_against_urdf(robot, rows, final_fit, out);
   return out;

@@ -20,7 +20,7 @@ struct Suspicion {
 
 /// Signs and units of torque and gravity, by fits of its own over some hundred rows of the train logs (base parameters,
 /// viscous, Coulomb, offset and rotor inertia of each joint):
-/// - does another sign of one joint's torque, or of gravity, explain all joints together far better?
+/// - does another sign of one joint's torque, or of gravity, explain all joints together far better? A power of ten?
 /// - is the joint's own inertia M_jj negative at nearly all poses, or its friction, by five standard deviations?
 /// - does the mass that gravity and inertia ask for at least go with the size of the robot, and with its URDF?
 /// `joints` gives the widths of the Coulomb sign. Empty where nothing is suspicious.

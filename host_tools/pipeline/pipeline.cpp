@@ -148,18 +148,23 @@ void Pipeline::check_motion() {
   }
 }
 
-void Pipeline::check_excited() const {
+std::optional<std::pair<int, std::string>> Pipeline::not_excited() const {
   const fs::path file = directory_ / "diagnosis.json";
-  if (!fs::exists(file)) return;
+  if (!fs::exists(file)) return {};
   const json report = json::parse(read_file(file));
   for (const json& joint : report.at("joints")) {
-    if (joint.at("verdict") != "not_excited") continue;
-    throw DataError(fmt::format(
-        "joint {} ({}) is not_excited: it rests in the baseline or moves no more than its encoder's noise, and "
-        "its friction is not in the model; record a baseline or train log in which it moves, or leave the "
-        "baseline out",
-        joint.at("index").get<int>(), joint.at("joint").get<std::string>()));
+    if (joint.at("verdict") == "not_excited") return {{joint.at("index"), joint.at("joint")}};
   }
+  return {};
+}
+
+void Pipeline::check_excited() const {
+  const auto joint = not_excited();
+  if (!joint) return;
+  throw DataError(fmt::format(
+      "joint {} ({}) is not_excited: it moves no more than its encoder's noise, and its friction is not in the "
+      "model; record a log in which it moves",
+      joint->first, joint->second));
 }
 
 std::vector<ProcessedLog> Pipeline::logs(Role role) {
@@ -500,8 +505,10 @@ void Pipeline::write_export(IdentifiedModel& model, const Formats& formats, cons
 }
 
 void Pipeline::report() {
-  IdentifiedModel model = this->model();
-  if (!model.formats || !fs::exists(directory_ / "export.json")) {
+  // A diagnosis that training refuses is drawn as it is.
+  const auto diagnosed = written({"diagnosed"});
+  IdentifiedModel model = diagnosed && not_excited() ? *diagnosed : this->model();
+  if (model.stage == "trained" && (!model.formats || !fs::exists(directory_ / "export.json"))) {
     export_tables();
     model = this->model();
   }

@@ -49,7 +49,9 @@ class Pipeline {
   /// DIR/model.json, if it is current and one of these stages made it.
   std::optional<IdentifiedModel> written(std::initializer_list<std::string_view> stages);
   void check_motion();
-  /// @throws DataError: diagnosis could tell nothing of a joint
+  /// Index (from 1) and name of a joint of which diagnosis could tell nothing.
+  std::optional<std::pair<int, std::string>> not_excited() const;
+  /// @throws DataError: there is one
   void check_excited() const;
   nlohmann::json rigid_metrics(Fitter fitter);
   /// Of a fit: what metrics.json and DIR hold beside the model.

@@ -53,6 +53,12 @@ KeptEffects::KeptEffects(IdentifiedModel diagnosed, const std::vector<ProcessedL
 bool KeptEffects::is_kept(std::size_t joint, const EffectFit& fit) const {
   const EffectInfo& info = *find_effect(fit.effect);
   if (fit.effect == RotorInertia::name && rotor_is_absorbed_[joint]) return true;
+  // What the healthy session had of an effect that grew: today's logs show the sum only.
+  const auto& effects = diagnosed_.joints[joint].effects;
+  const bool grew = !fit.named && std::any_of(effects.begin(), effects.end(), [&](const EffectFit& other) {
+    return other.named && other.effect == fit.effect;
+  });
+  if (grew) return true;
   // The Fitter's columns start cold with every log.
   return info.acts_on != ActsOn::torque || info.needs_structural || info.needs_total ||
          (warm_ && fit.effect == FrictionDrift::name);
