@@ -24,6 +24,7 @@ using Names = std::vector<std::string>;
 
 /// @throws InputError with file and line.
 inline toml::table parse(const std::filesystem::path& file) {
+  if (std::filesystem::is_directory(file)) throw InputError(file.string() + ": is a folder; name the TOML file in it");
   try {
     return toml::parse_file(file.string());
   } catch (const toml::parse_error& error) {

@@ -177,6 +177,14 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
+    // What is missing is missing because of the word that is misspelt.
+    const auto unknown = app.remaining(true);
+    if (error.get_exit_code() != 0 && !unknown.empty()) {
+      const bool option = unknown.front().starts_with("-"), no_verb = app.get_subcommands().empty();
+      fmt::print(stderr, "fxdyn: '{}' {}: see fxdyn {}--help\n", unknown.front(),
+                 option ? "is no option here" : (no_verb ? "is no verb" : "was not expected"), no_verb ? "" : "VERB ");
+      return 2;
+    }
     return app.exit(error) == 0 ? 0 : 2;
   }
   if (*effects_verb) {

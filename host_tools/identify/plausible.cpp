@@ -45,7 +45,10 @@ class Rows {
     base_ = find_base(chain);
     Regressor regressor(chain);
     const auto nb = static_cast<Index>(base_.columns.size());
-    for (Index j = 0; j < n_; ++j) has_rotor_.push_back(!rotor_inertia_is_absorbed(chain, base_, j));
+    for (Index j = 0; j < n_; ++j) {
+      has_rotor_.push_back(!rotor_inertia_is_absorbed(chain, base_, j));
+      left_out_.push_back(logs.front().is_left_out(j));
+    }
     Index available = 0;
     for (const ProcessedLog& log : logs) {
       if (log.role == Role::train) available += log.last - log.first;
@@ -131,6 +134,10 @@ class Rows {
         const auto joint = static_cast<std::size_t>(j);
         const double w = static_cast<double>(tau_.rows()) / residual[j];
         const Index at = nb + own * j;
+        if (left_out_[joint]) {
+          information.block(at, at, own, own).setIdentity();
+          continue;
+        }
         information.topLeftCorner(nb, nb) += w * grams[joint].topLeftCorner(nb, nb);
         information.block(0, at, nb, own) = w * grams[joint].topRightCorner(nb, own);
         information.block(at, 0, own, nb) = w * grams[joint].bottomLeftCorner(own, nb);
@@ -142,6 +149,7 @@ class Rows {
       fit.score = 0;
       for (Index j = 0; j < n_; ++j) {
         const auto joint = static_cast<std::size_t>(j);
+        if (left_out_[joint]) continue;
         const VectorXd x = of_joint(fit.solution, j);
         const double whole = signs[j] * signs[j] * squares_[joint];
         const double square = whole - 2 * signs[j] * x.dot(projections[joint]) + x.dot(grams[joint] * x);
@@ -190,6 +198,8 @@ class Rows {
   double gravity_of(const VectorXd& pi, Index j) const {
     return (gravity_[static_cast<std::size_t>(j)] * (base_.grouping * pi)).cwiseAbs().maxCoeff();
   }
+  /// A joint that stands still holds any torque, as does its brake: nothing of it counts.
+  bool is_left_out(Index j) const { return left_out_[static_cast<std::size_t>(j)]; }
   double acceleration_rms(Index j) const { return std::sqrt(accelerations_[j] / static_cast<double>(tau_.rows())); }
   double torque_rms(Index j) const {
     return std::sqrt(squares_[static_cast<std::size_t>(j)] / static_cast<double>(tau_.rows()));
@@ -214,7 +224,7 @@ class Rows {
 
   Index n_;
   BaseSet base_;
-  std::vector<bool> has_rotor_;
+  std::vector<bool> has_rotor_, left_out_;
   MatrixXd tau_;
   VectorXd accelerations_;  ///< sum of squares
   std::vector<MatrixXd> moving_, gravity_, own_, own_inertia_;
@@ -303,6 +313,7 @@ void check_one_unit(const Robot& robot, const Rows& rows, const Rows::Fit& fit, 
   std::vector<Scaled> all;
   double best = fit.score - worth_a_unit;
   for (std::size_t j = 0; j < robot.size(); ++j) {
+    if (rows.is_left_out(static_cast<Index>(j))) continue;
     for (const double times : {1e-3, 1e-2, 0.1, 10.0, 100.0, 1e3}) {
       VectorXd signs = fit.signs;
       signs[static_cast<Index>(j)] *= times;
@@ -368,6 +379,7 @@ std::vector<Suspicion> check_plausible(const Robot& robot, const std::vector<Pro
   std::vector<std::string> why(robot.size(), "the other joints' torques fit together only with the opposite sign");
   std::vector<Suspicion> out;
   for (Index j = 0; j < n; ++j) {
+    if (rows.is_left_out(j)) continue;
     double share = 0;
     const Estimate inertia = rows.inertia(fit, j, share);
     const Estimate friction = rows.friction(fit, j);
