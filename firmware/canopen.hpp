@@ -16,12 +16,12 @@ inline constexpr std::uint32_t largest_node_id = 127;
 inline constexpr std::uint32_t cob_invalid = 1U << 31, cob_no_remote = 1U << 30, cob_extended = 1U << 29;
 inline constexpr std::uint32_t cob_identifier = 0x7FF;
 
-/// Identifiers that no PDO, SYNC or EMCY may take (7.3.5, table "restricted CAN-IDs").
+/// Identifiers that no PDO, SYNC or EMCY may take (7.3.5, table "restricted CAN-IDs"). Of the SDO's and the heartbeat's
+/// ranges also the first, which would belong to node 0.
 constexpr bool is_restricted(std::uint32_t id) {
-  return id <= 0x07F || (id >= 0x101 && id <= 0x180) || (id >= 0x581 && id <= 0x5FF) || (id >= 0x601 && id <= 0x67F) ||
-         (id >= 0x6E0 && id <= 0x6FF) || id >= 0x701;
+  return id <= 0x07F || (id >= 0x101 && id <= 0x180) || (id >= 0x580 && id <= 0x67F) || (id >= 0x6E0 && id <= 0x6FF) ||
+         id >= 0x700;
 }
-
 /// What a heartbeat says (7.2.8.3.2.2).
 enum class NmtState : std::uint8_t { initialising = 0x00, stopped = 0x04, operational = 0x05, pre_operational = 0x7F };
 
@@ -50,7 +50,9 @@ enum class Abort : std::uint32_t {
   invalid_value = 0x0609'0030,
   too_high = 0x0609'0031,
   too_low = 0x0609'0032,
+  incompatible = 0x0604'0043,
   device_state = 0x0800'0022,
+  no_data = 0x0800'0024,
 };
 
 /// Little endian, as everything on the bus.

@@ -22,6 +22,7 @@
 #include "model/numbers.hpp"
 #include "model/table_page.hpp"
 #include "model/version.hpp"
+#include "model/wrapping.hpp"
 
 // The drive node (docs/decisions/0006-drive-node.md). How a main_<board>.cpp wires it:
 //
@@ -31,8 +32,8 @@
 //   Bus bus; Clock clock; ...                                                  // opened and started by the board
 //   fxdyn::DriveHardware hardware{bus, clock, counter, watchdog, enable, fault, tick_busy};
 //   static fxdyn::DriveNode<Model, decltype(hardware)> node(
-//       hardware, {page.parameters, page.header, fxdyn::page_is_valid(page), is_update, rated}, {.board =
-//       "mps2-an386"});
+//       hardware, {page.parameters, page.header, fxdyn::page_is_valid(page), fxdyn::UpdateSlot::empty, rated},
+//       {.board = "mps2-an386"});
 //   for (;;) {
 //     if (!node.poll()) sleep;     // until a frame has come or node.longest_sleep_us have passed, whichever is first
 //   }
@@ -60,14 +61,15 @@ template <class Model>
 struct NodeTables {
   const typename Model::Parameters& parameters;
   PageHeader header;
-  bool valid = false;      ///< page_is_valid()
-  bool is_update = false;  ///< the page of the update slot
+  bool valid = false;                     ///< page_is_valid()
+  UpdateSlot update = UpdateSlot::empty;  ///< what the slot for updates holds; `used`: these tables
   const RatedTorques<Model>& rated;
 };
 
 /// What of a board can fail at start-up: bits of NodeSettings::hardware_failed.
 namespace hardware_part {
-inline constexpr std::uint8_t can = 1 << 0, wake_up_timer = 1 << 1, watchdog = 1 << 2;
+inline constexpr std::uint8_t can = 1 << 0, wake_up_timer = 1 << 1, watchdog = 1 << 2,
+                              crystal = 1 << 3;  ///< the board runs from its internal oscillator
 }
 
 /// What only the board knows.
@@ -77,6 +79,7 @@ struct NodeSettings {
   std::string_view board = "";       ///< hardware version 0x1009, up to 32 characters
   bool watchdog_reset = false;       ///< why the processor started
   std::uint8_t hardware_failed = 0;  ///< parts that did not start: an error that lasts, the fault output with it
+  bool fd_allowed = true;            ///< false: the clock is not exact enough for CAN FD
 };
 
 /// CANopen node that puts out the feedforward torque of setpoints that come over the bus. It knows neither the board
@@ -115,6 +118,8 @@ class DriveNode {
     reset(now);
     if (settings_.hardware_failed != 0) errors_.raise(Error::hardware, settings_.hardware_failed, now);
     if (!tables_.valid) errors_.raise(Error::tables, 0, now);
+    if (is_refused(tables_.update))
+      errors_.raise(Error::update_refused, static_cast<std::uint16_t>(tables_.update), now);
     if (settings_.watchdog_reset) {
       count(Counter::watchdog_resets);
       errors_.raise(Error::watchdog_reset, 0, now);
@@ -133,13 +138,13 @@ class DriveNode {
       more = hardware_.bus.receive(received_) == hal::Status::ok;
       if (more) handle();
       const std::uint32_t cost = measured();
-      if (more) since_tick_ += cost;
+      if (more) since_tick_ = wrapping_add(since_tick_, cost);
     }
     hardware_.counter.start();
     serve(hardware_.clock.now_us());
     flush();
     const std::uint32_t cost = measured();
-    if (handled > 1 || more) since_tick_ += cost;  // polls for nothing are no work
+    if (handled > 1 || more) since_tick_ = wrapping_add(since_tick_, cost);  // polls for nothing are no work
     if (!is_supervised()) hardware_.watchdog.feed();
     return more || pending_ != 0;
   }
@@ -153,7 +158,7 @@ class DriveNode {
          std::any_of(torques_.begin(), torques_.end(), [](const auto& torque) { return torque.value() != 0; })))
       return longest_sleep_us;
     if (!is_due_to_tick()) return resolution_us;
-    const std::uint32_t since = hardware_.clock.now_us() - sync_us_;
+    const std::uint32_t since = wrapping_subtract(hardware_.clock.now_us(), sync_us_);
     return std::clamp(overdue_after_us_ - std::min(since, overdue_after_us_), longest_sleep_us, resolution_us);
   }
 
@@ -168,6 +173,11 @@ class DriveNode {
   using Object = dictionary::Object;
   canopen::Abort find(std::uint16_t index, std::uint8_t sub_index, Object& object) const {
     return dictionary::find(extent, index, sub_index, object);
+  }
+  /// The history 0x1003 has as many fields as errors were told.
+  bool has_data(const Object& object) const {
+    return object.entry == nullptr || object.entry->variable != dictionary::Variable::error_field ||
+           object.item < errors_.history_count();
   }
   std::size_t read(const Object& object, std::uint8_t* to) const {
     if (object.type() == dictionary::Type::visible_string) {
@@ -211,6 +221,7 @@ class DriveNode {
   static constexpr std::uint32_t all_joints = joints == 32 ? 0xFFFF'FFFF : (1U << joints) - 1;
   static constexpr std::uint32_t boot_up_retry_us = 10'000;  ///< where the bus refused it
   static constexpr std::uint32_t longest_gap = 0x00FF'FFFF;  ///< stale ticks that are counted in a row
+  static constexpr std::uint32_t rate_window = 256;          ///< periods
 
   /// Frames that wait to be sent, one place each, most urgent first. A newer one takes the older one's place.
   static constexpr std::size_t emergency_place = 0, torque_place = 1, sdo_place = torque_place + outputs,
@@ -226,6 +237,7 @@ class DriveNode {
     std::uint32_t error_behaviour = dictionary::defaults::error_behaviour;
     std::uint32_t ramp_ticks = dictionary::defaults::ramp_ticks;
     std::uint32_t tolerated = dictionary::defaults::tolerated_ticks;
+    std::uint32_t patience_ms = dictionary::defaults::patience_ms;
     bool fd = false;
     bool parity = false;
     std::array<std::uint32_t, dictionary::consumers> consumers{};
@@ -236,9 +248,7 @@ class DriveNode {
 
   const auto& limits(std::size_t j) const { return tables_.parameters.constants[j].limits; }
   /// The larger end of a range around zero, at least 1.
-  static std::int32_t scale_limit(std::int32_t lower, std::int32_t upper) {
-    return whole_share(lower, upper);
-  }
+  static std::int32_t scale_limit(std::int32_t lower, std::int32_t upper) { return whole_share(lower, upper); }
   std::int32_t velocity_limit(std::size_t j) const {
     return scale_limit(limits(j).dq_lower.raw, limits(j).dq_upper.raw);
   }
@@ -274,7 +284,7 @@ class DriveNode {
     listen();
     leave_operation();
     state_ = NmtState::initialising;  // until the boot-up message has gone
-    heartbeat_us_ = now - boot_up_retry_us;
+    heartbeat_us_ = wrapping_subtract(now, boot_up_retry_us);
     pending_ = 0;  // nothing of before goes out ahead of the boot-up message
     step_us_ = now;
     release_after_us_ = tick_us_;
@@ -324,10 +334,11 @@ class DriveNode {
   void leave_operation() {
     synchronised_ = false;
     has_last_ = false;
-    waiting_mask_ = odd_mask_ = 0;
-    stale_ = 0;
+    drop_setpoints();
+    stale_ = own_ticks_ = elapsed_ = 0;
     since_tick_ = 0;
     errors_.clear(Error::setpoints_stale);
+    errors_.clear(Error::sync_rate);
   }
 
   /// What 0x1029 says of errors of the communication.
@@ -373,14 +384,50 @@ class DriveNode {
       return errors_.raise(Error::sync_length, received_.size, hardware_.clock.now_us());
     }
     if (state_ != NmtState::operational) return;
-    wait_for_sync(configuration_.period_us);
+    const std::uint32_t now = hardware_.clock.now_us(), periods = periods_since_sync(now);
+    // one that comes at once after another is no period of its own: twice the same, or the late one and its successor
+    const bool at_once =
+        is_watched() && synchronised_ && own_ticks_ == 0 && wrapping_subtract(now, sync_us_) < tick_us_ / 4;
+    elapsed_ = std::min(elapsed_ + (at_once ? 0 : periods), longest_gap);
+    watch_rate(now, periods);
+    wait_for_sync(now);
     synchronised_ = true;
-    tick(true);
+    tick(periods);
   }
-  /// The next SYNC is overdue after one and a half periods.
-  void wait_for_sync(std::uint32_t period_us) {
-    sync_us_ = hardware_.clock.now_us();
-    overdue_after_us_ = period_us + period_us / 2;
+  /// The next SYNC is overdue after one and a half periods; where it has no period, when the host's time is up.
+  void wait_for_sync(std::uint32_t now) {
+    sync_us_ = now;
+    overdue_after_us_ =
+        is_watched() ? configuration_.period_us + configuration_.period_us / 2 : 1000 * configuration_.patience_ms;
+  }
+  /// Whether SYNC has a period that it must keep.
+  bool is_watched() const { return configuration_.period_us != 0; }
+
+  /// Periods from the last SYNC to this one, at least 1. After n ticks of the node's own it is the n+1st, unless it
+  /// comes so soon after the last of them that it is the one that was missed, late.
+  std::uint32_t periods_since_sync(std::uint32_t now) const {
+    if (!is_watched() || own_ticks_ == 0) return 1;
+    return own_ticks_ + (wrapping_subtract(now, sync_us_) < tick_us_ / 4 ? 0U : 1U);
+  }
+
+  /// The tables hold for their own tick alone: what effects remember is wrong at any other. n periods of SYNC have to
+  /// take n ticks, give or take two ticks (jitter, a period miscounted) and a 64th. So a rate that is off by a quarter
+  /// is noticed within 9 periods, one that is off by 2.5 % within a window. The error ends with a window that is right
+  /// to a 64th.
+  void watch_rate(std::uint32_t now, std::uint32_t periods) {
+    if (!is_watched()) return;
+    rate_periods_ += periods;
+    const std::uint32_t passed = wrapping_subtract(now, rate_us_), expected = rate_periods_ * tick_us_;
+    const std::uint32_t off = passed > expected ? passed - expected : expected - passed;
+    const bool wrong = synchronised_ && off > 2 * tick_us_ + expected / 64;
+    if (wrong) {
+      const std::uint64_t period = slow_quotient(passed, rate_periods_);
+      errors_.raise(Error::sync_rate, static_cast<std::uint16_t>(std::min<std::uint64_t>(period, 0xFFFF)), now);
+    }
+    if (synchronised_ && !wrong && rate_periods_ < rate_window) return;
+    if (synchronised_ && off <= expected / 64) errors_.clear(Error::sync_rate);
+    rate_us_ = now;
+    rate_periods_ = 0;
   }
 
   void handle_setpoint(std::size_t j) {
@@ -399,9 +446,15 @@ class DriveNode {
     const std::uint32_t bit = 1U << j;
     if ((waiting_mask_ & bit) != 0) count(Counter::duplicate_setpoints);
     waiting_mask_ |= bit;
+    arrivals_[j] = static_cast<std::uint8_t>(arrivals_[j] + (arrivals_[j] < 0xFF ? 1 : 0));
     waiting_[j] = WireSetpoint::load(from);
     const std::uint32_t odd = waiting_[j].is_odd() ? bit : 0;
     odd_mask_ = (odd_mask_ & ~bit) | odd;
+  }
+
+  void drop_setpoints() {
+    waiting_mask_ = odd_mask_ = 0;
+    arrivals_ = {};
   }
 
   void handle_nmt() {
@@ -450,23 +503,45 @@ class DriveNode {
 
   void handle_heartbeat(std::uint32_t node) {
     if (received_.remote || received_.size != 1) return count(Counter::malformed_frames);
+    const auto state = static_cast<NmtState>(received_.data[0]);
+    const bool works = state == NmtState::operational || state == NmtState::pre_operational;
+    if (!works && state != NmtState::initialising && state != NmtState::stopped)
+      return count(Counter::malformed_frames);
+    const std::uint32_t now = hardware_.clock.now_us();
     for (std::size_t i = 0; i < dictionary::consumers; ++i) {
-      if (consumer_node(i) != node || consumer_ms(i) == 0) continue;
+      if (!is_consumed(i) || consumer_node(i) != node) continue;
+      // A boot-up message of a node that was alive says that it was reset: what it knew of this one is gone.
+      if (!works) {
+        if ((consumer_seen_ >> i & 1U) != 0) lose_consumer(i, now);
+        continue;
+      }
       consumer_seen_ |= 1U << i;
       consumer_lost_ &= ~(1U << i);
-      consumer_us_[i] = hardware_.clock.now_us();
+      consumer_us_[i] = now;
     }
     if (consumer_lost_ == 0) errors_.clear(Error::heartbeat_lost);
   }
-  std::uint32_t consumer_node(std::size_t i) const { return configuration_.consumers[i] >> 16 & 0x7FU; }
+  void lose_consumer(std::size_t i, std::uint32_t now) {
+    consumer_seen_ &= ~(1U << i);
+    consumer_lost_ |= 1U << i;
+    count(Counter::lost_heartbeats);
+    errors_.raise(Error::heartbeat_lost, static_cast<std::uint16_t>(consumer_node(i)), now);
+    communication_failed();
+  }
+  std::uint32_t consumer_node(std::size_t i) const { return configuration_.consumers[i] >> 16; }
   std::uint32_t consumer_ms(std::size_t i) const { return configuration_.consumers[i] & 0xFFFFU; }
+  /// An entry of node 0 or above 127, or without a time, is not used (CiA 301, 7.5.2.18).
+  bool is_consumed(std::size_t i) const {
+    return consumer_node(i) != 0 && consumer_node(i) <= canopen::largest_node_id && consumer_ms(i) != 0;
+  }
 
   // --- the tick ----------------------------------------------------------------------------------------------------
 
-  /// At SYNC, or by the node's own timer where SYNC stays away.
-  void tick(bool by_sync) {
+  /// At SYNC, `periods` after the last one; 0: by the node's own timer where SYNC stays away. What waits is then for
+  /// the SYNC that is still to come.
+  void tick(std::uint32_t periods) {
     static_cast<void>(hardware_.tick_busy.set(true));  // an oscilloscope's trace: nobody to tell where it fails
-    const bool fresh = by_sync && accept_setpoints();
+    const bool by_sync = periods != 0, fresh = by_sync && accept_setpoints(periods);
     const bool enabled = is_enabled();
     ++tick_count_;
     if (fresh) {
@@ -482,10 +557,15 @@ class DriveNode {
       if (stale_ > configuration_.tolerated)
         errors_.raise(Error::setpoints_stale, static_cast<std::uint16_t>(missing_joint()), hardware_.clock.now_us());
     }
-    waiting_mask_ = odd_mask_ = 0;
+    if (by_sync) {
+      drop_setpoints();
+      own_ticks_ = 0;
+    } else if (own_ticks_ < longest_gap) {
+      ++own_ticks_;
+    }
 
     const bool hold = !fresh && stale_ <= configuration_.tolerated;
-    const bool allowed = enabled && consumer_lost_ == 0;
+    const bool allowed = enabled && may_put_out();
     step_us_ = sync_us_;
     release_after_us_ = tick_us_ + tick_us_ / 2;
     bool zero = true;
@@ -516,7 +596,8 @@ class DriveNode {
   }
 
   /// Every joint has a setpoint and none jumps: they become the tick's input, together. Else nothing of them is used.
-  bool accept_setpoints() {
+  bool accept_setpoints(std::uint32_t periods) {
+    if (is_watched() && own_ticks_ != 0) drop_old_setpoints(periods);
     if (waiting_mask_ != all_joints) {
       count(Counter::missing_setpoints, static_cast<std::uint32_t>(std::popcount(all_joints & ~waiting_mask_)));
       return false;
@@ -529,7 +610,7 @@ class DriveNode {
     if (has_last_) {
       for (std::size_t j = 0; j < joints; ++j) {
         const std::int64_t jump = std::int64_t{waiting_[j].q} - last_[j].q;
-        const std::int64_t most = std::int64_t{jump_per_tick_[j]} * (stale_ + 1);
+        const std::int64_t most = std::int64_t{jump_per_tick_[j]} * std::max<std::uint32_t>(elapsed_, 1);
         implausible += static_cast<std::uint32_t>(jump > most || jump < -most);
       }
     }
@@ -546,6 +627,14 @@ class DriveNode {
     return true;
   }
 
+  /// After SYNCs that stayed away: as many setpoints as periods have to have come for a joint, else its newest one is
+  /// of one of those, and counts as missing.
+  void drop_old_setpoints(std::uint32_t periods) {
+    for (std::size_t j = 0; j < joints; ++j) {
+      if (arrivals_[j] != periods) waiting_mask_ &= ~(1U << j);
+    }
+  }
+
   /// The first joint whose setpoint is missing, from 1; 0: none is.
   std::uint32_t missing_joint() const {
     const std::uint32_t missing = all_joints & ~waiting_mask_;
@@ -559,7 +648,8 @@ class DriveNode {
   }
 
   /// Whether a torque other than zero may stay.
-  bool is_allowed() { return consumer_lost_ == 0 && is_enabled(); }
+  bool is_allowed() { return may_put_out() && is_enabled(); }
+  bool may_put_out() const { return consumer_lost_ == 0 && !errors_.is_present(Error::sync_rate); }
 
   /// As long without setpoints as the longest ramp takes: the next ones begin anew. A time and not just a torque of
   /// zero, so that drives of one joint each forget when a drive of all does.
@@ -567,6 +657,8 @@ class DriveNode {
     model_state_ = {};
     has_last_ = false;
     synchronised_ = false;
+    drop_setpoints();
+    own_ticks_ = elapsed_ = 0;
   }
 
   /// What the counter says of the stretch that ends here, without its own cost; zero where that wavers by more.
@@ -576,21 +668,23 @@ class DriveNode {
   }
 
   void measure_model() {
-    since_tick_ += measured();
+    since_tick_ = wrapping_add(since_tick_, measured());
     saturations_ = {};
     hardware_.counter.start();
     compute();
     const std::uint32_t cost = measured();
     hardware_.counter.start();
-    since_tick_ += cost;
+    since_tick_ = wrapping_add(since_tick_, cost);
     note_cost(dictionary::Cost::model, cost);
   }
   /// A function of its own, from members to members, so that no part of it can leave the measured stretch.
   [[gnu::noinline]] void compute() {
+    if (elapsed_ > 1) Model::skip(tables_.parameters, model_state_, elapsed_ - 1, saturations_);
+    elapsed_ = 0;
     model_torques_ = Model::tick(tables_.parameters, model_state_, setpoints_, saturations_);
   }
   void end_of_measurement() {
-    since_tick_ += measured();
+    since_tick_ = wrapping_add(since_tick_, measured());
     hardware_.counter.start();
     note_cost(dictionary::Cost::everything, since_tick_);
     since_tick_ = 0;
@@ -644,52 +738,49 @@ class DriveNode {
 
   void serve_heartbeats(std::uint32_t now) {
     if (state_ == NmtState::initialising) {
-      if (off_bus_ || is_pending(heartbeat_place) || now - heartbeat_us_ < boot_up_retry_us) return;
+      if (off_bus_ || is_pending(heartbeat_place) || wrapping_subtract(now, heartbeat_us_) < boot_up_retry_us) return;
       put_heartbeat();
       heartbeat_us_ = now;
     } else if (const std::uint32_t period = 1000 * configuration_.heartbeat_ms;
-               period != 0 && now - heartbeat_us_ >= period) {
-      heartbeat_us_ = now - heartbeat_us_ < 2 * period ? heartbeat_us_ + period : now;
+               period != 0 && wrapping_subtract(now, heartbeat_us_) >= period) {
+      heartbeat_us_ = wrapping_subtract(now, heartbeat_us_) < 2 * period ? wrapping_add(heartbeat_us_, period) : now;
       put_heartbeat();
     }
     for (std::size_t i = 0; i < dictionary::consumers; ++i) {
-      if ((consumer_seen_ >> i & 1U) == 0 || now - consumer_us_[i] <= 1000 * consumer_ms(i)) continue;
-      consumer_seen_ &= ~(1U << i);
-      consumer_lost_ |= 1U << i;
-      count(Counter::lost_heartbeats);
-      errors_.raise(Error::heartbeat_lost, static_cast<std::uint16_t>(consumer_node(i)), now);
-      communication_failed();
+      const bool late = wrapping_subtract(now, consumer_us_[i]) > 1000 * consumer_ms(i);
+      if ((consumer_seen_ >> i & 1U) != 0 && late) lose_consumer(i, now);
     }
   }
   void put_heartbeat() {
     put(heartbeat_place, canopen::heartbeat_id + settings_.id, 1).data[0] = static_cast<std::uint8_t>(state_);
   }
 
-  /// Whether a tick has to come: by SYNC or, half a period later, by the node's own timer.
-  bool is_due_to_tick() const {
-    return state_ == NmtState::operational && synchronised_ && configuration_.period_us != 0;
+  /// Whether a tick has to come: by SYNC or, once that is overdue, by the node's own timer.
+  bool is_due_to_tick() const { return state_ == NmtState::operational && synchronised_; }
+  bool is_supervised() const {
+    return is_due_to_tick() && is_watched() && configuration_.period_us <= supervised_period_us;
   }
-  bool is_supervised() const { return is_due_to_tick() && configuration_.period_us <= supervised_period_us; }
 
   /// Ticks without SYNC, at the tables' own rate once SYNC is overdue, so that a slow period makes no slow ramp.
   /// Between ticks, and where none is due, a torque that may not go out goes to zero at that rate too.
   void serve_own_ticks(std::uint32_t now) {
-    if (is_due_to_tick() && now - sync_us_ >= overdue_after_us_) {
-      sync_us_ += overdue_after_us_;
-      if (now - sync_us_ >= tick_us_) sync_us_ = now;  // far behind: no burst of ticks
+    if (is_due_to_tick() && wrapping_subtract(now, sync_us_) >= overdue_after_us_) {
+      sync_us_ = wrapping_add(sync_us_, overdue_after_us_);
+      if (wrapping_subtract(now, sync_us_) >= tick_us_) sync_us_ = now;  // far behind: no burst of ticks
       overdue_after_us_ = tick_us_;
-      return tick(false);
+      return tick(0);
     }
-    if (now - step_us_ < release_after_us_) return;
-    step_us_ += release_after_us_;
-    if (now - step_us_ >= tick_us_) step_us_ = now;
+    if (wrapping_subtract(now, step_us_) < release_after_us_) return;
+    step_us_ = wrapping_add(step_us_, release_after_us_);
+    if (wrapping_subtract(now, step_us_) >= tick_us_) step_us_ = now;
     release_after_us_ = tick_us_;
-    if (state_ == NmtState::operational && synchronised_ && is_allowed()) return;
+    if (is_due_to_tick() && is_allowed()) return;
     for (std::size_t o = 0; o < outputs; ++o) torques_[o].release(steps_[o]);
   }
 
   void serve_emergency(std::uint32_t now) {
-    if (!emergency_may_go_ && now - emergency_us_ >= 100 * configuration_.emergency_inhibit) emergency_may_go_ = true;
+    if (!emergency_may_go_ && wrapping_subtract(now, emergency_us_) >= 100 * configuration_.emergency_inhibit)
+      emergency_may_go_ = true;
     if (!emergency_may_go_ || off_bus_ || is_pending(emergency_place) ||
         (state_ != NmtState::pre_operational && state_ != NmtState::operational))
       return;
@@ -794,7 +885,7 @@ class DriveNode {
       case V::error_count:
         return errors_.history_count();
       case V::error_field:
-        return item < errors_.history_count() ? errors_.history(item) : 0;
+        return errors_.history(item);
       case V::sync_id:
         return configuration_.sync_id;
       case V::cycle_period:
@@ -840,7 +931,11 @@ class DriveNode {
       case V::outputs:
         return Model::outputs_mask;
       case V::page:
-        return tables_.is_update ? 1 : 0;
+        return tables_.update == UpdateSlot::used ? 1 : 0;
+      case V::sequence:
+        return tables_.header.sequence;
+      case V::update_slot:
+        return static_cast<std::uint32_t>(tables_.update);
       case V::counter:
         return counters_[item];
       case V::cost:
@@ -853,6 +948,8 @@ class DriveNode {
         return configuration_.tolerated;
       case V::tick_parity:
         return configuration_.parity ? 1 : 0;
+      case V::patience:
+        return configuration_.patience_ms;
       case V::fractional_bits:
         return word(std::array{position_bits, velocity_bits, acceleration_bits, torque_bits}[item]);
       case V::velocity_limit:
@@ -906,20 +1003,28 @@ class DriveNode {
         return canopen::Abort::none;
       case V::sync_id:
         if (operational) return canopen::Abort::device_state;
-        if (value > canopen::cob_identifier || canopen::is_restricted(value)) return canopen::Abort::invalid_value;
+        if (value > canopen::cob_identifier || canopen::is_restricted(value) || is_taken(value, configuration_.sync_id))
+          return canopen::Abort::invalid_value;
         configuration_.sync_id = value;
         listen();
         return canopen::Abort::none;
       case V::cycle_period:
-        if (value > longest_period_us) return canopen::Abort::too_high;
-        if (value != 0 && value < shortest_period_us) return canopen::Abort::too_low;
+        // the tables are for their own tick
+        if (value > dictionary::longest_period_us(tick_us_)) return canopen::Abort::too_high;
+        if (value != 0 && value < dictionary::shortest_period_us(tick_us_)) return canopen::Abort::too_low;
         configuration_.period_us = value;
-        wait_for_sync(value);
+        errors_.clear(Error::sync_rate);
+        expect_sync();
+        return canopen::Abort::none;
+      case V::patience:
+        configuration_.patience_ms = value;
+        expect_sync();
         return canopen::Abort::none;
       case V::emergency_inhibit:
         configuration_.emergency_inhibit = value;
         return canopen::Abort::none;
       case V::consumer_heartbeat:
+        if (const auto abort = check_consumer(object.item, value); abort != canopen::Abort::none) return abort;
         configuration_.consumers[object.item] = value;
         consumer_seen_ &= ~(1U << object.item);  // begins with the next heartbeat
         consumer_lost_ &= ~(1U << object.item);
@@ -933,8 +1038,8 @@ class DriveNode {
         configuration_.error_behaviour = value;
         return canopen::Abort::none;
       case V::setpoint_id:
-        if ((value & canopen::cob_no_remote) != 0) return canopen::Abort::invalid_value;  // of torques only
-        return set_cob_id(configuration_.setpoint_ids[object.item], value);
+        // bit 30 says nothing here (CiA 301, 7.5.2.35)
+        return set_cob_id(configuration_.setpoint_ids[object.item], value & ~canopen::cob_no_remote);
       case V::torque_id:
         return set_cob_id(configuration_.torque_ids[output_of(object.item)], value);
       case V::ramp_ticks:
@@ -956,6 +1061,7 @@ class DriveNode {
       case V::can_fd:
         if (operational) return canopen::Abort::device_state;
         if (value != 0 && !can_fd) return canopen::Abort::too_high;
+        if (value != 0 && !settings_.fd_allowed) return canopen::Abort::device_state;
         configuration_.fd = value != 0;
         return canopen::Abort::none;
       default:
@@ -979,14 +1085,32 @@ class DriveNode {
     return canopen::Abort::none;
   }
 
-  /// Whether SYNC or another PDO than `own` has this identifier.
+  /// Whether the node's EMCY, SYNC or a PDO has this identifier, other than `own`.
   bool is_taken(std::uint32_t id, const std::uint32_t& own) const {
     const auto has = [&](const std::uint32_t& other) {
       return &other != &own && (other & canopen::cob_invalid) == 0 && (other & canopen::cob_identifier) == id;
     };
-    return id == configuration_.sync_id ||
+    return id == canopen::emergency_id + settings_.id || has(configuration_.sync_id) ||
            std::any_of(configuration_.setpoint_ids.begin(), configuration_.setpoint_ids.end(), has) ||
            std::any_of(configuration_.torque_ids.begin(), configuration_.torque_ids.end(), has);
+  }
+
+  /// From now on as after a SYNC: the time-outs count anew, and nothing of before does.
+  void expect_sync() {
+    drop_setpoints();
+    own_ticks_ = rate_periods_ = 0;
+    rate_us_ = hardware_.clock.now_us();
+    wait_for_sync(rate_us_);
+  }
+
+  /// Only one entry may watch a node (CiA 301, 7.5.2.18).
+  canopen::Abort check_consumer(std::size_t item, std::uint32_t value) const {
+    const std::uint32_t node = value >> 16, ms = value & 0xFFFFU;
+    if (node > 0xFF) return canopen::Abort::invalid_value;  // bits that are reserved
+    for (std::size_t i = 0; i < dictionary::consumers; ++i) {
+      if (i != item && is_consumed(i) && ms != 0 && consumer_node(i) == node) return canopen::Abort::incompatible;
+    }
+    return canopen::Abort::none;
   }
 
   /// Torque limit / ticks, rounded up: the ramp is not longer than told.
@@ -997,10 +1121,6 @@ class DriveNode {
       steps_[o].ramp = ticks == 0 ? 0x7FFF'FFFF : static_cast<std::int32_t>(slow_quotient(limit - 1, ticks) + 1);
     }
   }
-
-  /// Limits of 0x1006 where it is not 0.
-  static constexpr std::uint32_t shortest_period_us = 200;
-  static constexpr std::uint32_t longest_period_us = 10'000'000;
 
   Hardware& hardware_;
   NodeTables<Model> tables_;
@@ -1019,12 +1139,16 @@ class DriveNode {
   std::array<char, dictionary::longest_string> label_{};
   std::size_t label_size_ = 0;
 
-  std::uint32_t waiting_mask_ = 0;  ///< bit j: waiting_[j] has come since the last SYNC
-  std::uint32_t odd_mask_ = 0;      ///< bit j: it is of an odd tick
+  std::uint32_t waiting_mask_ = 0;               ///< bit j: waiting_[j] has come since the last SYNC
+  std::uint32_t odd_mask_ = 0;                   ///< bit j: it is of an odd tick
+  std::array<std::uint8_t, joints> arrivals_{};  ///< setpoints since the last SYNC, up to 255
   std::array<WireSetpoint, joints> waiting_{}, last_{};
   bool has_last_ = false, synchronised_ = false, was_enabled_ = false;
-  std::uint32_t stale_ = 0;  ///< stale ticks in a row
+  std::uint32_t stale_ = 0;      ///< stale ticks in a row
+  std::uint32_t own_ticks_ = 0;  ///< since the last SYNC
+  std::uint32_t elapsed_ = 0;    ///< periods of SYNC since the setpoints of the last fresh tick
   std::uint32_t tick_count_ = 0, sync_us_ = 0, overdue_after_us_ = 0;
+  std::uint32_t rate_us_ = 0, rate_periods_ = 0;      ///< when the window of watch_rate() began, periods since then
   std::uint32_t step_us_ = 0, release_after_us_ = 0;  ///< when the torques last moved, when they are released next
 
   typename Model::State model_state_{};

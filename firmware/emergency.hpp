@@ -5,12 +5,15 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "model/wrapping.hpp"
+
 namespace fxdyn {
 
 /// What can be wrong with a node, in the order in which it is told.
 enum class Error : std::uint8_t {
   hardware,
   tables,
+  update_refused,
   watchdog_reset,
   id_collision,
   heartbeat_lost,
@@ -20,6 +23,7 @@ enum class Error : std::uint8_t {
   pdo_length,
   sync_length,
   setpoints_stale,
+  sync_rate,
 };
 
 struct ErrorKind {
@@ -27,8 +31,9 @@ struct ErrorKind {
   std::uint8_t register_ = 0;  ///< bits of the error register 0x1001: 0 generic, 4 communication
   bool event = false;          ///< has no end of its own: counts as gone when it has not happened for a while
 };
-inline constexpr std::array<ErrorKind, 11> error_kinds{{{0x5000, 0x01, false},
+inline constexpr std::array<ErrorKind, 13> error_kinds{{{0x5000, 0x01, false},
                                                         {0x6320, 0x01, false},
+                                                        {0x6320, 0x01, true},
                                                         {0x6010, 0x01, true},
                                                         {0x8150, 0x11, true},
                                                         {0x8130, 0x11, false},
@@ -37,7 +42,8 @@ inline constexpr std::array<ErrorKind, 11> error_kinds{{{0x5000, 0x01, false},
                                                         {0x8110, 0x11, true},
                                                         {0x8210, 0x11, true},
                                                         {0x8240, 0x11, true},
-                                                        {0x8250, 0x11, false}}};
+                                                        {0x8250, 0x11, false},
+                                                        {0x8700, 0x11, false}}};
 
 /// Which errors are present, which of them still have to be told, and the history of object 0x1003. An error is told
 /// once, however often it happens while it is present.
@@ -80,7 +86,7 @@ class ErrorLog {
   void serve(std::uint32_t now_us) {
     for (std::uint32_t left = present_; left != 0; left &= left - 1) {
       const auto i = static_cast<std::size_t>(std::countr_zero(left));
-      if (error_kinds[i].event && now_us - last_us_[i] >= event_us) present_ &= ~(1U << i);
+      if (error_kinds[i].event && wrapping_subtract(now_us, last_us_[i]) >= event_us) present_ &= ~(1U << i);
     }
   }
 

@@ -9,22 +9,16 @@ extern "C" const std::uint32_t fxdyn_update_begin[];  // NOLINT
 
 namespace fxdyn {
 
-/// The tables that an image computes with.
-template <class Page>
-struct FlashTables {
-  const Page& page;
-  bool valid = false, is_update = false;
-};
-
-/// Chooses between the update slot and the image's own page. Hides from the compiler that it knows the values: either
-/// page can be reflashed alone.
-template <class Page>
-FlashTables<Page> tables_in_flash(const Page& built_in) {
-  const Page* own = &built_in;
-  const Page* update = reinterpret_cast<const Page*>(fxdyn_update_begin);  // NOLINT: whatever the flash has there
-  asm volatile("" : "+r"(own), "+r"(update));
-  const Page& page = newest_valid_page(*update, *own);
-  return {page, page_is_valid(page), &page == update};
+/// choose_tables() of the image's own page and the slot.
+template <class Model, class Memory>
+ChosenTables<Model> tables_in_flash(const TablePage<Model>& built_in, Memory& memory) {
+  const auto* slot = reinterpret_cast<const TablePage<Model>*>(fxdyn_update_begin);  // NOLINT: what the flash has there
+  return choose_tables(built_in, *slot, memory);
+}
+template <class Model>
+ChosenTables<Model> tables_in_flash(const TablePage<Model>& built_in) {
+  PlainMemory memory;
+  return tables_in_flash(built_in, memory);
 }
 
 }  // namespace fxdyn

@@ -42,11 +42,14 @@ constexpr const char* usage =
   --node N          node id, 1 .. 127, several nodes count on from it; default: number of the (first) joint
   --fd              also CAN FD frames (object 0x2030)
   --tables FILE     tables.bin instead of the tables it was built with
+  --update FILE     tables.bin of `fxdyn update`: taken where it is whole, of the same model and newer than those
   --gpio-chip C     chip of these lines, for one node: gpiochip0, /dev/gpiochip0 or a label
     --enable L      input, default: always enabled
-    --fault L       output
+    --fault L       output, low while an error is present: a line that a dead process has let go of reads the same,
+                    with a pull-down at the reader
     --busy L        output, high while a tick is computed
-  --active-low      all three lines
+  --active-low      of --enable and --busy: low enables, low while a tick is computed
+  --fault-high      of --fault: high while an error is present
   --realtime P      SCHED_FIFO with this priority, 1 .. 99, and memory locked
   --watchdog DEV    /dev/watchdog, 1 s, for one node
   --serial-number S of object 0x1018
@@ -56,8 +59,8 @@ struct Options {
   const char* can = nullptr;
   std::vector<unsigned> joints;
   unsigned node = 0, serial_number = 0;
-  bool fd = false, active_low = false;
-  const char *tables = nullptr, *chip = nullptr, *watchdog = nullptr;
+  bool fd = false, active_low = false, fault_high = false;
+  const char *tables = nullptr, *update = nullptr, *chip = nullptr, *watchdog = nullptr;
   std::optional<unsigned> enable, fault, busy;
   int realtime = 0;
 };
@@ -96,6 +99,10 @@ Options parse(int count, char** arguments) {
       options.active_low = true;
       continue;
     }
+    if (name == "--fault-high") {
+      options.fault_high = true;
+      continue;
+    }
     if (i + 1 == count) quit(2, arguments[i], ": not an option, or one without its value; --help lists them");
     const char* const option = arguments[i];
     const char* const value = arguments[++i];
@@ -107,6 +114,8 @@ Options parse(int count, char** arguments) {
       options.node = number(option, value, 1, fxdyn::canopen::largest_node_id);
     else if (name == "--tables")
       options.tables = value;
+    else if (name == "--update")
+      options.update = value;
     else if (name == "--gpio-chip")
       options.chip = value;
     else if (name == "--enable")
@@ -152,11 +161,11 @@ struct Output {
   Status set(bool on) { return pin.is_open() ? pin.set(on) : Status::ok; }
 };
 
-template <class Pin>
-void open_pin(Pin& pin, const Options& options, const std::optional<unsigned>& line, const char* name) {
+/// `how`: polarity, and of an output what it shows at first.
+template <class Pin, class... How>
+void open_pin(Pin& pin, const Options& options, const std::optional<unsigned>& line, const char* name, How... how) {
   if (!line) return;
-  const auto polarity = options.active_low ? os::Polarity::active_low : os::Polarity::active_high;
-  if (pin.open(options.chip, *line, name, polarity) == Status::ok) return;
+  if (pin.open(options.chip, *line, name, how...) == Status::ok) return;
   const char* remedy = errno == EACCES   ? ": no permission: sudo usermod -aG gpio $USER, and log in anew"
                        : errno == EBUSY  ? ": taken by another program: gpioinfo says which"
                        : errno == EINVAL ? ": no such line: gpioinfo lists them"
@@ -177,16 +186,22 @@ std::string remedy_of_watchdog(int number) {
   return std::strerror(number) + std::string(remedy);
 }
 
-constinit fxdyn::TablePage<Model> loaded_page{};
+using Page = fxdyn::TablePage<Model>;
+using Tables = fxdyn::ChosenTables<Model>;
+constexpr Page nothing{{.magic = 0}, {}};  // as an empty slot
+constinit Page loaded_page = nothing, update_page = nothing;
 
-/// The tables to compute with: those of a file where there is one, whether they are valid or not, since the node has to
-/// say so.
-const fxdyn::TablePage<Model>& tables_of(const Options& options) {
-  if (options.tables == nullptr) return fxdyn::tables::page;
-  std::ifstream file(options.tables, std::ios::binary);
-  if (!file) quit(2, options.tables, ": can't be read: `fxdyn export` writes tables.bin");
-  file.read(reinterpret_cast<char*>(&loaded_page), sizeof loaded_page);
-  return loaded_page;
+void load(const char* name, Page& page) {
+  std::ifstream file(name, std::ios::binary);
+  if (!file) quit(2, name, ": can't be read: `fxdyn export` and `fxdyn update` write tables.bin");
+  file.read(reinterpret_cast<char*>(&page), sizeof page);
+}
+
+/// The tables to compute with, whether they are valid or not, since the node has to say so.
+Tables tables_of(const Options& options) {
+  if (options.tables != nullptr) load(options.tables, loaded_page);
+  if (options.update != nullptr) load(options.update, update_page);
+  return fxdyn::choose_tables(options.tables != nullptr ? loaded_page : fxdyn::tables::page, update_page);
 }
 
 void prepare_real_time(int priority) {
@@ -266,15 +281,17 @@ class Node {
 template <class M, class Bus>
 class NodeOf final : public Node {
  public:
-  NodeOf(const Options& options, const fxdyn::TablePage<Model>& page, std::uint32_t id) : reporter_(options) {
+  NodeOf(const Options& options, const Tables& tables, std::uint32_t id) : reporter_(options) {
     open(options);
-    static_assert(sizeof parameters_ == sizeof page.parameters);
-    std::memcpy(static_cast<void*>(&parameters_), &page.parameters, sizeof parameters_);
-    const bool valid = fxdyn::page_is_valid(page);
+    static_assert(sizeof parameters_ == sizeof tables.page.parameters);
+    std::memcpy(static_cast<void*>(&parameters_), &tables.page.parameters, sizeof parameters_);
     std::fprintf(stderr, "fxdyn_node: node %u on %s, %zu of %zu joints, tables %08x%s, costs in %s, watchdog %s\n", id,
-                 options.can, M::outputs, M::joints, page.header.crc32, valid ? "" : " INVALID: stays pre-operational",
-                 counter_.unit(), watchdog_.armed() ? "armed" : "none");
-    node_.emplace(hardware_, fxdyn::NodeTables<M>{parameters_, page.header, valid, options.tables != nullptr, rated},
+                 options.can, M::outputs, M::joints, tables.header.crc32,
+                 tables.valid ? "" : " INVALID: stays pre-operational", counter_.unit(),
+                 watchdog_.armed() ? "armed" : "none");
+    if (options.update != nullptr)
+      std::fprintf(stderr, "fxdyn_node: %s: %s\n", options.update, fxdyn::name_of(tables.update).data());
+    node_.emplace(hardware_, fxdyn::NodeTables<M>{parameters_, tables.header, tables.valid, tables.update, rated},
                   fxdyn::NodeSettings{
                       .id = static_cast<std::uint8_t>(id), .serial_number = options.serial_number, .board = "linux"});
   }
@@ -288,9 +305,11 @@ class NodeOf final : public Node {
  private:
   void open(const Options& options) {
     if (const auto result = bus_.open(options.can, filters); !result) quit(1, os::explain(result, options.can).c_str());
-    open_pin(enable_.pin, options, options.enable, "fxdyn enable");
-    open_pin(fault_.pin, options, options.fault, "fxdyn fault");
-    open_pin(busy_.pin, options, options.busy, "fxdyn tick-busy");
+    const auto polarity = options.active_low ? os::Polarity::active_low : os::Polarity::active_high;
+    open_pin(enable_.pin, options, options.enable, "fxdyn enable", polarity);
+    open_pin(fault_.pin, options, options.fault, "fxdyn fault",
+             options.fault_high ? os::Polarity::active_high : os::Polarity::active_low, fxdyn::hal::AtStart::on);
+    open_pin(busy_.pin, options, options.busy, "fxdyn tick-busy", polarity);
     if (options.watchdog != nullptr && watchdog_.open(options.watchdog, 1) != Status::ok)
       quit(1, options.watchdog, ": ", remedy_of_watchdog(errno).c_str());
   }
@@ -310,31 +329,30 @@ class NodeOf final : public Node {
 };
 
 template <class M>
-std::unique_ptr<Node> make_node(const Options& options, const fxdyn::TablePage<Model>& page, std::uint32_t id) {
-  if (options.fd) return std::make_unique<NodeOf<M, os::SocketCan<fxdyn::hal::FdFrame>>>(options, page, id);
-  return std::make_unique<NodeOf<M, os::SocketCan<fxdyn::hal::ClassicFrame>>>(options, page, id);
+std::unique_ptr<Node> make_node(const Options& options, const Tables& tables, std::uint32_t id) {
+  if (options.fd) return std::make_unique<NodeOf<M, os::SocketCan<fxdyn::hal::FdFrame>>>(options, tables, id);
+  return std::make_unique<NodeOf<M, os::SocketCan<fxdyn::hal::ClassicFrame>>>(options, tables, id);
 }
 
 /// The node that puts out joint `joint` alone.
 template <std::size_t j = 0>
-std::unique_ptr<Node> make_joint_node(const Options& options, const fxdyn::TablePage<Model>& page, unsigned joint,
-                                      std::uint32_t id) {
+std::unique_ptr<Node> make_joint_node(const Options& options, const Tables& tables, unsigned joint, std::uint32_t id) {
   if constexpr (j < Model::joints) {
-    if (joint == j + 1) return make_node<typename WithOutputs<1U << j, Model>::type>(options, page, id);
-    return make_joint_node<j + 1>(options, page, joint, id);
+    if (joint == j + 1) return make_node<typename WithOutputs<1U << j, Model>::type>(options, tables, id);
+    return make_joint_node<j + 1>(options, tables, joint, id);
   }
   return nullptr;
 }
 
 std::vector<std::unique_ptr<Node>> make_nodes(const Options& options) {
   std::vector<std::unique_ptr<Node>> nodes;
-  const fxdyn::TablePage<Model>& page = tables_of(options);
+  const Tables tables = tables_of(options);
   constexpr auto first_joint = static_cast<std::uint32_t>(std::countr_zero(Model::outputs_mask)) + 1;
   if (options.joints.empty())
-    nodes.push_back(make_node<Model>(options, page, options.node != 0 ? options.node : first_joint));
+    nodes.push_back(make_node<Model>(options, tables, options.node != 0 ? options.node : first_joint));
   for (std::uint32_t i = 0; i < options.joints.size(); ++i) {
     const unsigned joint = options.joints[i];
-    nodes.push_back(make_joint_node(options, page, joint, options.node != 0 ? options.node + i : joint));
+    nodes.push_back(make_joint_node(options, tables, joint, options.node != 0 ? options.node + i : joint));
   }
   return nodes;
 }

@@ -20,7 +20,7 @@ int main() {
   using Counter = fxdyn::hal::mps2::ExactSysTick;
   Counter counter;
   static fxdyn::ReplayNode<fxdyn::tables::Model, fxdyn::hal::mps2::Uart, Counter> node(
-      uart, counter, tables.page.parameters, {tables.page.header.layout_hash, tables.page.header.crc32, tables.valid});
+      uart, counter, tables.page.parameters, {tables.header.layout_hash, tables.header.crc32, tables.valid});
   for (;;) {
     if (!node.poll()) uart.wait();
   }

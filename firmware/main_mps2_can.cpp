@@ -1,4 +1,5 @@
 // The drive node on an Arm MPS2 board, its CAN bus an SLCAN line over UART0: nothing but the wiring.
+//   EXP1 enable in (low: torque may go out), EXP2 fault out (low: fault), EXP3 tick-busy out
 
 #include FXDYN_TABLES_HEADER
 
@@ -46,7 +47,7 @@ int main() {
   mps2::MicrosecondClock clock;
   Counter counter;
   mps2::InputPin<1, false> enable;  // active low: an emulator's pins read as 0
-  mps2::OutputPin<2, true> fault;
+  mps2::OutputPin<2, false> fault(fxdyn::hal::AtStart::on);
   TickBusy tick_busy;
   static fxdyn::hal::SlcanBus bus(uart);
   static fxdyn::DriveHardware hardware{bus, clock, counter, watchdog, enable, fault, tick_busy};
@@ -54,7 +55,7 @@ int main() {
   const bool watchdog_reset = watchdog.made_the_reset();
   watchdog.start(1'000'000);  // an emulator on a loaded machine stands still for a while
   const bool wakes_up = wake_up.start(Node::longest_sleep_us) == fxdyn::hal::Status::ok;
-  static Node node(hardware, {tables.page.parameters, tables.page.header, tables.valid, tables.is_update, rated},
+  static Node node(hardware, {tables.page.parameters, tables.header, tables.valid, tables.update, rated},
                    {.board = FXDYN_BOARD_NAME,
                     .watchdog_reset = watchdog_reset,
                     .hardware_failed = wakes_up ? std::uint8_t{0} : fxdyn::hardware_part::wake_up_timer});

@@ -1,6 +1,6 @@
 // The drive node on a Cortex-R5F of the Zynq UltraScale+, behind its CAN controller 0: nothing but the wiring. Clocks
 // and pins are the boot loader's.
-//   MIO 13 enable in (low: torque may go out), MIO 14 fault out, MIO 15 tick-busy out
+//   MIO 13 enable in (low: torque may go out), MIO 14 fault out (low: fault), MIO 15 tick-busy out
 
 #include FXDYN_TABLES_HEADER
 
@@ -25,7 +25,9 @@ constexpr auto timing = fxdyn::hal::bit_timing(board::can_limits, board::can_clo
 constexpr auto format = board::FrameFormat::qemu_7;
 // QEMU 7.2 has neither GPIO nor watchdog there: an access would be an abort.
 using Enable = fxdyn::hal::FixedInput;
-using Fault = fxdyn::hal::AbsentOutput;
+struct Fault : fxdyn::hal::AbsentOutput {
+  explicit Fault(fxdyn::hal::AtStart) {}
+};
 using TickBusy = fxdyn::hal::AbsentOutput;
 struct Watchdog : fxdyn::hal::AbsentWatchdog {
   Status start(std::uint32_t) { return Status::ok; }
@@ -33,7 +35,7 @@ struct Watchdog : fxdyn::hal::AbsentWatchdog {
 #else
 constexpr auto format = board::FrameFormat::controller;
 using Enable = board::InputPin<13, false>;
-using Fault = board::OutputPin<14, true>;
+using Fault = board::OutputPin<14, false>;
 using TickBusy = board::OutputPin<15, true>;
 using Watchdog = board::Watchdog;
 #endif
@@ -45,7 +47,7 @@ int main() {
   board::CycleCounter counter;
   Watchdog watchdog;
   Enable enable;
-  Fault fault;
+  Fault fault(fxdyn::hal::AtStart::on);
   TickBusy tick_busy;
   board::BasicXcan<format, board::MicrosecondClock> can(clock);
   namespace part = fxdyn::hardware_part;
@@ -54,7 +56,7 @@ int main() {
   if (watchdog.start(50) != Status::ok) failed |= part::watchdog;
   static fxdyn::DriveHardware hardware{can, clock, counter, watchdog, enable, fault, tick_busy};
   static fxdyn::DriveNode<Model, decltype(hardware)> node(
-      hardware, {tables.page.parameters, tables.page.header, tables.valid, tables.is_update, rated},
+      hardware, {tables.page.parameters, tables.header, tables.valid, tables.update, rated},
       {.board = FXDYN_BOARD_NAME, .hardware_failed = failed});
   for (;;) static_cast<void>(node.poll());
 }

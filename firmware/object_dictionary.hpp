@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "firmware/canopen.hpp"
+#include "model/wrapping.hpp"
 
 // The object dictionary of a drive node, in one list. The SDO server reads it; EDS and DBC are printed from it
 // (host_tools/dictionary). Joint j is sub-index j of an array and index offset j - 1 of a PDO, whether the node puts
@@ -90,6 +91,8 @@ enum class Variable : std::uint8_t {
   joints,
   outputs,
   page,
+  sequence,
+  update_slot,
   counter,
   cost,
   label,
@@ -97,6 +100,7 @@ enum class Variable : std::uint8_t {
   step_limit,
   tolerated_ticks,
   tick_parity,
+  patience,
   fractional_bits,
   velocity_limit,
   acceleration_limit,
@@ -154,10 +158,15 @@ inline constexpr std::size_t error_fields = 8;  ///< history of 0x1003
 
 /// Values after a reset; the EDS tells the same.
 namespace defaults {
-inline constexpr std::uint32_t heartbeat_ms = 100, emergency_inhibit_100us = 100, ramp_ticks = 50, tolerated_ticks = 1;
+inline constexpr std::uint32_t heartbeat_ms = 100, emergency_inhibit_100us = 100, ramp_ticks = 50, tolerated_ticks = 1,
+                               patience_ms = 100;
 /// 0x1029:1. 1: communication errors don't change the NMT state, since they ramp the torque to zero anyway.
 inline constexpr std::uint32_t error_behaviour = 1;
 }  // namespace defaults
+
+/// 0x1006 where it is not 0: the tables' tick to 1 %, since they hold for no other.
+constexpr std::uint32_t shortest_period_us(std::uint32_t tick_us) { return tick_us - tick_us / 100; }
+constexpr std::uint32_t longest_period_us(std::uint32_t tick_us) { return tick_us + tick_us / 100; }
 
 inline constexpr const char* device_name = "fxdyn drive node";
 inline constexpr std::uint32_t product_code = 0x3144'5846;  ///< "FXD1"
@@ -303,6 +312,10 @@ inline constexpr auto described = [] {
       member(0x2000, 4, u8, ro, V::joints, "Tables", "Joints of the robot"),
       member(0x2000, 5, u32, ro, V::outputs, "Tables", "Joints whose torque this node puts out, a bit each"),
       member(0x2000, 6, u8, ro, V::page, "Tables", "Page: 0 built in, 1 update"),
+      member(0x2000, 7, u32, ro, V::sequence, "Tables", "Sequence number"),
+      member(0x2000, 8, u8, ro, V::update_slot, "Tables",
+             "Slot for updates: 0 empty, 1 used, 2 same, refused: 3 older, 4 other origin, 5 other layout, 6 damaged, "
+             "7 unreadable"),
       counter(Counter::ticks, "Fresh ticks"),
       counter(Counter::stale_ticks, "Stale ticks"),
       counter(Counter::overdue_syncs, "Stale ticks since SYNC was overdue"),
@@ -339,6 +352,9 @@ inline constexpr auto described = [] {
       within(one(0x2013, u8, rw, V::tick_parity, "Lowest bit of a setpoint's acceleration is the tick's parity", "",
                  number, 0),
              0, 1),
+      within(one(0x2014, u16, rw, V::patience, "Time without SYNC after which torque goes, where 0x1006 is 0", "ms",
+                 number, defaults::patience_ms),
+             1, 60'000),
       member(0x2020, 1, u8, fixed, V::fractional_bits, "Fractional bits", "Position"),
       member(0x2020, 2, u8, fixed, V::fractional_bits, "Fractional bits", "Velocity"),
       member(0x2020, 3, u8, fixed, V::fractional_bits, "Fractional bits", "Acceleration"),
@@ -413,7 +429,7 @@ constexpr canopen::Abort find(const Extent& extent, std::uint16_t index, std::ui
   bool index_exists = false;
   std::size_t highest = 0;
   for (const Entry& entry : entries) {
-    const std::size_t offset = static_cast<std::size_t>(index) - entry.index;  // huge where the index is smaller
+    const std::size_t offset = wrapping_subtract(std::size_t{index}, entry.index);  // huge where the index is smaller
     if (!extent.stands_at(entry, offset)) continue;
     index_exists = true;
     const std::size_t last = entry.array == 0 ? entry.sub_index : extent.length(entry);

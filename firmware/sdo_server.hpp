@@ -8,14 +8,16 @@
 #include <span>
 
 #include "firmware/canopen.hpp"
+#include "model/wrapping.hpp"
 
 namespace fxdyn {
 
 /// What an SDO server needs of a dictionary. `Object` names one entry, found by index and sub-index.
-///   find   Abort::none: `object` is set
-///   size   bytes of the object; `fixed` false for strings, whose size is then the most they hold
-///   read   value into `to` (largest_object bytes), returns its bytes
-///   write  Abort::none: the value is taken
+///   find      Abort::none: `object` is set
+///   has_data  whether it can be read now
+///   size      bytes of the object; `fixed` false for strings, whose size is then the most they hold
+///   read      value into `to` (largest_object bytes), returns its bytes
+///   write     Abort::none: the value is taken
 template <class T>
 concept SdoDictionary = requires(T& dictionary, typename T::Object& object, std::uint8_t* to,
                                  std::span<const std::uint8_t> from) {
@@ -24,6 +26,7 @@ concept SdoDictionary = requires(T& dictionary, typename T::Object& object, std:
   { object.writable() } -> std::same_as<bool>;
   { object.has_fixed_size() } -> std::same_as<bool>;
   { object.size() } -> std::same_as<std::size_t>;
+  { dictionary.has_data(object) } -> std::same_as<bool>;
   { dictionary.read(object, to) } -> std::same_as<std::size_t>;
   { dictionary.write(object, from) } -> std::same_as<canopen::Abort>;
 };
@@ -70,7 +73,7 @@ class SdoServer {
 
   /// True where a transfer was given up for want of its next segment: `answer` says so.
   bool time_out(std::uint32_t now_us, Bytes& answer) {
-    if (transfer_ == Transfer::none || now_us - last_us_ < timeout_us) return false;
+    if (transfer_ == Transfer::none || wrapping_subtract(now_us, last_us_) < timeout_us) return false;
     write_abort(canopen::Abort::timed_out, answer);
     return true;
   }
@@ -148,6 +151,7 @@ class SdoServer {
   template <class Dictionary>
   canopen::Abort begin_upload(Dictionary& dictionary, Bytes& answer) {
     if (!object_.readable()) return canopen::Abort::write_only;
+    if (!dictionary.has_data(object_)) return canopen::Abort::no_data;
     told_size_ = static_cast<std::uint32_t>(dictionary.read(object_, buffer_.data()));
     put_multiplexer(answer);
     if (told_size_ > 0 && told_size_ <= 4) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 namespace fxdyn::hal {
@@ -33,33 +34,74 @@ struct BitRate {
 inline void no_bit_timing_gives_this_bit_rate_from_this_clock() {}
 
 /// Prescaler and segments that give exactly the bit rate, with the sample point nearest to what is wanted; of equals
-/// the one with most quanta. Where the controller has none, it does not compile.
+/// the one with most quanta, then the one that samples earlier, since its clock may be further off. Where the
+/// controller has none, it does not compile.
 consteval BitTiming bit_timing(BitTimingLimits limits, std::uint32_t clock_hz, BitRate wanted) {
   BitTiming best;
-  std::uint32_t best_distance = wanted.tolerance_permille + 1;
+  std::uint64_t best_distance = 0;  // of the sample point, in quanta / 1000
   for (std::uint32_t prescaler = 1; prescaler <= limits.largest_prescaler; ++prescaler) {
     const std::uint64_t per_quantum = std::uint64_t{prescaler} * wanted.bits_per_second;
     if (per_quantum == 0 || clock_hz % per_quantum != 0) continue;
     const std::uint64_t quanta = clock_hz / per_quantum;
     if (quanta < wanted.fewest_quanta || quanta > std::uint64_t{1} + limits.largest_segment1 + limits.largest_segment2)
       continue;
-    for (std::uint32_t segment2 = limits.smallest_segment2; segment2 <= limits.largest_segment2; ++segment2) {
-      if (quanta < std::uint64_t{1} + limits.smallest_segment1 + segment2) break;
+    for (std::uint32_t segment2 = limits.largest_segment2; segment2 >= limits.smallest_segment2; --segment2) {
+      if (quanta < std::uint64_t{1} + limits.smallest_segment1 + segment2) continue;
       const auto segment1 = static_cast<std::uint32_t>(quanta) - 1 - segment2;
-      if (segment1 > limits.largest_segment1) continue;
-      const BitTiming timing{prescaler, segment1, segment2,
-                             segment2 < limits.largest_jump_width ? segment2 : limits.largest_jump_width};
-      const std::uint32_t sample = timing.sample_permille();
-      const std::uint32_t distance =
-          sample > wanted.sample_permille ? sample - wanted.sample_permille : wanted.sample_permille - sample;
-      if (distance < best_distance) {
-        best_distance = distance;
-        best = timing;
-      }
+      if (segment1 > limits.largest_segment1) break;
+      const std::uint64_t sample = std::uint64_t{1000} * (1 + segment1), target = quanta * wanted.sample_permille;
+      const std::uint64_t distance = sample > target ? sample - target : target - sample;
+      if (distance > quanta * wanted.tolerance_permille) continue;
+      if (best.prescaler != 0 && distance * best.quanta() >= best_distance * quanta) continue;
+      best_distance = distance;
+      best = {prescaler, segment1, segment2, std::min(segment2, limits.largest_jump_width)};
     }
   }
   if (best.prescaler == 0) no_bit_timing_gives_this_bit_rate_from_this_clock();
   return best;
+}
+
+/// What part of a bit the bus takes: there and back, transceivers included. Quanta, rounded up.
+consteval std::uint32_t propagation_quanta(BitTiming timing, std::uint32_t clock_hz, std::uint32_t there_and_back_ns) {
+  const std::uint64_t per_second = std::uint64_t{timing.prescaler} * 1'000'000'000;
+  return static_cast<std::uint32_t>((std::uint64_t{there_and_back_ns} * clock_hz + per_second - 1) / per_second);
+}
+
+/// How far every clock of a bus may be off, in millionths, rounded down; two nodes are then twice as far apart. F.
+/// Hartwich, A. Bassemir, "The Configuration of the CAN Bit Timing" (6th iCC, 1999), is in ISO 11898-1:
+///   1. the jump width corrects what ten bits without an edge add up to;
+///   2. the bit after an error flag, up to 13 bits after the last edge, is sampled within the phase segments.
+/// `propagation`: quanta of `segment1` that are the propagation segment; the rest is phase segment 1. 0: not possible.
+consteval std::uint32_t clock_tolerance_ppm(BitTiming nominal, std::uint32_t propagation) {
+  if (propagation >= nominal.segment1) return 0;
+  const std::uint64_t bit = nominal.quanta(), phase = std::min(nominal.segment1 - propagation, nominal.segment2);
+  const std::uint64_t jump = std::min<std::uint64_t>(nominal.jump_width, phase);
+  return static_cast<std::uint32_t>(
+      std::min(1'000'000 * jump / (20 * bit), 1'000'000 * phase / (2 * (13 * bit - nominal.segment2))));
+}
+
+/// The same with the bit rate switched. A. Mutter, "Robustness of a CAN FD Bus System" (14th iCC, 2013), adds:
+///   3. as 1, in the data phase;
+///   4. as 2, where the error flag begins in the data phase: 6 fast bits, then 7 slow ones;
+///   5. the switch, as late as two slow bits after the last edge: the jump width of the data phase corrects that, less
+///      what a slower quantum before the switch leaves.
+/// What transceivers make longer or shorter of a fast bit is not in it.
+consteval std::uint32_t clock_tolerance_ppm(BitTiming nominal, BitTiming data, std::uint32_t propagation) {
+  const std::uint32_t classic = clock_tolerance_ppm(nominal, propagation);
+  if (classic == 0) return 0;
+  const std::uint64_t bit = nominal.quanta(), fast = data.quanta(), slow_clock = nominal.prescaler,
+                      fast_clock = data.prescaler;
+  const std::uint64_t phase = std::min(nominal.segment1 - propagation, nominal.segment2);
+  const std::uint64_t third = 1'000'000 * std::uint64_t{data.jump_width} / (20 * fast);
+  const std::uint64_t fourth =
+      1'000'000 * phase * slow_clock / (2 * ((6 * fast - data.segment2) * fast_clock + 7 * bit * slow_clock));
+  // in periods of the clock, so that the prescalers' ratio needs no fraction
+  const std::uint64_t jump = data.jump_width * fast_clock, lost = slow_clock > fast_clock ? slow_clock - fast_clock : 0;
+  const std::uint64_t fifth =
+      jump <= lost ? 0
+                   : 1'000'000 * (jump - lost) /
+                         (2 * ((2 * bit - nominal.segment2) * slow_clock + (data.segment2 + 4 * fast) * fast_clock));
+  return static_cast<std::uint32_t>(std::min({std::uint64_t{classic}, third, fourth, fifth}));
 }
 
 }  // namespace fxdyn::hal

@@ -16,8 +16,8 @@ namespace fxdyn::raw {
 constexpr std::int32_t lower_half(std::int32_t pair) { return static_cast<std::int16_t>(pair); }
 constexpr std::int32_t upper_half(std::int32_t pair) { return pair >> 16; }
 constexpr std::int32_t pack(std::int32_t lower, std::int32_t upper) {
-  return static_cast<std::int32_t>((static_cast<std::uint32_t>(lower) & 0xffffU) | static_cast<std::uint32_t>(upper)
-                                                                                       << 16);
+  return static_cast<std::int32_t>((static_cast<std::uint32_t>(lower) & 0xffffU) |
+                                   wrapping_shift_left(static_cast<std::uint32_t>(upper), 16));
 }
 
 constexpr std::int32_t pack_upper_halves(std::int32_t lower, std::int32_t upper) {
@@ -43,7 +43,7 @@ struct DualSum {
   }
   /// sum 2^-shift, 0 < shift < 32, rounded down, for a result of 32 bits
   constexpr std::int32_t shifted(int shift) const {
-    return static_cast<std::int32_t>(low >> shift | static_cast<std::uint32_t>(high) << (32 - shift));
+    return static_cast<std::int32_t>(low >> shift | wrapping_shift_left(static_cast<std::uint32_t>(high), 32 - shift));
   }
   /// += a_lower b_lower + a_upper b_upper
   constexpr void add(std::int32_t a, std::int32_t b) {
@@ -127,11 +127,12 @@ inline constexpr int tanh_table_step_bits = 10;  ///< step 1/64
 inline constexpr auto tanh_lines = [] {
   std::array<std::int32_t, 1024> table{};
   for (int i = 0; i < 1024; ++i) {
-    const double from = (i - 512) / 64.0, to = (i - 511) / 64.0;
-    const auto tanh_of = [](double x) {
-      return x < 0 ? -series::hyperbolic_tangent(-x) : series::hyperbolic_tangent(x);
+    const auto tanh_of = [](int x) {  // of x / 128
+      const double size = series::hyperbolic_tangents[static_cast<std::size_t>(x < 0 ? -x : x)];
+      return x < 0 ? -size : size;
     };
-    const double f0 = tanh_of(from), f1 = tanh_of(to), bow = (tanh_of((from + to) / 2) - (f0 + f1) / 2) / 2;
+    const int from = 2 * (i - 512), to = from + 2;
+    const double f0 = tanh_of(from), f1 = tanh_of(to), bow = (tanh_of(from + 1) - (f0 + f1) / 2) / 2;
     const double scale = activation_one * 65536.0;
     const double slope = (f1 - f0) * scale / (1 << tanh_table_step_bits);
     const auto slope_raw = static_cast<std::int32_t>(slope + 0.5);  // never negative

@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "model/quantity.hpp"
+#include "model/wrapping.hpp"
 
 #ifdef __ARM_FEATURE_SAT
 #include <arm_acle.h>
@@ -31,7 +32,7 @@ inline constexpr std::int64_t min32 = std::numeric_limits<std::int32_t>::min();
 /// x * 2^-shift, rounded half up (towards +infinity on a tie) for shift > 0, exact for shift <= 0. The rounding is
 /// added after the shift, so that it can't overflow.
 constexpr std::int64_t shift_right(std::int64_t x, int shift) {
-  if (shift <= 0) return static_cast<std::int64_t>(static_cast<std::uint64_t>(x) << -shift);
+  if (shift <= 0) return static_cast<std::int64_t>(wrapping_shift_left(static_cast<std::uint64_t>(x), -shift));
   return (x >> shift) + ((x >> (shift - 1)) & 1);
 }
 
@@ -81,7 +82,7 @@ constexpr std::int32_t limit(std::int32_t x, std::int32_t lower, std::int32_t up
   const std::int32_t raised = x > lower ? x : lower;
   const std::int32_t result = raised < upper ? raised : upper;
   const auto difference = static_cast<std::uint32_t>(result ^ x);
-  outside = (difference | (0U - difference)) >> 31;
+  outside = (difference | wrapping_negate(difference)) >> 31;
   return result;
 }
 
@@ -108,9 +109,9 @@ struct Wide {
   std::int64_t raw = 0;
   // Unsigned inside: whatever stands in a table that was flashed with a valid CRC, a sum wraps and nothing else
   // happens.
-  friend constexpr Wide operator+(Wide a, Wide b) { return wrapped(unsigned_of(a) + unsigned_of(b)); }
-  friend constexpr Wide operator-(Wide a, Wide b) { return wrapped(unsigned_of(a) - unsigned_of(b)); }
-  friend constexpr Wide operator-(Wide a) { return wrapped(0U - unsigned_of(a)); }
+  friend constexpr Wide operator+(Wide a, Wide b) { return wrapped(wrapping_add(unsigned_of(a), unsigned_of(b))); }
+  friend constexpr Wide operator-(Wide a, Wide b) { return wrapped(wrapping_subtract(unsigned_of(a), unsigned_of(b))); }
+  friend constexpr Wide operator-(Wide a) { return wrapped(wrapping_negate(unsigned_of(a))); }
 
  private:
   static constexpr std::uint64_t unsigned_of(Wide x) { return static_cast<std::uint64_t>(x.raw); }

@@ -52,27 +52,55 @@ constexpr JointInput<N> joint_input(const JointState<N>& joint, const JointConst
 /// delta from tick to tick, its derivatives, within the joint's limits. Zero derivatives in the first tick.
 template <class N>
 struct Deflection {
+  /// Ticks in a row that skip() may stand for: beyond, the differences begin anew. Extrapolated by constant
+  /// acceleration the error grows with the cube of the ticks; three of them are 6 ms at 2 ms.
+  static constexpr std::uint32_t most_skipped = 3;
+
   Position<N> delta{};
+  Position<N> change{}, change_before{};  ///< of delta over the last tick and the one before
   Velocity<N> rate{};
-  std::uint32_t ticks = 0;  ///< since the start, up to 2
+  std::uint32_t ticks = 0;    ///< since the start or the last skip(), which counts as 2; up to 4
+  std::uint32_t skipped = 0;  ///< in a row
 
   /// @param per_second 1 / tick [1/s]
   constexpr JointState<N> step(const JointState<N>& motor, typename N::DeflectionSum sum, Count<N> per_second,
                                const JointLimits<N>& limits, Saturations& saturations) {
     const auto now = N::template narrow<Position<N>>(sum, saturations);
-    const auto change = N::template narrow<Position<N>>(now - delta, saturations);
-    const auto speed = N::template narrow<Velocity<N>>(change * per_second, saturations);
+    const auto change_now = N::template narrow<Position<N>>(now - delta, saturations);
+    const auto speed = N::template narrow<Velocity<N>>(change_now * per_second, saturations);
     const auto new_rate = select(ticks > 0, speed, Velocity<N>{});
     const auto speed_change = N::template narrow<Velocity<N>>(new_rate - rate, saturations);
     const auto push = N::template narrow<Acceleration<N>>(speed_change * per_second, saturations);
     const auto acceleration = select(ticks > 1, push, Acceleration<N>{});
     delta = now;
+    change_before = change;
+    change = select(ticks > 0, change_now, Position<N>{});
     rate = new_rate;
-    ticks += static_cast<std::uint32_t>(ticks < 2);
+    ticks += static_cast<std::uint32_t>(ticks < 4);
+    skipped = 0;
     return limit_setpoint<N>({N::template narrow<Position<N>>(motor.q - now, saturations),
                               N::template narrow<Velocity<N>>(motor.dq - new_rate, saturations),
                               N::template narrow<Acceleration<N>>(motor.ddq - acceleration, saturations)},
                              limits, saturations);
+  }
+
+  /// A tick that has no setpoints. Delta goes on with its last acceleration, so that the next step() differentiates
+  /// over one tick again: delta <- delta + c, c <- c + (c - c_before). Without it two ticks' change would count as one
+  /// tick's, a jump of the rate that the second difference turns into a spike of torque. The change of a tick after a
+  /// skipped one makes up for the error of the extrapolation: an acceleration out of it would multiply that error from
+  /// gap to gap, so until two changes of their own are known the rate is held.
+  constexpr void skip(Count<N> per_second, Saturations& saturations) {
+    const bool known = ticks == 4 || skipped > 0;
+    const auto growth =
+        select(known, N::template narrow<Position<N>>(change - change_before, saturations), Position<N>{});
+    const bool begins = (ticks < 3 && skipped == 0) || skipped == most_skipped;
+    change_before = change;
+    change = N::template narrow<Position<N>>(change + growth, saturations);
+    delta = N::template narrow<Position<N>>(delta + change, saturations);
+    rate = N::template narrow<Velocity<N>>(change * per_second, saturations);
+    ++skipped;
+    ticks = 2;
+    if (begins) *this = {};
   }
 };
 
@@ -118,6 +146,14 @@ struct JointModel {
     (std::index_sequence_for<Effects...>{});
     return total;
   }
+  /// A tick without setpoints, for the effects that have to go on through it.
+  template <class N>
+  static constexpr void skip(State<N>& state, bool anew, Saturations& saturations) {
+    [&]<std::size_t... i>(std::index_sequence<i...>) {
+      (skip_effect<Effects, N>(std::get<i>(state), anew, saturations), ...);
+    }
+    (std::index_sequence_for<Effects...>{});
+  }
   static constexpr void hash(LayoutHash& hash) {
     hash.add(LinkShape::code);
     hash.add(static_cast<std::int32_t>(sizeof...(Effects)));
@@ -132,6 +168,13 @@ struct JointModel {
     } else {
       hash.add(E::name);
       hash.add(static_cast<std::int32_t>(words_of<E>));
+    }
+  }
+  template <class E, class N, class State>
+  static constexpr void skip_effect(State& state, bool anew, Saturations& saturations) {
+    if constexpr (requires { E::template skip<N>(state, saturations); }) {
+      E::template skip<N>(state, saturations);
+      if (anew) state = {};
     }
   }
   template <class E, class N, ActsOn what, class State, class Sum>
@@ -186,9 +229,10 @@ struct RobotModel {
   using Torques = Eigen::Matrix<Torque<N>, static_cast<int>(outputs), 1>;
 
   /// One tick: setpoints in, feedforward torques out. Total: whatever comes in is limited, saturated and counted. The
-  /// number of instructions does not depend on the values.
-  static Torques tick(const Parameters& parameters, State& state, const Setpoints& setpoints,
+  /// number of instructions does not depend on the values. The tables may be constants: flash is read all the same.
+  static Torques tick(const Parameters& tables, State& state, const Setpoints& setpoints,
                       Saturations& saturations) noexcept {
+    const Parameters& parameters = as_flashed(tables);
     std::array<JointState<N>, joints> limited;
     for (std::size_t i = 0; i < joints; ++i) {
       const auto k = static_cast<int>(i);
@@ -229,6 +273,23 @@ struct RobotModel {
         },
         parameters);
     return tau;
+  }
+
+  /// A tick that had no setpoints (lost on the bus, say), `times` in a row: call it before the next tick(), so that
+  /// what is differentiated from tick to tick goes on by itself (Deflection::skip). What effects remember stands still
+  /// meanwhile: it lags by these ticks, which makes no step.
+  static void skip(const Parameters& parameters, State& state, std::uint32_t times, Saturations& saturations) noexcept {
+    if constexpr (deflects) {
+      // once more than Deflection can bridge is as good as many times more
+      const std::uint32_t count = times <= Deflection<N>::most_skipped ? times : Deflection<N>::most_skipped + 1;
+      for (std::uint32_t i = 0; i < count; ++i) {
+        for (auto& deflection : state.deflections) deflection.skip(parameters.ticks_per_second, saturations);
+        [&]<std::size_t... j>(std::index_sequence<j...>) {
+          (Joints::template skip<N>(std::get<j>(state.effects), times > Deflection<N>::most_skipped, saturations), ...);
+        }
+        (std::index_sequence_for<Joints...>{});
+      }
+    }
   }
 
   /// Torques of the rigid body for joints `from` .. of states within the limits: the tick's RNEA. One function of its

@@ -3,6 +3,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 
 #include "model/fixed.hpp"
@@ -79,11 +80,21 @@ constexpr double square_root(double x) {
   return root;
 }
 constexpr double inverse_hyperbolic_sine(double x) { return logarithm(x + square_root(x * x + 1)); }
-constexpr double hyperbolic_tangent(double x) {  // x >= 0; exp(-2x) by powers
-  double e = 1;
-  for (int k = 0; k < 32; ++k) e *= exponential(-2 * x / 32);
-  return (1 - e) / (1 + e);
-}
+/// tanh(i / 128), 0 <= i <= 1024, all at once: exp(-2x) is a product of two powers, of which there are few. Compilers
+/// limit the steps that they take for a constant (clang: 2^20).
+inline constexpr auto hyperbolic_tangents = [] {
+  std::array<double, 33> coarse{};  // exp(-i / 2)
+  std::array<double, 32> fine{};    // exp(-i / 64)
+  for (std::size_t i = 0; i < fine.size(); ++i) fine[i] = exponential(-static_cast<double>(i) / 64);
+  coarse[0] = 1;
+  for (std::size_t i = 1; i < coarse.size(); ++i) coarse[i] = coarse[i - 1] * exponential(-0.5);
+  std::array<double, 1025> table{};
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    const double e = coarse[i / 32] * fine[i % 32];
+    table[i] = (1 - e) / (1 + e);
+  }
+  return table;
+}();
 constexpr std::int32_t to_raw(double x, int bits) {
   const double scaled = x * static_cast<double>(std::int64_t{1} << bits);
   return static_cast<std::int32_t>(scaled < 0 ? scaled - 0.5 : scaled + 0.5);
@@ -95,7 +106,8 @@ inline constexpr double pi = 3.14159265358979323846;
 /// sin(2 pi i / 256), one and a quarter turns, 30 bits.
 inline constexpr auto sine_table = [] {
   std::array<std::int32_t, 321> table{};
-  for (int i = 0; i < 321; ++i) table[i] = series::to_raw(series::sine(2 * pi * (i % 256) / 256), 30);
+  for (std::size_t i = 0; i < 321; ++i)
+    table[i] = series::to_raw(series::sine(2 * pi * static_cast<double>(i % 256) / 256), 30);
   return table;
 }();
 
@@ -104,12 +116,13 @@ inline constexpr auto sine_table = [] {
 constexpr SineCosine<std::int32_t> sin_cos_of_phase(std::uint32_t phase) {
   constexpr std::int32_t two_pi = 1686629713;  // 2^28
   constexpr std::int32_t third = 1431655765;   // 2^32
-  const std::uint32_t nearest = phase + (1U << 23);
+  const std::uint32_t nearest = wrapping_add(phase, 1U << 23);
   const std::uint32_t node = nearest >> 24;
-  const std::int32_t h = multiply_high(static_cast<std::int32_t>((nearest << 8) ^ 0x80000000U), two_pi);  // 36 bits
-  const std::int32_t half_square = multiply_high(h, h);                                                   // 41 bits
-  const std::int32_t sine_h = h - (multiply_high(multiply_high(h, half_square), third) >> 9);             // 36 bits
-  const std::int32_t versine = half_square >> 5;                                                          // 36 bits
+  const std::int32_t h =
+      multiply_high(static_cast<std::int32_t>(wrapping_shift_left(nearest, 8) ^ 0x80000000U), two_pi);  // 36 bits
+  const std::int32_t half_square = multiply_high(h, h);                                                 // 41 bits
+  const std::int32_t sine_h = h - (multiply_high(multiply_high(h, half_square), third) >> 9);           // 36 bits
+  const std::int32_t versine = half_square >> 5;                                                        // 36 bits
   const std::int64_t s = sine_table[node];
   const std::int64_t c = sine_table[node + 64];
   return {static_cast<std::int32_t>(s) + proven_narrow<36>(c * sine_h - s * versine),
@@ -134,7 +147,7 @@ constexpr std::uint32_t phase_of_turns(std::int64_t turns, int bits) {
 /// tanh(i / 32), 0 <= x <= 8, 30 bits.
 inline constexpr auto tanh_table = [] {
   std::array<std::int32_t, 257> table{};
-  for (int i = 0; i < 257; ++i) table[i] = series::to_raw(series::hyperbolic_tangent(i / 32.0), 30);
+  for (std::size_t i = 0; i < 257; ++i) table[i] = series::to_raw(series::hyperbolic_tangents[4 * i], 30);
   return table;
 }();
 
@@ -142,11 +155,11 @@ inline constexpr auto tanh_table = [] {
 /// tanh(a): tanh(a + d) = t + d (1 - t^2) (1 - d t) + O(d^3 / 3), |d| <= 1/64.
 constexpr std::int32_t tanh(std::int32_t x) {
   const std::int32_t sign = x >> 31;
-  std::uint32_t size = static_cast<std::uint32_t>(x ^ sign) - static_cast<std::uint32_t>(sign);
+  std::uint32_t size = wrapping_subtract(static_cast<std::uint32_t>(x ^ sign), static_cast<std::uint32_t>(sign));
   constexpr std::uint32_t end = 8U << argument_bits;
   size = size < end ? size : end;
   const std::uint32_t node = (size + (1U << (argument_bits - 6))) >> (argument_bits - 5);
-  const auto d = static_cast<std::int32_t>(size - (node << (argument_bits - 5))) << 5;  // 32 bits
+  const auto d = static_cast<std::int32_t>(wrapping_subtract(size, node << (argument_bits - 5))) << 5;  // 32 bits
   const std::int32_t t = tanh_table[node];
   const std::int32_t slope = (1 << 28) - multiply_high(t, t);      // 28 bits
   const std::int32_t bend = (1 << 30) - multiply_high(d, t);       // 30 bits
@@ -158,7 +171,8 @@ constexpr std::int32_t tanh(std::int32_t x) {
 /// 2^(-i/64), 30 bits.
 inline constexpr auto power_table = [] {
   std::array<std::int32_t, 65> table{};
-  for (int i = 0; i < 65; ++i) table[i] = series::to_raw(series::exponential(-0.69314718055994531 * i / 64), 30);
+  for (std::size_t i = 0; i < 65; ++i)
+    table[i] = series::to_raw(series::exponential(-0.69314718055994531 * static_cast<double>(i) / 64), 30);
   return table;
 }();
 
@@ -188,10 +202,10 @@ struct Parabola {
 /// asinh over 1 + |x| in [2^e, 2^(e+1)), e = 0 .. 7, sixteen segments an octave, interpolated at three points of each.
 inline constexpr auto asinh_table = [] {
   std::array<Parabola, 8 * 16> table{};
-  for (int e = 0; e < 8; ++e) {
-    for (int i = 0; i < 16; ++i) {
-      const double width = static_cast<double>(1 << e) / 16;
-      const double from = static_cast<double>(1 << e) + i * width - 1;
+  for (std::size_t e = 0; e < 8; ++e) {
+    for (std::size_t i = 0; i < 16; ++i) {
+      const double width = static_cast<double>(1U << e) / 16;
+      const double from = static_cast<double>(1U << e) + static_cast<double>(i) * width - 1;
       const double f0 = series::inverse_hyperbolic_sine(from);
       const double f1 = series::inverse_hyperbolic_sine(from + width / 2);
       const double f2 = series::inverse_hyperbolic_sine(from + width);
@@ -207,7 +221,7 @@ constexpr std::int32_t asinh(std::int32_t x) {
   const std::int32_t sign = x >> 31;
   // 1 + |x|, at most 129 * 2^24: fits unsigned
   const std::uint32_t shifted =
-      (static_cast<std::uint32_t>(x ^ sign) - static_cast<std::uint32_t>(sign)) + (1U << ratio_bits);
+      wrapping_subtract(static_cast<std::uint32_t>(x ^ sign), static_cast<std::uint32_t>(sign)) + (1U << ratio_bits);
   const int e = 31 - ratio_bits - std::countl_zero(shifted);
   const std::uint32_t mantissa = shifted << (31 - ratio_bits - e);  // leading one at bit 31
   const Parabola& piece = asinh_table[static_cast<std::uint32_t>(e) * 16 + ((mantissa >> 27) & 15U)];
@@ -218,7 +232,7 @@ constexpr std::int32_t asinh(std::int32_t x) {
 
 constexpr std::int32_t magnitude(std::int32_t x) {
   const auto sign = static_cast<std::uint32_t>(x >> 31);
-  const std::uint32_t size = (static_cast<std::uint32_t>(x) ^ sign) - sign;
+  const std::uint32_t size = wrapping_subtract(static_cast<std::uint32_t>(x) ^ sign, sign);
   return static_cast<std::int32_t>(size - (size >> 31));  // 2^31 becomes the nearest int32, without a branch
 }
 

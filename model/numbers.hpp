@@ -208,7 +208,7 @@ struct FixedNumbers {
     if constexpr (bits >= T::bits)
       return {raw::proven_narrow<bits - T::bits>(x.raw)};
     else
-      return {static_cast<std::int32_t>(static_cast<std::uint32_t>(x.raw) << (T::bits - bits))};
+      return {static_cast<std::int32_t>(wrapping_shift_left(static_cast<std::uint32_t>(x.raw), T::bits - bits))};
   }
   template <class T, class U>
   static constexpr Vector3<T> turned(const Vector3<T>& v, U, U) {

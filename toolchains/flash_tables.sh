@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # flash_tables.sh PREFIX IMAGE.elf TABLES.bin OPENOCD_ARGUMENT..: writes a page of tables into the slot for updates of the
-# board that runs IMAGE, and resets it. Refuses a page of another layout, which the firmware would not take.
+# board that runs IMAGE, and resets it. Refuses a page that IMAGE would not take: of another layout or model, or not newer
+# than its own (its own it takes: that ends an update).
 # PREFIX: of the binutils, e.g. arm-none-eabi-. OPENOCD: another program than openocd.
 set -euo pipefail
 [ $# -ge 4 ] || { echo "usage: flash_tables.sh PREFIX IMAGE.elf TABLES.bin OPENOCD_ARGUMENT.." >&2; exit 2; }
@@ -17,9 +18,19 @@ size=$(stat -c %s "$page")
 own=$(mktemp)
 trap 'rm -f "$own"' EXIT
 "${prefix}objcopy" -O binary --only-section=.fxdyn_tables "$elf" "$own"
-# magic, layout hash, words (model/table_page.hpp)
+# model/table_page.hpp: magic, layout hash, words, CRC; origin, sequence, check
+word() { od -A n -t u4 --endian=little -j $((4 * $2)) -N 4 "$1" | tr -d ' '; }
 if ! cmp -s -n 12 "$own" "$page"; then
   echo "flash_tables: $page is for another model or layout than $elf: build and flash the image anew" >&2
+  exit 1
+fi
+if [ "$(word "$page" 4)" != "$(word "$own" 4)" ]; then
+  echo "flash_tables: $page is an update of another model than $elf has: build and flash the image anew" >&2
+  exit 1
+fi
+is=$(word "$page" 5) has=$(word "$own" 5)
+if [ "$is" -le "$has" ] && ! cmp -s "$own" "$page"; then
+  echo "flash_tables: $page has sequence $is, $elf has $has itself and would not take it: build and flash the image anew" >&2
   exit 1
 fi
 "$(dirname "$0")/openocd.sh" "$@" -c "program {$page} verify reset exit 0x$begin"

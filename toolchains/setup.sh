@@ -15,9 +15,11 @@ packages=(
   gnuplot-nox
   # target
   gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm
-  binutils-aarch64-linux-gnu openocd
+  binutils-aarch64-linux-gnu openocd libunicorn-dev libcapstone-dev
+  # a second compiler, its linker and its checks
+  clang-14 lld-14 libclang-rt-14-dev
   # tests
-  libgtest-dev librapidcheck-dev libbenchmark-dev liborocos-kdl-dev libmujoco-dev libpagmo-dev python3 llvm-14
+  libgtest-dev libunicorn-dev librapidcheck-dev libbenchmark-dev liborocos-kdl-dev libmujoco-dev libpagmo-dev python3 llvm-14
 )
 
 "$(dirname "$0")/install.sh" "${packages[@]}"

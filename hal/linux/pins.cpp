@@ -15,10 +15,10 @@ Status Pin::get_line(const char* chip, unsigned line) {
   return line_ != nullptr ? Status::ok : Status::failed;
 }
 
-Status OutputPin::open(const char* chip, unsigned line, const char* consumer, Polarity polarity) {
+Status OutputPin::open(const char* chip, unsigned line, const char* consumer, Polarity polarity, AtStart start) {
   if (get_line(chip, line) != Status::ok) return Status::failed;
   const int flags = polarity == Polarity::active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0;
-  if (::gpiod_line_request_output_flags(line_, consumer, flags, 0) == 0) return Status::ok;
+  if (::gpiod_line_request_output_flags(line_, consumer, flags, start == AtStart::on ? 1 : 0) == 0) return Status::ok;
   line_ = nullptr;
   return Status::failed;
 }

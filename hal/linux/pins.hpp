@@ -30,8 +30,9 @@ enum class Polarity : std::uint8_t { active_high, active_low };
 
 class OutputPin : public Pin {
  public:
-  /// Drives the line at once, not asserted.
-  Status open(const char* chip, unsigned line, const char* consumer, Polarity polarity = Polarity::active_high);
+  /// Drives the line at once.
+  Status open(const char* chip, unsigned line, const char* consumer, Polarity polarity = Polarity::active_high,
+              AtStart start = AtStart::off);
   Status set(bool on);
 };
 static_assert(hal::OutputPin<OutputPin>);

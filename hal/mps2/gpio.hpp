@@ -15,8 +15,9 @@ class OutputPin {
   static_assert(number >= 0 && number < 16);
 
  public:
-  explicit OutputPin(R registers = {}) : registers_(registers) {
-    write(!active_high);                                   // the level first: enabling the output must not make a pulse
+  explicit OutputPin(R registers = {}) : OutputPin(AtStart::off, registers) {}
+  explicit OutputPin(AtStart start, R registers = {}) : registers_(registers) {
+    write((start == AtStart::on) == active_high);          // the level first: enabling the output must not make a pulse
     registers_.write(gpio0_address + 0x10, 1U << number);  // OUTENSET
   }
   Status set(bool on) {

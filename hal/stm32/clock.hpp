@@ -7,7 +7,7 @@ namespace fxdyn::hal::stm32 {
 /// What the processor runs from.
 enum class ClockSource : std::uint8_t {
   crystal,        ///< full speed from the crystal
-  internal,       ///< full speed from the internal oscillator: 1 % off, good for classic CAN, not for CAN FD
+  internal,       ///< full speed from the internal oscillator, some per cent off
   internal_slow,  ///< the internal oscillator itself, 16 MHz: the PLL did not lock either
 };
 

@@ -38,8 +38,9 @@ void use_alternate_function(R& registers, Address port, std::uint32_t number, st
 template <Address port, std::uint32_t number, bool active_high, Registers R = MemoryMapped>
 class OutputPin {
  public:
-  explicit OutputPin(R registers = {}) : registers_(registers) {
-    write(!active_high);  // the level first: the change of mode must not make a pulse
+  explicit OutputPin(R registers = {}) : OutputPin(AtStart::off, registers) {}
+  explicit OutputPin(AtStart start, R registers = {}) : registers_(registers) {
+    write((start == AtStart::on) == active_high);  // the level first: the change of mode must not make a pulse
     detail::configure(registers_, port, number, detail::Mode::output, Pull::none);
   }
   Status set(bool on) {

@@ -13,7 +13,6 @@
 
 namespace fxdyn::hal::stm32g4 {
 
-/// Bit timings for the two clocks that start_clock() can end with.
 struct FdcanTiming {
   BitTiming nominal, data;
 };
@@ -22,18 +21,21 @@ struct FdcanTiming {
 inline constexpr BitTimingLimits nominal_limits{512, 2, 256, 2, 128, 128};
 inline constexpr BitTimingLimits data_limits{32, 1, 32, 1, 16, 16};
 
-/// The same bit rates from `clock_hz`; impossible ones don't compile. Data phase: sample point 75 % (CiA 601-3 for
+/// Both bit rates from `clock_hz`; impossible ones don't compile. Data phase: sample point 75 % (CiA 601-3 for
 /// 2 Mbit/s).
-consteval FdcanTiming fdcan_timing(std::uint32_t clock_hz, std::uint32_t bit_rate, std::uint32_t data_bit_rate) {
+consteval FdcanTiming fdcan_timing(std::uint32_t clock_hz, std::uint32_t bit_rate, std::uint32_t data_bit_rate,
+                                   std::uint32_t fewest_data_quanta = BitRate{}.fewest_quanta) {
   return {bit_timing(nominal_limits, clock_hz, {.bits_per_second = bit_rate}),
-          bit_timing(data_limits, clock_hz, {.bits_per_second = data_bit_rate, .sample_permille = 750})};
+          bit_timing(data_limits, clock_hz,
+                     {.bits_per_second = data_bit_rate, .sample_permille = 750, .fewest_quanta = fewest_data_quanta})};
 }
 
 /// FDCAN1 (RM0440, "FD controller area network (FDCAN)"), classic and FD frames with the bit rate switched. The
 /// message RAM has a fixed layout: per instance 28 standard filters, 8 extended ones, twice 3 received frames, 3
 /// transmit events, 3 frames to send. Three received frames are 0.35 ms at 1 Mbit/s, so the interrupt moves them to a
 /// ring; the other FIFO stays empty, since the order between setpoints and SYNC counts. Everything is let through until
-/// listen(). One instance, whose on_receive() the interrupt handler calls.
+/// listen(). What waits to be sent is a queue: the lowest identifier goes first, so that no heartbeat that lost the
+/// arbitration keeps a torque waiting. One instance, whose on_receive() the interrupt handler calls.
 template <Registers R = MemoryMapped>
 class BasicFdcan {
  public:
@@ -61,7 +63,7 @@ class BasicFdcan {
                                              << 8);  // to the sample point
     // All filter elements of both kinds; what matches none is rejected. FIFO 0 blocks when full.
     registers_.write(filters, extended_filters << 24 | standard_filters << 16 | 0b10U << 4 | 0b10U << 2);
-    registers_.write(transmit_buffers, 0);  // a FIFO: in the order in which they came
+    registers_.write(transmit_buffers, queue_mode);
     for (Address word = 0; word < message_ram_bytes; word += 4) registers_.write(ram + word, 0);
     registers_.write(ram, accept(0, 0x7ff));
     registers_.write(ram + extended_offset, 1U << 29);         // EFEC: to FIFO 0, from identifier 0 ..
@@ -87,15 +89,19 @@ class BasicFdcan {
     }
   }
 
+  /// busy also while a frame with this identifier waits: in a queue the order of two of them is anyone's guess (RM0440,
+  /// "Tx queue"), and so no identifier takes more than one of the three places.
   Status send(const Frame& frame) {
     if (off_bus()) return Status::failed;
-    const std::uint32_t fifo = registers_.read(transmit_status);
-    if ((fifo & 1U << 21) != 0) return Status::busy;  // TFQF
     const int code = length_code(frame);
     if (code < 0) return Status::failed;
-    const std::uint32_t index = fifo >> 16 & 0b11;  // TFQPI
+    const std::uint32_t queue = registers_.read(transmit_status);
+    if ((queue & 1U << 21) != 0) return Status::busy;  // TFQF
+    const std::uint32_t head = (frame.extended ? 1U << 30 | frame.id : frame.id << 18) | (frame.remote ? 1U << 29 : 0);
+    if (is_waiting(head)) return Status::busy;
+    const std::uint32_t index = queue >> 16 & 0b11;  // TFQPI: the first free one
     const Address element = ram + transmit_offset + index * element_bytes;
-    registers_.write(element, (frame.extended ? 1U << 30 | frame.id : frame.id << 18) | (frame.remote ? 1U << 29 : 0));
+    registers_.write(element, head);
     registers_.write(element + 4, (frame.fd ? 0b11U << 20 : 0) | static_cast<std::uint32_t>(code) << 16);  // FDF, BRS
     for (std::uint32_t at = 0; !frame.remote && at < frame.size; at += 4) {
       std::uint32_t word = 0;  // the message RAM takes whole words only
@@ -103,6 +109,7 @@ class BasicFdcan {
         word |= static_cast<std::uint32_t>(frame.data[at + i]) << 8 * i;
       registers_.write(element + 8 + at, word);
     }
+    heads_[index] = head;
     registers_.write(transmit_request, 1U << index);
     return Status::ok;
   }
@@ -125,7 +132,7 @@ class BasicFdcan {
   /// (RM0440, "Bus_Off recovery"). What was waiting to be sent is too old by then.
   Status restart() {
     if ((registers_.read(control) & init) != 0) {
-      registers_.write(transmit_cancel, 0b111);
+      registers_.write(transmit_cancel, all_places);
       clear_bits(registers_, control, init);
     }
     return off_bus() ? Status::busy : Status::ok;
@@ -174,6 +181,13 @@ class BasicFdcan {
     return -1;
   }
 
+  bool is_waiting(std::uint32_t head) {
+    const std::uint32_t pending = registers_.read(transmit_pending);
+    for (std::uint32_t i = 0; i < heads_.size(); ++i)
+      if ((pending >> i & 1U) != 0 && heads_[i] == head) return true;
+    return false;
+  }
+
   /// Standard filter element: SFT = 0, a range; SFEC = 1, to FIFO 0.
   static constexpr std::uint32_t accept(std::uint32_t first, std::uint32_t last) {
     return 1U << 27 | first << 16 | last;
@@ -188,13 +202,15 @@ class BasicFdcan {
                            interrupt_enable = fdcan1 + 0x54, interrupt_lines = fdcan1 + 0x5c, filters = fdcan1 + 0x80,
                            receive_status = fdcan1 + 0x90, receive_acknowledge = fdcan1 + 0x94,
                            transmit_buffers = fdcan1 + 0xc0, transmit_status = fdcan1 + 0xc4,
-                           transmit_request = fdcan1 + 0xcc, transmit_cancel = fdcan1 + 0xd0,
-                           clock_divider = fdcan1 + 0x100;
+                           transmit_pending = fdcan1 + 0xc8, transmit_request = fdcan1 + 0xcc,
+                           transmit_cancel = fdcan1 + 0xd0, clock_divider = fdcan1 + 0x100;
   // CCCR
   static constexpr std::uint32_t init = 1U << 0, change_enable = 1U << 1, clock_stop = 1U << 4, fd_enable = 1U << 8,
                                  bit_rate_switch = 1U << 9;
   static constexpr std::uint32_t new_in_fifo0 = 1U << 0, lost_in_fifo0 = 1U << 2, all_interrupts = 0x00ff'ffff;  // IR
   static constexpr std::uint32_t passive = 1U << 5, bus_off = 1U << 7;                                           // PSR
+  static constexpr std::uint32_t queue_mode = 1U << 24;  // TXBC: TFQM
+  static constexpr std::uint32_t all_places = 0b111;     // TXBCR
   // Message RAM (RM0440, figure "Message RAM configuration")
   static constexpr Address ram = fdcan1_message_ram;
   static constexpr std::uint32_t element_bytes = 72, extended_offset = 0x70, receive_offset = 0xb0,
@@ -203,6 +219,7 @@ class BasicFdcan {
   static constexpr std::uint32_t tries = 100'000;
 
   [[no_unique_address]] R registers_;
+  std::array<std::uint32_t, 3> heads_{};  ///< identifiers of the places to send from
   Ring<Frame, 16> received_;
   std::atomic<std::uint32_t> lost_{0};  // written by the interrupt
 };

@@ -14,8 +14,9 @@ class OutputPin {
   static_assert(number >= 0 && number < 26);
 
  public:
-  explicit OutputPin(R registers = {}) : registers_(registers) {
-    write(!active_high);                               // the level first: enabling the output must not make a pulse
+  explicit OutputPin(R registers = {}) : OutputPin(AtStart::off, registers) {}
+  explicit OutputPin(AtStart start, R registers = {}) : registers_(registers) {
+    write((start == AtStart::on) == active_high);      // the level first: enabling the output must not make a pulse
     set_bits(registers_, gpio + 0x204, 1U << number);  // DIRM_0
     set_bits(registers_, gpio + 0x208, 1U << number);  // OEN_0
   }

@@ -197,4 +197,9 @@ void Master::write(std::uint8_t node, std::uint16_t index, std::uint8_t sub_inde
   download(node, index, sub_index, std::span{data}.first(std::min<std::size_t>(bytes, 4)));
 }
 
+void Master::use_lockstep(std::uint8_t node, std::chrono::milliseconds patience) {
+  write(node, 0x1006, 0, 0, 4);
+  write(node, 0x2014, 0, static_cast<std::uint32_t>(patience.count()), 2);
+}
+
 }  // namespace fxdyn::can

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -50,6 +51,9 @@ class Master {
   std::uint32_t read(std::uint8_t node, std::uint16_t index, std::uint8_t sub_index);
   std::string read_text(std::uint8_t node, std::uint16_t index, std::uint8_t sub_index);
   void write(std::uint8_t node, std::uint16_t index, std::uint8_t sub_index, std::uint32_t value, std::size_t bytes);
+  /// The node takes SYNC at any rate (0x1006 = 0), as a host in lockstep sends it, and lets the torque go when none has
+  /// come for `patience` (0x2014).
+  void use_lockstep(std::uint8_t node, std::chrono::milliseconds patience);
 
   /// Takes what comes for so long.
   void listen(Duration time);

@@ -29,6 +29,7 @@ struct BusDescription {
   std::uint32_t outputs = 0;  ///< bit i: the node puts out the torque of joint i+1
   std::string software;       ///< version
   std::uint32_t revision = version_number;
+  std::uint32_t tick_us = 0;  ///< of the tables
 
   dictionary::Extent extent() const { return {joints.size(), outputs}; }
 };
@@ -40,6 +41,8 @@ BusDescription describe(const typename Model::Parameters& parameters,
   BusDescription description;
   description.outputs = Model::outputs_mask;
   description.software = software;
+  description.tick_us =
+      static_cast<std::uint32_t>(1e6 / std::ldexp(parameters.ticks_per_second.raw, -count_bits));  // as the node does
   for (std::size_t j = 0; j < Model::joints; ++j) {
     const auto& limits = parameters.constants[j].limits;
     description.joints.push_back(

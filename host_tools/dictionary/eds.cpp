@@ -97,7 +97,9 @@ std::map<int, IndexedObject> objects_of(const BusDescription& description) {
         if (entry.access == Access::read_write && entry.type != Type::visible_string) {
           sub.has_limits = true;
           sub.lowest = entry.lowest;
-          sub.highest = entry.highest;
+          sub.highest = entry.variable == dictionary::Variable::cycle_period
+                            ? std::int64_t{dictionary::longest_period_us(description.tick_us)}
+                            : entry.highest;
         }
         object.subs[entry.sub_index + static_cast<int>(i)] = sub;
       }

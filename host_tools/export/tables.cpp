@@ -8,9 +8,9 @@
 #include "host_tools/files.hpp"
 #include "host_tools/model/broad_learning_types.hpp"
 #include "host_tools/model/effects.hpp"
-#include "model/version.hpp"
 #include "model/catalogue.hpp"
 #include "model/table_page.hpp"
+#include "model/version.hpp"
 
 namespace fxdyn {
 namespace {
@@ -362,7 +362,11 @@ std::uint32_t write_tables(const IdentifiedModel& model, const Formats& formats,
   const FixedModel fixed(model, formats, outputs);
   const std::vector<std::int32_t> words = fixed.words();
   const std::vector<LinkShape> shapes = link_shapes(model, words);
-  const PageHeader header{table_magic, fixed.layout_hash(), static_cast<std::uint32_t>(words.size()), fixed.crc()};
+  const PageHeader header = with_check({.layout_hash = fixed.layout_hash(),
+                                        .words = static_cast<std::uint32_t>(words.size()),
+                                        .crc32 = fixed.crc(),
+                                        .origin = model.lineage.origin,
+                                        .sequence = model.lineage.sequence});
 
   std::string format_lines, model_lines, error_lines, log_lines;
   for (std::size_t i = 0; i < quantity_count; ++i) {
@@ -414,6 +418,9 @@ std::uint32_t write_tables(const IdentifiedModel& model, const Formats& formats,
 
 #include "model/joint_model.hpp"
 
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmissing-braces"  // numbers without braces of their own
+
 namespace fxdyn::tables {{
 
 struct Formats {{
@@ -422,10 +429,12 @@ using Numbers = FixedNumbers<Formats>;
 using Model = RobotModel<Numbers, {:#x}{}>;
 
 [[gnu::section(".fxdyn_tables"), gnu::used]] inline constexpr TablePage<Model> page{{
-  {{{}U, {}U, {}U, {}U}},  // magic, layout hash, words, CRC-32
+  // magic, layout hash, words, CRC-32; origin, sequence, CRC-32 of the header
+  {{{}U, {}U, {}U, {}U, {}U, {}U, {}U}},
   {{
 {}  }}}};
-static_assert(page.header.words == TablePage<Model>::parameter_words && page.header.layout_hash == Model::layout_hash(),
+static_assert(page.header.words == TablePage<Model>::parameter_words && page.header.layout_hash == Model::layout_hash() &&
+                  page.header.check == with_check(page.header).check,
               "these tables are for another version of the model library: export them anew");
 inline constexpr const Model::Parameters& parameters = page.parameters;
 
@@ -433,10 +442,12 @@ inline constexpr const Model::Parameters& parameters = page.parameters;
 inline constexpr std::array<std::int32_t, Model::joints> rated_torque{{{}}};
 
 }}  // namespace fxdyn::tables
+
+#pragma GCC diagnostic pop
 )",
       version, model.project, model.project_hash, driven, model.tick_s, log_lines, error_lines, format_lines, outputs,
-      model_lines, header.magic, header.layout_hash, header.words, header.crc32, parameters_text(model, words, outputs),
-      rated);
+      model_lines, header.magic, header.layout_hash, header.words, header.crc32, header.origin, header.sequence,
+      header.check, parameters_text(model, words, outputs), rated);
   write_file(directory / "tables.hpp", text);
 
   std::string bytes(sizeof header + 4 * words.size(), '\0');

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -11,6 +12,7 @@
 #include "firmware/object_dictionary.hpp"
 #include "host_tools/can/guard.hpp"
 #include "host_tools/error.hpp"
+#include "model/table_page.hpp"
 
 namespace fxdyn {
 namespace {
@@ -18,9 +20,9 @@ namespace {
 using nlohmann::json;
 using namespace std::chrono_literals;
 
-/// In lockstep a tick takes as long as it takes: SYNC counts as overdue after one and a half of these, which is later
-/// than the torques are given up, so that a slow host never makes a node's own timer tick in between.
-constexpr std::uint32_t patient_period_us = 4'000'000;
+/// In lockstep a tick takes as long as it takes: SYNC counts as overdue later than the torques are given up, so that a
+/// slow host never makes a node's own timer tick in between.
+constexpr std::chrono::milliseconds patience = 6s;
 constexpr can::Duration torque_time = 5s;
 constexpr can::Duration answer_time = 500ms, start_time = 10s;
 
@@ -33,7 +35,7 @@ CanDrives::CanDrives(can::Bus& bus, const IdentifiedModel& model, const Settings
   if (ids.empty()) {
     for (std::size_t id = 1; id <= n; ++id) ids.push_back(static_cast<std::uint8_t>(id));
   }
-  const auto patience = master_.sdo_timeout;
+  const auto usual_timeout = master_.sdo_timeout;
   master_.sdo_timeout = answer_time;
   std::uint32_t driven = 0;
   for (const std::uint8_t id : ids) {
@@ -56,7 +58,7 @@ CanDrives::CanDrives(can::Bus& bus, const IdentifiedModel& model, const Settings
     driven |= node.outputs;
     nodes_.push_back(std::move(node));
   }
-  master_.sdo_timeout = patience;
+  master_.sdo_timeout = usual_timeout;
   if (nodes_.empty()) no_answer(fmt::format("no node answers to SDO (ids {})", fmt::join(ids, ", ")));
   for (std::size_t j = 0; j < n; ++j) {
     if ((driven >> j & 1U) == 0)
@@ -141,9 +143,15 @@ void CanDrives::check(const Node& node) {
   if (!is_own && layout != whole.layout_hash())
     throw InputError(fmt::format("node {}: its image was built for another model (layout {:08x}, expected {:08x}): {}",
                                  node.id, layout, own.layout_hash(), image));
-  if (const std::uint32_t crc = (is_own ? own : whole).crc(); node.crc != crc)
-    throw InputError(
-        fmt::format("node {}: holds other tables (CRC {:08x}, expected {:08x}): {}", node.id, node.crc, crc, page));
+  const std::uint32_t crc = (is_own ? own : whole).crc();
+  if (node.crc == crc) return;
+  const auto slot = static_cast<UpdateSlot>(
+      std::min(master_.read(node.id, dictionary::tables, 8), static_cast<std::uint32_t>(UpdateSlot::unreadable)));
+  if (is_refused(slot))
+    throw InputError(fmt::format("node {}: refuses the page in its slot for updates, which is {}: {}", node.id,
+                                 name_of(slot), slot >= UpdateSlot::damaged ? page : image));
+  throw InputError(
+      fmt::format("node {}: holds other tables (CRC {:08x}, expected {:08x}): {}", node.id, node.crc, crc, page));
 }
 
 void CanDrives::restart() {
@@ -154,7 +162,7 @@ void CanDrives::restart() {
     // The boot-up message: a heartbeat may still be one from before the reset.
     master_.wait_for(node.id, canopen::NmtState::initialising, start_time);
     wait_for_zero_torque(node);
-    master_.write(node.id, 0x1006, 0, patient_period_us, 4);
+    master_.use_lockstep(node.id, patience);
     if (heartbeat_of_ != 0)
       master_.write(node.id, 0x1016, 1, std::uint32_t{heartbeat_of_} << 16 | can::Guard::consumer_ms, 4);
     master_.write(node.id, 0x2013, 0, 1, 1);

@@ -323,6 +323,12 @@ class ProjectReader {
       project_.target.tick_s = tick->positive();
       if (project_.target.tick_s < 5e-5 || project_.target.tick_s > 0.1) tick->place().fail("expected 5e-5 .. 0.1 s");
     }
+    if (const auto sequence = table.find("sequence")) {
+      constexpr std::int64_t highest = 0x7FFF'FFFF;  // leaves room for updates
+      const std::int64_t number = sequence->integer(1);
+      if (number > highest) sequence->place().fail(fmt::format("expected 1 .. {}", highest));
+      project_.target.sequence = static_cast<std::uint32_t>(number);
+    }
     if (const auto joints = table.find("joints"); joints && !joints->is_string()) {
       for (const Value& value : joints->items()) {
         const auto joint = static_cast<std::size_t>(value.integer(1));

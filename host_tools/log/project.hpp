@@ -72,6 +72,7 @@ struct TargetSettings {
   std::string board = "mps2-an386";
   double tick_s = 0.002;
   std::vector<std::size_t> joints;  ///< one image for each of these (from 0); empty: one image for all
+  std::uint32_t sequence = 1;       ///< of the exported tables, at least
 };
 
 struct LimitSettings {

@@ -340,6 +340,10 @@ json to_json(const IdentifiedModel& model) {
     out["formats"] = formats_json(*model.formats);
     out["tables_crc"] = model.tables_crc;
   }
+  if (model.lineage.sequence != 0) {
+    out["origin"] = model.lineage.origin;
+    out["sequence"] = model.lineage.sequence;
+  }
   if (model.layout) out["layout"] = {{"parameters", model.layout->parameters}, {"node_bits", model.layout->node_bits}};
   if (!model.updates.empty()) out["updates"] = logs_json(model.updates);
   return out;
@@ -389,6 +393,7 @@ IdentifiedModel read_model(const std::filesystem::path& file) {
       model.formats = to_formats(j.at("formats"));
       model.tables_crc = j.at("tables_crc");
     }
+    model.lineage = {j.value("origin", 0U), j.value("sequence", 0U)};
     if (j.contains("layout")) {
       model.layout = {j.at("layout").at("parameters").get<std::vector<unsigned>>(),
                       j.at("layout").at("node_bits").get<std::vector<int>>()};

@@ -91,6 +91,12 @@ struct TableLayout {
   std::vector<int> node_bits;        ///< per joint: fractional bits of the BLS's node coefficients; 0 without one
 };
 
+/// Which page of tables is newer than which (model/table_page.hpp). No clock: the same input makes the same bytes.
+struct Lineage {
+  std::uint32_t origin = 0;    ///< CRC-32 of the parameters that the first export wrote
+  std::uint32_t sequence = 0;  ///< 0: not exported yet
+};
+
 /// When the robot ran, by the logs' own time stamps: what drifts has done so since the start.
 struct Session {
   double start_s = 0, end_s = 0;
@@ -118,11 +124,18 @@ struct IdentifiedModel {
   std::optional<Formats> formats;
   std::optional<TableLayout> layout;
   std::uint32_t tables_crc = 0;
+  Lineage lineage;
 
-  void drop_tables() {
+  /// For other tables of the same model.
+  void drop_formats() {
     formats.reset();
     layout.reset();
     tables_crc = 0;
+  }
+  /// It is another model now.
+  void drop_tables() {
+    drop_formats();
+    lineage = {};
   }
 };
 

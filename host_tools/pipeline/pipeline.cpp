@@ -410,14 +410,15 @@ IdentifiedModel Pipeline::exported() {
   std::optional<IdentifiedModel> model = trained();
   if (!model) throw refuse("not a trained model of this project and its logs as they are now", "run");
   const fs::path page = directory_ / "tables.bin";
-  if (!model->formats || !model->layout || !fs::exists(page) || header_of(page).crc32 != model->tables_crc)
+  if (!model->formats || !model->layout || model->lineage.sequence == 0 || !fs::exists(page) ||
+      header_of(page).crc32 != model->tables_crc)
     throw refuse("its tables are not exported", "export");
   return *std::move(model);
 }
 
 void Pipeline::export_tables() {
   IdentifiedModel model = this->model();
-  model.drop_tables();
+  model.drop_formats();
   const Formats formats = choose_formats(model);
   write_export(model, formats, directory_);
   write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
@@ -427,6 +428,8 @@ void Pipeline::write_export(IdentifiedModel& model, const Formats& formats, cons
   progress_.stage("proving ranges and errors, writing tables", 4);
   model.formats = formats;
   model.layout = layout_of(model, formats);
+  if (model.lineage.sequence == 0) model.lineage = {FixedModel(model, formats).crc(), 1};
+  model.lineage.sequence = std::max(model.lineage.sequence, project_.target.sequence);
   const Proof proof = prove(model, &formats);
   progress_.step();
   const Attained attained = attain(model);
@@ -494,6 +497,8 @@ void Pipeline::write_export(IdentifiedModel& model, const Formats& formats, cons
                          {"tick_s", model.tick_s},
                          {"board", project_.target.board},
                          {"tables_crc", model.tables_crc},
+                         {"origin", model.lineage.origin},
+                         {"sequence", model.lineage.sequence},
                          {"formats", formats_json(formats)},
                          {"joints", joints},
                          {"drives", drives},

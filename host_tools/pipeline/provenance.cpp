@@ -16,7 +16,7 @@ json hash_of_model(const fs::path& directory) {
   if (!fs::exists(file)) return nullptr;
   json model = json::parse(read_file(file));
   // An export makes them anew without touching the model.
-  for (const char* key : {"formats", "layout", "tables_crc"}) model.erase(key);
+  for (const char* key : {"formats", "layout", "tables_crc", "origin", "sequence"}) model.erase(key);
   return hash_of(model.dump());
 }
 
@@ -61,7 +61,7 @@ json training_seconds(const fs::path& directory) {
 PageHeader header_of(const fs::path& page) {
   const std::string bytes = read_file(page);
   PageHeader header;
-  if (bytes.size() < sizeof header) return {0, 0, 0, 0};
+  if (bytes.size() < sizeof header) return {.magic = 0};
   std::memcpy(&header, bytes.data(), sizeof header);
   return header;
 }

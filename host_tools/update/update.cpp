@@ -253,6 +253,7 @@ json update_json(const IdentifiedModel& before, const NewSession& session, const
           {"joints", joints},
           {"mean_log_ratio", mean_log_ratio(held_out)},
           {"tables_crc", {{"old", before.tables_crc}, {"new", nullptr}}},
+          {"sequence", {{"old", before.lineage.sequence}, {"new", nullptr}}},
           {"accepted", false}};
 }
 
@@ -329,7 +330,7 @@ Update update(Pipeline& pipeline, const UpdateSettings& settings) {
 
   Formats formats = *old.formats;
   if (settings.rebuild) {
-    updated.drop_tables();
+    updated.drop_formats();
     formats = choose_formats(updated);
   } else if (const std::string why = why_not_in_layout(updated, formats); !why.empty()) {
     throw DataError(
@@ -337,6 +338,7 @@ Update update(Pipeline& pipeline, const UpdateSettings& settings) {
                     "rebuild; add --rebuild and build it from the new tables.hpp",
                     settings.log.string(), why));
   }
+  ++updated.lineage.sequence;
   updated.updates.push_back(session.reference);
   updated.notes.push_back(fmt::format("coefficients updated with {:.1f} s of {}, forgetting {:g}", session.refit_s,
                                       session.reference.file, forgetting));
@@ -357,6 +359,7 @@ Update update(Pipeline& pipeline, const UpdateSettings& settings) {
   }
   report["accepted"] = true;
   report["tables_crc"]["new"] = updated.tables_crc;
+  report["sequence"]["new"] = updated.lineage.sequence;
   write_file(staging.path() / "update.json", report.dump(1) + "\n");
   staging.replace("model.json");
   return out;

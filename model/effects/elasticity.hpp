@@ -20,18 +20,27 @@ struct Elasticity {
                                                    "Han, Wu, Hui 2025, Eq. 12: 1 / K"}};
   template <class N>
   struct State {
-    Torque<N> load{};
-    std::uint32_t ticks = 0;  ///< 0 or 1: stepped before
+    Torque<N> load{}, change{};  ///< and how much the last tick changed it
+    std::uint32_t ticks = 0;     ///< 0 or 1: stepped before
   };
   static constexpr double stored_shape(std::size_t, double relaxation, double tick_s) {
     return tick_s / (tick_s + relaxation);
   }
 
+  /// A tick without setpoints: the load goes on as it went.
+  template <class N>
+  static constexpr void skip(State<N>& state, Saturations& saturations) {
+    state.load = N::template narrow<Torque<N>>(state.load + state.change, saturations);
+  }
   template <class N, class Emit>
-  static constexpr void basis(const JointInput<N>& u, Words<N> words, State<N>& state, Saturations&, Emit&& emit) {
+  static constexpr void basis(const JointInput<N>& u, Words<N> words, State<N>& state, Saturations& saturations,
+                              Emit&& emit) {
     // The first tick takes the torque as it is: no branch, so that every tick costs the same.
     const std::array<Unit<N>, 2> shares{N::one(), words.template number<Quantity::unit>(0)};
+    const auto before = state.load;
     state.load = relax<N>(state.load, u.structural, shares[state.ticks]);
+    state.change =
+        select(state.ticks != 0, N::template narrow<Torque<N>>(state.load - before, saturations), Torque<N>{});
     state.ticks = 1;
     emit(as<Quantity::torque>, 0, state.load);
   }

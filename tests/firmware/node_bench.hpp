@@ -18,9 +18,14 @@
 #include "hal/fake/can.hpp"
 #include "hal/fake/clock.hpp"
 #include "hal/fake/gpio.hpp"
-#include "tests/golden/tables.hpp"
 
-// Drive nodes of the golden tables' robot on a bus in memory, and a host that talks to them.
+#ifndef FXDYN_TABLES_HEADER
+#define FXDYN_TABLES_HEADER "tests/golden/tables.hpp"
+#endif
+#include FXDYN_TABLES_HEADER
+
+// Drive nodes of a golden model's robot on a bus in memory, and a host that talks to them. A test of every golden model
+// is one source compiled with the tables of each (fxdyn_golden_test).
 
 namespace fxdyn::test {
 
@@ -33,16 +38,18 @@ inline constexpr std::array<std::int32_t, robot_joints> rated = tables::rated_to
 template <class Model, std::size_t joint>
 struct OneJoint;
 /// The model that a drive of joint `joint` alone computes: the other joints have no effects, as the export leaves them
-/// out.
+/// out, unless they deflect, which moves this one's link.
 template <class N, std::uint32_t outputs, class... Joints, std::size_t joint>
 struct OneJoint<RobotModel<N, outputs, Joints...>, joint> {
   using Whole = RobotModel<N, outputs, Joints...>;
+  template <std::size_t i>
+  static constexpr bool keeps_effects = i == joint || Whole::deflects;
   template <class Indices>
   struct Make;
   template <std::size_t... i>
   struct Make<std::index_sequence<i...>> {
-    using type =
-        RobotModel<N, 1U << joint, std::conditional_t<i == joint, Joints, JointModel<typename Joints::LinkShape>>...>;
+    using type = RobotModel<N, 1U << joint,
+                            std::conditional_t<keeps_effects<i>, Joints, JointModel<typename Joints::LinkShape>>...>;
   };
   using type = typename Make<std::index_sequence_for<Joints...>>::type;
 
@@ -50,7 +57,7 @@ struct OneJoint<RobotModel<N, outputs, Joints...>, joint> {
     typename type::Parameters one{whole.up, whole.ticks_per_second, whole.geometry, whole.inertia, whole.constants, {}};
     constexpr std::array<std::size_t, sizeof...(Joints)> words{Joints::words...};
     std::size_t at = 0;
-    for (std::size_t j = 0; j < joint; ++j) at += words[j];
+    for (std::size_t j = 0; j < joint && !Whole::deflects; ++j) at += words[j];
     std::copy_n(whole.words.begin() + static_cast<std::ptrdiff_t>(at), one.words.size(), one.words.begin());
     return one;
   }
@@ -66,11 +73,12 @@ struct NodeOnWire {
   static constexpr std::uint32_t watchdog_us = 50'000;
 
   NodeOnWire(hal::fake::CanWire<Frame>& wire, hal::fake::Clock& clock, const typename Model::Parameters& parameters,
-             NodeSettings settings = {.board = "bench"}, bool valid = true)
+             NodeSettings settings = {.board = "bench"}, bool valid = true, UpdateSlot update = UpdateSlot::empty)
       : bus(wire),
         watchdog(clock, watchdog_us),
         hardware{bus, clock, counter, watchdog, enable, fault, tick_busy},
-        node(hardware, {parameters, {table_magic, Model::layout_hash(), 0, 0x1234'5678}, valid, false, rated_torques},
+        node(hardware,
+             {parameters, {table_magic, Model::layout_hash(), 0, 0x1234'5678, 0, 5}, valid, update, rated_torques},
              settings) {}
 
   static constexpr RatedTorques<Model> rated_torques{rated};
@@ -94,8 +102,9 @@ class Bench {
   static constexpr std::size_t joints = Model::joints, outputs = Model::outputs;
 
   explicit Bench(NodeSettings settings = {.board = "bench"}, bool valid = true,
-                 const typename Model::Parameters& parameters = tables::page.parameters)
-      : on_wire(wire, clock, parameters, settings, valid) {}
+                 const typename Model::Parameters& parameters = tables::page.parameters,
+                 UpdateSlot update = UpdateSlot::empty)
+      : on_wire(wire, clock, parameters, settings, valid, update) {}
 
   hal::fake::Clock clock;
   hal::fake::CanWire<Frame> wire{clock};

@@ -181,6 +181,10 @@ TEST_F(DriveNodeTest, EveryObjectAnswers) {
       if (!dictionary::Extent{6, 0x3F}.stands_at(entry, j)) continue;
       const std::uint32_t index = entry.index + j;
       const auto result = bench.upload(index, entry.sub_index);
+      if (entry.variable == dictionary::Variable::error_field) {  // nothing has happened yet
+        EXPECT_EQ(std::get<Abort>(result), Abort::no_data);
+        continue;
+      }
       ASSERT_TRUE(std::holds_alternative<Bytes>(result)) << std::hex << index << ":" << int{entry.sub_index};
       if (entry.type != dictionary::Type::visible_string) {
         EXPECT_EQ(std::get<Bytes>(result).size(), dictionary::size_of(entry.type));

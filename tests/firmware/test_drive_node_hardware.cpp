@@ -74,7 +74,7 @@ struct FilteredNode : testing::Test {
   Hardware hardware{bus, clock, counter, watchdog, enable, fault, tick_busy};
   Model::Parameters parameters = test::OneJoint<test::Robot, 0>::parameters(tables::page.parameters);
   DriveNode<Model, Hardware> node{
-      hardware, {parameters, {table_magic, Model::layout_hash(), 0, 0}, true, false, rated}, {}};
+      hardware, {parameters, {table_magic, Model::layout_hash(), 0, 0}, true, UpdateSlot::empty, rated}, {}};
 
   void send(std::uint32_t id, const test::Bytes& bytes) {
     ASSERT_EQ(host.send(Bench<>::frame(id, bytes)), hal::Status::ok);

@@ -209,42 +209,13 @@ TEST_F(DriveNodeSafety, SyncThatStaysAwayRampsToZero) {
   EXPECT_FALSE(bench.node.errors().any());
 }
 
-TEST_F(DriveNodeSafety, AnUnsupervisedPeriodWaitsForever) {
-  bench.poll();
-  ASSERT_EQ(bench.write(0x1006, 0, 0, 4), Abort::none);
-  run();
-  const auto held = torques();
-  bench.pass(5'000'000);
-  EXPECT_EQ(torques(), held);
-  EXPECT_EQ(bench.counted(Counter::stale_ticks), 0U);
-  EXPECT_FALSE(bench.on_wire.watchdog.bites());
-}
-
-// A slow SYNC makes no slow ramp: once it is overdue, the torque goes down at the tables' rate.
-TEST_F(DriveNodeSafety, ASlowPeriodRampsAtTheTicksRate) {
-  bench.poll();
-  ASSERT_EQ(bench.write(0x1006, 0, 1'000'000, 4), Abort::none);
-  run();
-  const auto held = torques();
-  bench.pass(1'490'000);  // 2 ms of 1.5 s were over
-  EXPECT_EQ(torques(), held);
-  bench.pass(10'000);
-  EXPECT_GE(bench.counted(Counter::stale_ticks), 1U);
-  auto before = torques();
-  for (int i = 0; i < 52; ++i) {
-    bench.pass(2000);
-    for (std::size_t j = 0; j < 6; ++j) EXPECT_LE(std::abs(torques()[j] - before[j]), default_ramp(j));
-    before = torques();
-  }
-  EXPECT_TRUE(all_zero());
-}
-
 // What may not go out does not wait for a SYNC that may never come.
 TEST_F(DriveNodeSafety, WithoutSyncEnableAndHeartbeatRampToo) {
   for (const bool by_enable : {true, false}) {
     Bench<> one;
     one.poll();
     ASSERT_EQ(one.write(0x1006, 0, 0, 4), Abort::none);  // SYNC is not watched
+    ASSERT_EQ(one.write(0x2014, 0, 60'000, 2), Abort::none);
     ASSERT_EQ(one.write(0x1016, 1, 0x007F'0032, 4), Abort::none);
     one.start();
     for (k = 0; k < 100; ++k) {
@@ -521,6 +492,45 @@ TEST(DriveNodeStart, CorruptTablesKeepItPreOperational) {
   bench.nmt(NmtCommand::reset_node);
   bench.nmt(NmtCommand::start);
   EXPECT_EQ(bench.node.state(), NmtState::pre_operational);
+  EXPECT_TRUE(bench.on_wire.fault.level);
+}
+
+// A page in the slot for updates that can't be used is told once; the node runs on its own tables.
+TEST(DriveNodeStart, ARefusedUpdateIsToldAndIsNoFaultForEver) {
+  for (unsigned slot = 0; slot <= static_cast<unsigned>(UpdateSlot::unreadable); ++slot) {
+    SCOPED_TRACE(slot);
+    const auto update = static_cast<UpdateSlot>(slot);
+    const bool refused = update != UpdateSlot::empty && update != UpdateSlot::used && update != UpdateSlot::same;
+    Bench<> bench({.board = "bench"}, true, tables::page.parameters, update);
+    bench.pass(1000);
+    const auto told = bench.heard(0x081);
+    ASSERT_EQ(told.size(), refused ? 1U : 0U);
+    if (refused) {
+      EXPECT_EQ(canopen::load<2>(&told[0][0]), 0x6320U);
+      EXPECT_EQ(canopen::load<2>(&told[0][3]), slot) << "0 would be: the tables are not valid";
+    }
+    EXPECT_EQ(bench.on_wire.fault.level, refused);
+    EXPECT_EQ(bench.read(0x2000, 6), update == UpdateSlot::used ? 1U : 0U);
+    EXPECT_EQ(bench.read(0x2000, 7), 5U);
+    EXPECT_EQ(bench.read(0x2000, 8), slot);
+    bench.nmt(NmtCommand::start);
+    EXPECT_EQ(bench.node.state(), NmtState::operational);
+    EXPECT_EQ(bench.tick(test::motion(0)).size(), test::robot_joints);
+    bench.nmt(NmtCommand::enter_pre_operational);  // or missing setpoints are an error soon
+    bench.pass(ErrorLog::event_us + 20'000);
+    EXPECT_FALSE(bench.on_wire.fault.level);
+    EXPECT_EQ(bench.read(0x1001), 0U);
+  }
+}
+
+TEST(DriveNodeStart, CorruptTablesAndARefusedUpdateAreTwoErrors) {
+  Bench<> bench({.board = "bench"}, false, tables::page.parameters, UpdateSlot::unreadable);
+  bench.pass(20'000);
+  const auto told = bench.heard(0x081);
+  ASSERT_EQ(told.size(), 2U);
+  EXPECT_EQ(canopen::load<2>(&told[0][3]), 0U);
+  EXPECT_EQ(canopen::load<2>(&told[1][3]), static_cast<std::uint32_t>(UpdateSlot::unreadable));
+  bench.pass(ErrorLog::event_us);
   EXPECT_TRUE(bench.on_wire.fault.level);
 }
 

@@ -26,6 +26,9 @@
 
 #include "model/joint_model.hpp"
 
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmissing-braces"  // numbers without braces of their own
+
 namespace fxdyn::tables {
 
 struct Formats {
@@ -57,7 +60,8 @@ using Model = RobotModel<Numbers, 0x3f,
                          JointModel<Link<JointType::revolute, Twist::quarter, 0x0, 0x3b6>, Viscous, Coulomb, Offset, Stribeck, BroadLearning<40, 18>>>;
 
 [[gnu::section(".fxdyn_tables"), gnu::used]] inline constexpr TablePage<Model> page{
-  {826562630U, 2847350368U, 1084U, 3972360661U},  // magic, layout hash, words, CRC-32
+  // magic, layout hash, words, CRC-32; origin, sequence, CRC-32 of the header
+  {826562630U, 779821698U, 1084U, 3972360661U, 3972360661U, 1U, 2033568796U},
   {
     {0, 0, 164584489},  // minus gravity in the first DH frame [m/s^2]
     32768000,  // ticks per second
@@ -205,7 +209,8 @@ using Model = RobotModel<Numbers, 0x3f,
     529731311, 522519766, 124131212, 1433593977, 152692975, 91957334, -101586845, -213458012, -736890964,
     }
   }};
-static_assert(page.header.words == TablePage<Model>::parameter_words && page.header.layout_hash == Model::layout_hash(),
+static_assert(page.header.words == TablePage<Model>::parameter_words && page.header.layout_hash == Model::layout_hash() &&
+                  page.header.check == with_check(page.header).check,
               "these tables are for another version of the model library: export them anew");
 inline constexpr const Model::Parameters& parameters = page.parameters;
 
@@ -213,3 +218,5 @@ inline constexpr const Model::Parameters& parameters = page.parameters;
 inline constexpr std::array<std::int32_t, Model::joints> rated_torque{97600, 186400, 89400, 24200, 20100, 21300};
 
 }  // namespace fxdyn::tables
+
+#pragma GCC diagnostic pop

@@ -2,7 +2,7 @@
 
 #include "hal/can_timing.hpp"
 #include "hal/polled.hpp"
-#include "hal/stm32g4/fdcan.hpp"
+#include "hal/stm32g4/drive_board.hpp"
 #include "hal/zynqmp_r5/xcan.hpp"
 #include "tests/hal/models/register_model.hpp"
 
@@ -10,20 +10,62 @@ namespace fxdyn::hal {
 namespace {
 
 // At compile time, as the drivers use it.
-constexpr BitTiming g4 = bit_timing(stm32g4::nominal_limits, 170'000'000, {.bits_per_second = 1'000'000});
-static_assert(g4.bit_rate(170'000'000) == 1'000'000 && 170'000'000 % g4.prescaler == 0);
-static_assert(g4.sample_permille() == 876 || g4.sample_permille() == 875 || g4.sample_permille() == 874);
-constexpr BitTiming slow = bit_timing(stm32g4::nominal_limits, 16'000'000, {.bits_per_second = 1'000'000});
-static_assert(slow.prescaler == 1 && slow.quanta() == 16 && slow.sample_permille() == 875);
+constexpr auto g4 = stm32g4::BusTimings<1'000'000, 2'000'000>::full_speed;
+static_assert(g4.nominal.prescaler == 1 && g4.nominal.quanta() == 84 && g4.nominal.sample_permille() == 869);
+static_assert(g4.data.prescaler == 1 && g4.data.quanta() == 42 && g4.data.sample_permille() == 738);
+constexpr auto g4_fast = stm32g4::BusTimings<1'000'000, 4'000'000>::full_speed;
+static_assert(g4_fast.data.prescaler == 1 && g4_fast.data.quanta() == 21 && g4_fast.data.sample_permille() == 761);
+static_assert(g4_fast.data.bit_rate(stm32g4::fdcan_full_speed_hz) == 4'000'000);
+constexpr auto slow = stm32g4::BusTimings<1'000'000, 4'000'000>::slow;
+static_assert(slow.nominal.prescaler == 1 && slow.nominal.quanta() == 16 && slow.nominal.sample_permille() == 875);
+static_assert(slow.data.bit_rate(stm32g4::fdcan_slow_hz) == 4'000'000 && slow.data.quanta() == 4);
 constexpr BitTiming xcan = bit_timing(zynqmp_r5::can_limits, 100'000'000, {.bits_per_second = 1'000'000});
 static_assert(xcan.bit_rate(100'000'000) == 1'000'000 && xcan.quanta() <= 25);
 constexpr BitTiming quarter = bit_timing(zynqmp_r5::can_limits, 100'000'000, {.bits_per_second = 250'000});
 static_assert(quarter.bit_rate(100'000'000) == 250'000);
-constexpr auto fd = stm32g4::fdcan_timing(170'000'000, 1'000'000, 5'000'000);
-static_assert(fd.data.prescaler == 1 && fd.data.quanta() == 34);
+// The sample point is the nearest one, not the nearest in whole per mille: 87.5 % of 170 quanta is 148.75.
+constexpr BitTiming of_170 = bit_timing(stm32g4::nominal_limits, 170'000'000, {.bits_per_second = 1'000'000});
+static_assert(of_170.prescaler == 1 && of_170.segment1 == 148 && of_170.segment2 == 21);
+
+// The clock's tolerance in examples of others.
+// F. Hartwich, A. Bassemir, "The Configuration of the CAN Bit Timing", 1999: 1 Mbit/s of 10 MHz with 6 quanta of
+// propagation, 0.39 %; 100 kbit/s of 2 MHz with 1 quantum, 1.58 %, the most that CAN bears.
+static_assert(clock_tolerance_ppm({1, 7, 2, 1}, 6) == 1'000'000 * 1 / (2 * (130 - 2)));
+static_assert(clock_tolerance_ppm({1, 7, 2, 1}, 6) == 3906);
+static_assert(clock_tolerance_ppm({2, 5, 4, 4}, 1) == 15873);
+// python-can, test_bit_timing.py: 16 MHz / 2, loop delay 250 ns and 10 m: 1.23 %; CAN FD of 80 MHz / 5: 0.48 %.
+constexpr BitTiming eighth{2, 10, 5, 4};
+static_assert(propagation_quanta(eighth, 16'000'000, 600) == 5);
+static_assert(clock_tolerance_ppm(eighth, 5) == 12315);
+constexpr BitTiming half_megabit{5, 27, 4, 4}, two_megabit{5, 6, 1, 1};
+static_assert(propagation_quanta(half_megabit, 80'000'000, 600) == 10);
+static_assert(clock_tolerance_ppm(half_megabit, two_megabit, 10) == 4854);
+// Each of the five conditions where it is the narrowest one, and the value of its formula.
+static_assert(clock_tolerance_ppm({1, 72, 11, 2}, 40) == 1'000'000 * 2 / (20 * 84));
+static_assert(clock_tolerance_ppm({1, 72, 11, 11}, 40) == 1'000'000 * 11 / (2 * (13 * 84 - 11)));
+static_assert(clock_tolerance_ppm({1, 62, 21, 21}, 60) == 1'000'000 * 2 / (2 * (13 * 84 - 21)), "phase segment 1 is 2");
+static_assert(clock_tolerance_ppm({1, 72, 11, 11}, {1, 30, 11, 2}, 40) == 1'000'000 * 2 / (20 * 42));
+static_assert(clock_tolerance_ppm({1, 72, 11, 11}, {8, 30, 11, 11}, 40) ==
+              1'000'000 * 11 / (2 * ((6 * 42 - 11) * 8 + 7 * 84)));
+static_assert(clock_tolerance_ppm({4, 15, 5, 5}, {1, 30, 11, 5}, 8) ==
+              1'000'000 * (5 - 3) / (2 * ((2 * 21 - 5) * 4 + 11 + 4 * 42)));
+static_assert(clock_tolerance_ppm({4, 15, 5, 5}, {1, 30, 11, 3}, 8) == 0);
+static_assert(clock_tolerance_ppm({1, 7, 2, 1}, 7) == 0 && clock_tolerance_ppm({1, 7, 2, 1}, 8) == 0);
+static_assert(clock_tolerance_ppm({1, 7, 2, 1}, {1, 7, 2, 1}, 7) == 0);
+static_assert(propagation_quanta({1, 7, 2, 1}, 10'000'000, 600) == 6);
+static_assert(propagation_quanta({1, 7, 2, 1}, 10'000'000, 601) == 7);
+
+// What the guide says of the STM32G474.
+static_assert(stm32g4::classic_tolerance_ppm(g4) == 5087);
+static_assert(stm32g4::fd_tolerance_ppm(g4) == 5087 && stm32g4::fd_tolerance_ppm(g4_fast) == 5087);
+static_assert(2 * stm32g4::classic_tolerance_ppm(g4) < stm32g4::internal_ppm, "no promise without the crystal");
+constexpr BitTiming early = bit_timing(stm32g4::nominal_limits, stm32g4::fdcan_full_speed_hz,
+                                       {.bits_per_second = 1'000'000, .sample_permille = 750});
+static_assert(clock_tolerance_ppm(early, propagation_quanta(early, stm32g4::fdcan_full_speed_hz, 480)) == 9803);
+static_assert(2 * 9803 >= stm32g4::internal_ppm + stm32g4::crystal_ppm);
 
 TEST(BitTiming, StaysWithinTheFields) {
-  for (const auto& timing : {g4, slow, fd.nominal}) {
+  for (const auto& timing : {g4.nominal, slow.nominal, early, of_170}) {
     EXPECT_LE(timing.segment1, stm32g4::nominal_limits.largest_segment1);
     EXPECT_LE(timing.segment2, stm32g4::nominal_limits.largest_segment2);
     EXPECT_GE(timing.jump_width, 1U);
@@ -32,6 +74,16 @@ TEST(BitTiming, StaysWithinTheFields) {
   EXPECT_LE(xcan.segment1, 16U);
   EXPECT_LE(xcan.segment2, 8U);
   EXPECT_LE(xcan.jump_width, 4U);
+}
+
+TEST(BusTimings, WithoutTheCrystalFdIsNotAllowed) {
+  using Bus = stm32g4::BusTimings<1'000'000, 4'000'000>;
+  using stm32::ClockSource;
+  EXPECT_TRUE(Bus::fd_allowed({ClockSource::crystal, 168}));
+  EXPECT_FALSE(Bus::fd_allowed({ClockSource::internal, 168}));
+  EXPECT_FALSE(Bus::fd_allowed({ClockSource::internal_slow, 16}));
+  EXPECT_EQ(&Bus::of({ClockSource::internal, 168}), &Bus::full_speed);
+  EXPECT_EQ(&Bus::of({ClockSource::internal_slow, 16}), &Bus::slow);
 }
 
 TEST(Microseconds, GoOnThroughWrapsOfTheCounter) {

@@ -5,18 +5,18 @@
 #include "hal/mps2/uart.hpp"
 #include "hal/mps2/watchdog.hpp"
 #include "hal/stm32/gpio.hpp"
-#include "hal/stm32/watchdog.hpp"
 #include "hal/stm32f4/clock.hpp"
 #include "hal/stm32f4/usart.hpp"
-#include "hal/stm32g4/clock.hpp"
-#include "hal/stm32g4/fdcan.hpp"
-#include "hal/stm32g4/timer.hpp"
+#include "hal/stm32f4/watchdog.hpp"
+#include "hal/stm32g4/drive_board.hpp"
+#include "hal/stm32g4/watchdog.hpp"
 #include "hal/zynqmp_r5/clock.hpp"
 #include "hal/zynqmp_r5/gpio.hpp"
 #include "hal/zynqmp_r5/watchdog.hpp"
 #include "hal/zynqmp_r5/xcan.hpp"
 #include "tests/hal/models/clock_models.hpp"
 #include "tests/hal/models/fdcan_model.hpp"
+#include "tests/hal/models/g4_chip_model.hpp"
 #include "tests/hal/models/serial_models.hpp"
 #include "tests/hal/models/xcan_model.hpp"
 
@@ -32,7 +32,7 @@ const std::vector<std::string> none;
 
 // FDCAN ---------------------------------------------------------------------------------------------------------------
 
-constexpr auto fast_timing = stm32g4::fdcan_timing(170'000'000, 1'000'000, 5'000'000);
+constexpr auto fast_timing = stm32g4::BusTimings<1'000'000, 4'000'000>::full_speed;
 
 struct FdcanTest : testing::Test {
   test::FdcanModel model;
@@ -48,15 +48,20 @@ TEST_F(FdcanTest, StartsInTheOrderOfTheManualAndAtTheBitRate) {
   ASSERT_EQ(can.start(fast_timing), Status::ok);
   EXPECT_FALSE(model.initialising());
   EXPECT_TRUE(model.fd_enabled());
-  const auto bit = [&](hal::Address offset, int p, int pb, int s1, int s1b, int s2, int s2b) {
-    return 170'000'000 / ((model.field(offset, p, pb) + 1) *
-                          (1 + model.field(offset, s1, s1b) + 1 + model.field(offset, s2, s2b) + 1));
-  };
-  EXPECT_EQ(bit(0x1c, 16, 9, 8, 8, 0, 7), 1'000'000U);
-  EXPECT_EQ(bit(0x0c, 16, 5, 8, 5, 4, 4), 5'000'000U);
-  EXPECT_EQ(model.field(0x0c, 23, 1), 1U) << "200 ns a bit: the transmitter's delay has to be compensated";
-  EXPECT_EQ(model.field(0x48, 8, 7), fast_timing.data.segment1 + 1);
+  EXPECT_EQ(model.bit_rate(84'000'000), 1'000'000U);
+  EXPECT_EQ(model.data_bit_rate(84'000'000), 4'000'000U);
+  EXPECT_EQ(model.field(0x1c, 25, 7) + 1, fast_timing.nominal.jump_width);
+  EXPECT_EQ(model.field(0x0c, 0, 4) + 1, fast_timing.data.jump_width);
   EXPECT_EQ(model.interrupts, std::vector<std::uint32_t>{21});
+}
+
+TEST_F(FdcanTest, TheTransmittersDelayIsCompensatedAtBothDataBitRates) {
+  for (const auto& timing : {fast_timing, stm32g4::BusTimings<1'000'000, 2'000'000>::full_speed}) {
+    ASSERT_EQ(can.start(timing), Status::ok);
+    EXPECT_EQ(model.field(0x0c, 23, 1), 1U) << "TDC";
+    EXPECT_EQ(model.field(0x48, 8, 7), timing.data.segment1 + 1) << "TDCO: the sample point, in periods of 84 MHz";
+    EXPECT_LE(model.field(0x0c, 16, 5), 1U) << "DBRP: the manual wants a prescaler of 1 or 2";
+  }
 }
 
 TEST_F(FdcanTest, WithoutAClockItFails) {
@@ -65,7 +70,9 @@ TEST_F(FdcanTest, WithoutAClockItFails) {
 }
 
 TEST_F(FdcanTest, SlowDataPhaseNeedsNoCompensation) {
-  ASSERT_EQ(can.start(stm32g4::fdcan_timing(170'000'000, 1'000'000, 2'000'000)), Status::ok);
+  constexpr auto timing = stm32g4::fdcan_timing(84'000'000, 500'000, 500'000);
+  static_assert(timing.data.prescaler > 2);
+  ASSERT_EQ(can.start(timing), Status::ok);
   EXPECT_EQ(model.field(0x0c, 23, 1), 0U);
 }
 
@@ -94,15 +101,42 @@ TEST_F(FdcanTest, SendsEveryKindOfFrame) {
   EXPECT_EQ(can.send({.id = 1, .size = 12}), Status::failed) << "12 bytes are none of classic CAN";
 }
 
-TEST_F(FdcanTest, AFullTransmitFifoIsBusyAndKeepsTheOrder) {
+TEST_F(FdcanTest, WhatWaitsGoesOutLowestIdentifierFirst) {
   ASSERT_EQ(can.start(fast_timing), Status::ok);
-  for (std::uint32_t round = 0; round < 5; ++round) {
-    for (std::uint32_t id = 0; id < 3; ++id) ASSERT_EQ(can.send({.id = 10 * round + id}), Status::ok);
-    ASSERT_EQ(can.send({.id = 99}), Status::busy);
-    for (std::uint32_t id = 0; id < 3; ++id) EXPECT_EQ(model.transmit()->head >> 18, 10 * round + id);
-    ASSERT_EQ(can.send({.id = 7}), Status::ok);
-    EXPECT_EQ(model.transmit()->head >> 18, 7U);
+  const auto send = [&](std::uint32_t id) { return can.send({.id = id}); };
+  const auto sent = [&] { return model.transmit().value().head >> 18; };
+  ASSERT_EQ(send(0x701), Status::ok);
+  ASSERT_EQ(send(0x581), Status::ok);
+  ASSERT_EQ(send(0x181), Status::ok);
+  EXPECT_EQ(send(0x081), Status::busy) << "three are all there is";
+  EXPECT_EQ(sent(), 0x181U) << "a heartbeat that keeps losing the arbitration does not keep a torque waiting";
+  ASSERT_EQ(send(0x182), Status::ok);
+  EXPECT_EQ(sent(), 0x182U);
+  ASSERT_EQ(send(0x181), Status::ok);
+  EXPECT_EQ(sent(), 0x181U);
+  EXPECT_EQ(sent(), 0x581U);
+  EXPECT_EQ(sent(), 0x701U);
+  EXPECT_EQ(model.waiting(), 0);
+}
+
+TEST_F(FdcanTest, FramesWithOneIdentifierKeepTheirOrder) {
+  ASSERT_EQ(can.start(fast_timing), Status::ok);
+  const auto torque = [](std::uint8_t tick) { return FdFrame{.id = 0x181, .size = 1, .data = {tick}}; };
+  for (const std::uint32_t before : {0U, 1U, 2U}) {  // so many places with a lower number, free again at once
+    for (std::uint32_t id = 0; id < before; ++id) ASSERT_EQ(can.send({.id = id}), Status::ok);
+    ASSERT_EQ(can.send(torque(1)), Status::ok);
+    for (std::uint32_t id = 0; id < before; ++id) ASSERT_EQ(model.transmit()->head >> 18, id);
+    EXPECT_EQ(can.send(torque(2)), Status::busy);
+    EXPECT_EQ(model.waiting(), 1);
+    EXPECT_EQ(can.send({.id = 0x181, .remote = true}), Status::ok) << "another arbitration field";
+    EXPECT_EQ(can.send({.id = 0x181 << 18, .extended = true}), Status::ok);
+    EXPECT_EQ(model.transmit()->words[0] & 0xff, 1U);
+    EXPECT_EQ(can.send(torque(2)), Status::ok);
+    EXPECT_EQ(model.transmit()->words[0] & 0xff, 2U);
+    EXPECT_NE(model.transmit()->head & 1U << 29, 0U);
+    EXPECT_NE(model.transmit()->head & 1U << 30, 0U);
   }
+  EXPECT_EQ(model.waiting(), 0);
 }
 
 TEST_F(FdcanTest, ReceivesEveryKindOfFrame) {
@@ -177,7 +211,7 @@ TEST_F(FdcanTest, OverrunsAreCounted) {
 
 TEST_F(FdcanTest, BusOffRecoversAfterTheSequencesAndSendsNothingOld) {
   ASSERT_EQ(can.start(fast_timing), Status::ok);
-  ASSERT_EQ(can.send({.id = 0x181}), Status::ok);
+  for (const std::uint32_t id : {0x181U, 0x581U, 0x701U}) ASSERT_EQ(can.send({.id = id}), Status::ok);
   model.set_counters(130, 5);
   EXPECT_EQ(can.errors().state, CanState::passive);
   EXPECT_EQ(can.errors().transmit, 130);
@@ -197,9 +231,10 @@ TEST_F(FdcanTest, BusOffRecoversAfterTheSequencesAndSendsNothingOld) {
   model.idle_sequences(1);
   EXPECT_EQ(can.restart(), Status::ok);
   EXPECT_EQ(can.errors().state, CanState::active);
-  EXPECT_EQ(model.waiting(), 0U) << "a torque from before";
+  EXPECT_EQ(model.waiting(), 0) << "a torque from before";
   ASSERT_EQ(can.send({.id = 0x183}), Status::ok);
   EXPECT_EQ(model.transmit()->head >> 18, 0x183U);
+  ASSERT_EQ(can.send({.id = 0x181}), Status::ok) << "no longer waiting, though it never went out";
 }
 
 // XCAN ----------------------------------------------------------------------------------------------------------------
@@ -412,8 +447,8 @@ TYPED_TEST(Rcc, WithoutAPllItStaysSlow) {
 
 TEST(Rcc, TheDebugPortOfTheG4StaysOpen) {
   test::RccModel<test::G4> model;
-  EXPECT_EQ(stm32g4::start_clock(Modelled{&model}).mhz, 170U);
-  EXPECT_EQ(model.read(test::G4::flash), 4U | 0b111U << 8 | 1U << 18) << "wait states, prefetch, caches, DBG_SWEN";
+  EXPECT_EQ(stm32g4::start_clock(Modelled{&model}).mhz, 168U);
+  EXPECT_EQ(model.read(test::G4::flash), 4U | 0b110U << 8 | 1U << 18) << "wait states, caches, DBG_SWEN";
 }
 
 TEST(Rcc, RegistersThatReadAsZeroEndWithTheInternalOscillator) {
@@ -427,22 +462,60 @@ TEST(Rcc, RegistersThatReadAsZeroEndWithTheInternalOscillator) {
 
 // Watchdogs -----------------------------------------------------------------------------------------------------------
 
-TEST(Iwdg, ResetsUnlessFed) {
+template <class Tested>
+class Iwdg : public testing::Test {};
+using Watchdogs = testing::Types<stm32g4::BasicWatchdog<Modelled>, stm32f4::BasicWatchdog<Modelled>>;
+TYPED_TEST_SUITE(Iwdg, Watchdogs);
+
+template <class Tested>
+constexpr stm32::LsiRange range =
+    std::is_same_v<Tested, stm32g4::BasicWatchdog<Modelled>> ? stm32g4::lsi : stm32f4::lsi;
+
+TYPED_TEST(Iwdg, ResetsUnlessFed) {
   test::IwdgModel model;
-  stm32::BasicWatchdog<Modelled> watchdog{Modelled{&model}};
+  TypeParam watchdog{Modelled{&model}};
   EXPECT_EQ(watchdog.start(0), Status::failed);
-  EXPECT_EQ(watchdog.start(513), Status::failed);
+  EXPECT_EQ(watchdog.start(TypeParam::most_ms + 1), Status::failed);
   EXPECT_FALSE(model.running());
+  ASSERT_EQ(watchdog.start(TypeParam::most_ms), Status::ok);
   ASSERT_EQ(watchdog.start(20), Status::ok);
   for (int i = 0; i < 100; ++i) {
     model.pass_ms(19);
     watchdog.feed();
   }
   EXPECT_FALSE(model.has_reset);
-  model.pass_ms(20.1);
+  model.pass_ms(TypeParam::longest_ms(20) * range<TypeParam>.lowest_hz / 32'000.0 + 0.1);
   EXPECT_TRUE(model.has_reset);
   EXPECT_EQ(model.violations, none);
 }
+
+template <class Tested, std::uint32_t asked>
+void holds_over_the_whole_range_of_its_oscillator() {
+  constexpr std::uint32_t longest = Tested::longest_ms(asked);
+  for (const double hz : {double(range<Tested>.lowest_hz), 32'000.0, double(range<Tested>.highest_hz)}) {
+    for (const double first_count : {1e-9, 1.0}) {
+      test::IwdgModel model;
+      model.lsi_khz = hz / 1000;
+      model.first_count = first_count;
+      Tested watchdog{Modelled{&model}};
+      ASSERT_EQ(watchdog.start(asked), Status::ok);
+      model.pass_ms(asked);
+      EXPECT_FALSE(model.has_reset) << "sooner than " << asked << " ms, LSI " << hz << " Hz";
+      model.pass_ms(longest - asked + 1e-6);
+      EXPECT_TRUE(model.has_reset) << "later than " << longest << " ms, LSI " << hz << " Hz";
+    }
+  }
+}
+TYPED_TEST(Iwdg, ItsTimeHoldsOverTheWholeRangeOfItsOscillator) {
+  holds_over_the_whole_range_of_its_oscillator<TypeParam, 1>();
+  holds_over_the_whole_range_of_its_oscillator<TypeParam, 4>();
+  holds_over_the_whole_range_of_its_oscillator<TypeParam, 50>();
+}
+
+// What the guide says.
+static_assert(stm32g4::Watchdog::longest_ms(50) == 62 && stm32f4::Watchdog::longest_ms(50) == 142);
+static_assert(stm32g4::lsi.lowest_hz <= 29'500 && stm32g4::lsi.highest_hz >= 34'000, "DS12288");
+static_assert(stm32f4::lsi.lowest_hz <= 17'000 && stm32f4::lsi.highest_hz >= 47'000, "DS8626");
 
 TEST(CmsdkWatchdog, IsUnlockedForEveryWriteAndLockedAfterIt) {
   test::PlainModel model;
@@ -509,10 +582,10 @@ TEST(Timers, CountThePeriodsThatTheirInterruptsTell) {
 
   test::PlainModel stm;
   stm32g4::BasicTimer<Modelled> tim{Modelled{&stm}};
-  tim.set_clock({stm32::ClockSource::crystal, 170});
+  tim.set_clock({stm32::ClockSource::crystal, 168});
   EXPECT_EQ(tim.start(70'000), Status::failed);
   ASSERT_EQ(tim.start(2000), Status::ok);
-  EXPECT_EQ(stm.at(stm32g4::tim6 + 0x28), 169U);
+  EXPECT_EQ(stm.at(stm32g4::tim6 + 0x28), 167U);
   EXPECT_EQ(stm.at(stm32g4::tim6 + 0x2c), 1999U);
   EXPECT_EQ(stm.interrupts, std::vector<std::uint32_t>{54});
   tim.on_interrupt();
@@ -560,6 +633,16 @@ TEST(Pins, OutputsAreOffBeforeTheyAreDriven) {
   EXPECT_EQ(zynq.at(zynqmp_r5::gpio + 0x208), 1U << 20);
 }
 
+TEST(Pins, AnOutputMayBeAssertedFromTheStart) {
+  test::PlainModel stm, cmsdk, zynq;
+  stm32::OutputPin<stm32g4::gpio_b, 5, false, Modelled> on_stm{AtStart::on, Modelled{&stm}};
+  EXPECT_EQ(stm.writes.front(), (std::pair<Address, std::uint32_t>{stm32g4::gpio_b + 0x18, 1U << 21}));
+  mps2::OutputPin<2, false, Modelled> on_mps2{AtStart::on, Modelled{&cmsdk}};
+  EXPECT_EQ(cmsdk.writes.front(), (std::pair<Address, std::uint32_t>{0x4001'0000 + 0x400 + 4 * (1 << 2), 0}));
+  zynqmp_r5::OutputPin<14, false, Modelled> on_zynq{AtStart::on, Modelled{&zynq}};
+  EXPECT_EQ(zynq.writes.front(), (std::pair<Address, std::uint32_t>{zynqmp_r5::gpio, 0xbfff'0000U}));
+}
+
 TEST(Pins, InputsReadTheirLevelByPolarity) {
   test::PlainModel stm;
   stm.at(stm32g4::gpio_b) = 0xffff'ffff;  // after reset: analog
@@ -585,6 +668,100 @@ TEST(Pins, AlternateFunctionsGoToTheirRegister) {
   stm32::use_alternate_function(registers, stm32g4::gpio_a, 11, 9);
   EXPECT_EQ(stm.at(stm32g4::gpio_a + 0x24), 9U << 12);
   EXPECT_EQ(stm.at(stm32g4::gpio_a) >> 22 & 0b11, 2U);
+}
+
+// The STM32G474 of a drive, from its reset to the bus ----------------------------------------------------------------
+
+struct DriveBoardTest : testing::Test {
+  test::G4ChipModel chip;
+  std::optional<stm32g4::DriveBoard<Modelled>> board;
+  stm32g4::BasicFdcan<Modelled> can{Modelled{&chip}};
+  using Bus = stm32g4::BusTimings<1'000'000, 2'000'000>;
+  Status start() {
+    board.emplace(Modelled{&chip});
+    return can.start(Bus::of(board->system));
+  }
+  void TearDown() override {
+    EXPECT_EQ(chip.violations, none);
+    EXPECT_EQ(chip.can.violations, none);
+  }
+};
+
+TEST_F(DriveBoardTest, ReachesTheBusAtItsBitRates) {
+  ASSERT_EQ(start(), Status::ok);
+  EXPECT_EQ(board->system.source, stm32::ClockSource::crystal);
+  EXPECT_DOUBLE_EQ(chip.mhz(), 168);
+  EXPECT_DOUBLE_EQ(chip.can_mhz(), 84);
+  EXPECT_EQ(chip.can.bit_rate(84'000'000), 1'000'000U);
+  EXPECT_EQ(chip.can.data_bit_rate(84'000'000), 2'000'000U);
+  EXPECT_DOUBLE_EQ(chip.counts_mhz(), 1) << "a count of the clock is a microsecond";
+  EXPECT_EQ(chip.read(stm32g4::tim2 + 0x2c), UINT32_MAX) << "and it wraps with 32 bits";
+}
+
+TEST_F(DriveBoardTest, TheBitRateStaysWithoutCrystal) {
+  chip.crystal_starts = false;
+  ASSERT_EQ(start(), Status::ok);
+  EXPECT_EQ(board->system.source, stm32::ClockSource::internal);
+  EXPECT_DOUBLE_EQ(chip.can_mhz(), 84);
+  EXPECT_EQ(chip.can.bit_rate(84'000'000), 1'000'000U);
+  EXPECT_DOUBLE_EQ(chip.counts_mhz(), 1);
+}
+
+TEST_F(DriveBoardTest, TheBitRateStaysWithoutPll) {
+  chip.pll_locks = false;
+  ASSERT_EQ(start(), Status::ok);
+  EXPECT_EQ(board->system.source, stm32::ClockSource::internal_slow);
+  EXPECT_DOUBLE_EQ(chip.can_mhz(), 16);
+  EXPECT_EQ(chip.can.bit_rate(16'000'000), 1'000'000U);
+  EXPECT_EQ(chip.can.data_bit_rate(16'000'000), 2'000'000U);
+  EXPECT_DOUBLE_EQ(chip.counts_mhz(), 1);
+}
+
+TEST_F(DriveBoardTest, PinsAreWhatTheGuideSays) {
+  ASSERT_EQ(start(), Status::ok);
+  for (const std::uint32_t pin : {11U, 12U}) {  // data sheet, "Alternate function": FDCAN1_RX, FDCAN1_TX
+    EXPECT_EQ(chip.mode(stm32g4::gpio_a, pin), 2U);
+    EXPECT_EQ(chip.function(stm32g4::gpio_a, pin), 9U);
+  }
+  for (const std::uint32_t pin : {13U, 14U}) EXPECT_EQ(chip.mode(stm32g4::gpio_a, pin), 2U) << "SWD stays open";
+  EXPECT_EQ(chip.mode(stm32g4::gpio_b, 4), 0U) << "not NJTRST any more";
+  EXPECT_EQ(chip.pull(stm32g4::gpio_b, 4), 2U) << "down: a broken wire is off";
+  bool on = true;
+  EXPECT_EQ(board->enable.read(on), Status::ok);
+  EXPECT_FALSE(on);
+  chip.outside(stm32g4::gpio_b, 4, true);
+  EXPECT_EQ(board->enable.read(on), Status::ok);
+  EXPECT_TRUE(on);
+  EXPECT_TRUE(chip.driven_low(stm32g4::gpio_b, 6)) << "no tick";
+  EXPECT_EQ(board->tick_busy.set(true), Status::ok);
+  EXPECT_TRUE(chip.driven_high(stm32g4::gpio_b, 6));
+}
+
+TEST_F(DriveBoardTest, ItIsFaultyUntilSomebodySaysOtherwise) {
+  EXPECT_FALSE(chip.driven_high(stm32g4::gpio_b, 5)) << "in reset";
+  ASSERT_EQ(start(), Status::ok);
+  EXPECT_TRUE(chip.driven_low(stm32g4::gpio_b, 5));
+  EXPECT_EQ(board->fault.set(false), Status::ok);
+  EXPECT_TRUE(chip.driven_high(stm32g4::gpio_b, 5));
+  EXPECT_EQ(board->fault.set(true), Status::ok);
+  EXPECT_TRUE(chip.driven_low(stm32g4::gpio_b, 5));
+}
+
+TEST_F(DriveBoardTest, ResetsByTheWatchdogAreToldOnce) {
+  chip.reset_flags(1U << 29 | 1U << 26);  // IWDGRSTF, PINRSTF
+  EXPECT_TRUE(stm32g4::DriveBoard<Modelled>(Modelled{&chip}).watchdog_reset);
+  test::G4ChipModel other;
+  other.reset_flags(1U << 26);
+  EXPECT_FALSE(stm32g4::DriveBoard<Modelled>(Modelled{&other}).watchdog_reset);
+  EXPECT_FALSE(stm32g4::reset_by_watchdog(Modelled{&chip})) << "the next reset is another one's";
+}
+
+TEST_F(DriveBoardTest, TheWakeUpTimerHasItsClock) {
+  ASSERT_EQ(start(), Status::ok);
+  stm32g4::BasicTimer<Modelled> timer{Modelled{&chip}};
+  timer.set_clock(board->system);
+  ASSERT_EQ(timer.start(500), Status::ok);
+  EXPECT_EQ(chip.read(stm32g4::tim6 + 0x28), 167U);
 }
 
 }  // namespace

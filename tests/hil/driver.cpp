@@ -88,9 +88,8 @@ void configure(can::Master& master, std::uint8_t node, bool fd) {
   } catch (const can::SdoAbort& abort) {
     check(abort.code == canopen::Abort::read_only, "abort code of a write to a read-only object", node);
   }
-  // Lockstep waits as long as it takes: an overdue SYNC is no fault here.
-  master.write(node, 0x1006, 0, 4'000'000, 4);
-  master.write(node, 0x2013, 0, 1, 1);  // parity of the tick
+  master.use_lockstep(node, std::chrono::seconds(6));  // a slow machine is no fault here
+  master.write(node, 0x2013, 0, 1, 1);                 // parity of the tick
   if (fd) master.write(node, 0x2030, 0, 1, 1);
 }
 

@@ -86,9 +86,9 @@ int main(int count, char** arguments) {
   if (count < 3) return 2;
   try {
     ProcessNode node(arguments[1]);
-    hil::FaultCampaign campaign(node, count > 3 ? static_cast<unsigned>(std::strtoul(arguments[3], nullptr, 10)) : 1,
-                                {});
-    campaign.run(std::strtoull(arguments[2], nullptr, 10), 0.05);
+    const unsigned long seed = count > 3 ? std::strtoul(arguments[3], nullptr, 10) : 1;
+    hil::FaultCampaign campaign(node, {.seed = static_cast<unsigned>(seed), .slow_share = 0.05});
+    campaign.run(std::strtoull(arguments[2], nullptr, 10));
     const bool good = campaign.report();
     return good && node.is_alive() ? 0 : 1;
   } catch (const std::exception& error) {

@@ -1,7 +1,10 @@
-// The fault campaign on a bus in memory, with a time of its own: for volume. fault_memory [EVENTS [SEED]]
+// The fault campaign on a bus in memory, with a time of its own: for volume. fault_memory [EVENTS [SEED
+// [before|after]]], the last: when the setpoints of a SYNC come.
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <memory>
 
 #include "firmware/drive_node.hpp"
@@ -30,7 +33,7 @@ class MemoryNode final : public hil::NodeUnderTest, public can::Bus {
     page_ = tables::page;
     if (!good_tables) corrupt(page_);
     node_ = std::make_unique<Node>(
-        *hardware_, NodeTables<Model>{page_.parameters, page_.header, page_is_valid(page_), false, rated_},
+        *hardware_, NodeTables<Model>{page_.parameters, page_.header, page_is_valid(page_), UpdateSlot::empty, rated_},
         NodeSettings{.id = 1});
     poll();
   }
@@ -45,7 +48,8 @@ class MemoryNode final : public hil::NodeUnderTest, public can::Bus {
     for (;;) {
       if (host_->receive(frame) == hal::Status::ok) return true;
       if (now() >= end) return false;
-      clock_.advance(100);
+      const auto left = static_cast<std::uint64_t>((end - now()) / std::chrono::microseconds(1));
+      clock_.advance(std::clamp<std::uint64_t>(left, 1, 100));
       poll();
     }
   }
@@ -93,7 +97,10 @@ int main(int count, char** arguments) {
   const auto seed = count > 2 ? std::strtoul(arguments[2], nullptr, 10) : 1U;
   try {
     MemoryNode node;
-    hil::FaultCampaign campaign(node, static_cast<unsigned>(seed), std::chrono::milliseconds(2));
+    const bool after = count > 3 && std::strcmp(arguments[3], "after") == 0;
+    hil::FaultCampaign campaign(node, {.seed = static_cast<unsigned>(seed),
+                                       .period = std::chrono::milliseconds(2),
+                                       .order = after ? hil::Order::after : hil::Order::before});
     campaign.run(events);
     return campaign.report() ? 0 : 1;
   } catch (const std::exception& error) {

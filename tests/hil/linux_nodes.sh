@@ -16,6 +16,10 @@ start() {
   "$bin/fxdyn_node" --can vcan0 "$@" &
   pids+=($!)
 }
+start_batch() {
+  chrt --batch 0 "$bin/fxdyn_node" --can vcan0 "$@" &
+  pids+=($!)
+}
 
 # SCHED_BATCH: the master is not woken for each torque, but when the nodes sleep.
 drive() { chrt --batch 0 "$bin/hil_driver" --can vcan0 "$@"; }
@@ -23,7 +27,8 @@ drive() { chrt --batch 0 "$bin/hil_driver" --can vcan0 "$@"; }
 start --joint 1 --joint 2 --joint 3 --joint 4 --joint 5 --joint 6
 drive --name "6 Linux nodes on vcan, one process" --nodes 6 --ticks "$ticks" --least-rate "$least"
 stop_nodes
-for joint in 1 2 3 4 5 6; do start --joint $joint; done
+# SCHED_BATCH for them too: a node is not woken for each of a tick's seven frames, but when all of them are there.
+for joint in 1 2 3 4 5 6; do start_batch --joint $joint; done
 drive --name "6 Linux nodes on vcan, six processes" --nodes 6 --ticks $((ticks < 1000 ? ticks : 1000))
 stop_nodes
 start

@@ -14,6 +14,21 @@
 
 namespace fxdyn::hil {
 
+/// A tick's setpoints as the model takes them from the wire.
+template <class Model>
+typename Model::Setpoints model_input(const typename Model::Parameters& parameters,
+                                      const std::vector<WireSetpoint>& setpoints) {
+  typename Model::Setpoints input;
+  for (std::size_t j = 0; j < Model::joints; ++j) {
+    const auto i = static_cast<int>(j);
+    const auto& limits = parameters.constants[j].limits;
+    input.q[i].raw = setpoints[j].q;
+    input.dq[i].raw = from_share(setpoints[j].dq, whole_share(limits.dq_lower.raw, limits.dq_upper.raw));
+    input.ddq[i].raw = from_share(setpoints[j].ddq, whole_share(limits.ddq_lower.raw, limits.ddq_upper.raw));
+  }
+  return input;
+}
+
 /// Setpoints within the joints' limits for as many ticks as one likes, the same for the same seed. Half a second of
 /// smooth motion and half a second of random velocities and accelerations along a random walk in turn: what a robot
 /// does, and what drives the arithmetic into its corners. They carry the tick's parity (object 0x2013).
@@ -88,15 +103,8 @@ class Expected {
 
   /// One fresh tick of an enabled node. The tick count starts at `count`.
   std::array<WireTorque, Model::joints> tick(const std::vector<WireSetpoint>& setpoints, std::uint8_t count) {
-    typename Model::Setpoints input;
-    for (std::size_t j = 0; j < Model::joints; ++j) {
-      const auto i = static_cast<int>(j);
-      input.q[i].raw = setpoints[j].q;
-      input.dq[i].raw = from_share(setpoints[j].dq, whole_share(limits(j).dq_lower.raw, limits(j).dq_upper.raw));
-      input.ddq[i].raw = from_share(setpoints[j].ddq, whole_share(limits(j).ddq_lower.raw, limits(j).ddq_upper.raw));
-    }
     Saturations saturations;
-    const auto model = Model::tick(parameters_, state_, input, saturations);
+    const auto model = Model::tick(parameters_, state_, model_input<Model>(parameters_, setpoints), saturations);
     std::array<WireTorque, Model::joints> wire;
     for (std::size_t j = 0; j < Model::joints; ++j) {
       std::uint8_t status = torque_status::fresh | torque_status::enabled;

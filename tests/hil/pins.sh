@@ -31,19 +31,20 @@ echo 0 >$trace/events/gpio/gpio_value/enable
 sed -n 's/.*gpio_value: *\([0-9]*\) set \([01]\)/\1 \2/p' $trace/trace >/tmp/edges
 expect "lines that moved" "$(cut -d' ' -f1 /tmp/edges | sort -u | wc -l)" 1
 expect "tick-busy rises and falls 200 times in 200 ticks" "$(cut -d' ' -f2 /tmp/edges | tr -d '\n' | grep -cxE '(10){200}')" 1
-expect "fault after a clean run" "$(level 1)" 0
+expect "fault line after a clean run" "$(level 1)" 1
 expect "tick-busy between ticks" "$(level 2)" 0
 
 # No setpoints: stale ticks, EMCY 0x8250, fault.
 cansend vcan0 000#0101
 for _ in $(seq 5); do cansend vcan0 080#; done
-expect_level "fault without setpoints" 1 1
+expect_level "fault line without setpoints" 1 0
 cansend vcan0 000#8001
-expect_level "fault after pre-operational" 1 0
+expect_level "fault line after pre-operational" 1 1
 
 # A torque of the model, gravity's, with a ramp of 5 ticks and SYNC by hand; then enable low: the ticks are as fresh as before, but
 # their torques go to zero and say that they are not enabled.
 cansend vcan0 601#2306100000000000
+cansend vcan0 601#2B14200060EA0000
 cansend vcan0 601#2B10200005000000
 cansend vcan0 000#0101
 candump -L vcan0,180:780 >/tmp/torques &
@@ -70,3 +71,16 @@ enable down
 ticks 8 96
 expect "status of the torques with enable low" "$(status)" 1
 expect "torques of zero with enable low" "$(zeros)" 6
+
+# A node that is gone has let go of its line, which is pulled down on the far side.
+kill $node
+wait $node || true
+expect_level "fault line of a node that is gone" 1 0
+
+# The other way round.
+start_node "$1/fxdyn_node" --gpio-chip "$FXDYN_GPIO_CHIP" --fault 1 --busy 2 --fault-high --active-low
+expect_level "tick-busy with --active-low, between ticks" 2 1
+expect_level "fault line with --fault-high, no error" 1 0
+cansend vcan0 000#0101
+for _ in $(seq 5); do cansend vcan0 080#; done
+expect_level "fault line with --fault-high, without setpoints" 1 1

@@ -125,7 +125,8 @@ class CanDrivesTest : public testing::Test {
                     {{dictionary::tables, 2}, fixed.layout_hash()},
                     {{dictionary::tables, 3}, 1},
                     {{dictionary::tables, 4}, 2},
-                    {{dictionary::tables, 5}, outputs}};
+                    {{dictionary::tables, 5}, outputs},
+                    {{dictionary::tables, 8}, static_cast<std::uint32_t>(UpdateSlot::empty)}};
     for (std::uint32_t j = 1; j <= 2; ++j) {
       for (const std::uint32_t index : {0x2021U, 0x2022U, 0x2040U}) made.objects[{index, j}] = 1000;
     }
@@ -252,6 +253,16 @@ TEST_F(CanDrivesTest, SaysWhatToDo) {
   expect_line(with(dictionary::tables, 4, 6), {"a robot of 6 joints", "--target flash", "toolchains/build_node.sh"});
   expect_line(with(dictionary::tables, 2, 1), {"another model", "--target flash", "toolchains/build_node.sh"});
   expect_line(with(dictionary::tables, 1, 1), {"other tables", "--target flash-tables"});
+  const auto with_slot = [&](UpdateSlot slot) {
+    two_nodes();
+    bus_.nodes[2].objects[{dictionary::tables, 1}] ^= 1U;
+    bus_.nodes[2].objects[{dictionary::tables, 8}] = static_cast<std::uint32_t>(slot);
+    return refused();
+  };
+  expect_line(with_slot(UpdateSlot::same), {"other tables", "--target flash-tables"});
+  expect_line(with_slot(UpdateSlot::older), {"refuses the page in its slot", "older than", "toolchains/build_node.sh"});
+  expect_line(with_slot(UpdateSlot::other_origin), {"refuses", "of another model", "toolchains/build_node.sh"});
+  expect_line(with_slot(UpdateSlot::unreadable), {"refuses", "unreadable", "--target flash-tables"});
 }
 
 TEST_F(CanDrivesTest, SaysWhichNodeHasNoFd) {

@@ -37,6 +37,14 @@ TEST(Pins, OutputReachesTheFarSide) {
   EXPECT_EQ(level(1), 0);
 }
 
+TEST(Pins, AFaultLineIsAssertedBeforeAnybodySetsIt) {
+  OutputPin pin;
+  ASSERT_EQ(pin.open(chip(), 1, "fault", Polarity::active_low, AtStart::on), Status::ok);
+  EXPECT_EQ(level(1), 0);
+  ASSERT_EQ(pin.set(false), Status::ok);
+  EXPECT_EQ(level(1), 1);
+}
+
 TEST(Pins, PolarityIsThePins) {
   OutputPin out;
   InputPin in;

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# package.sh: installs fxdyn and builds firmware/example_drive against the installed package only, for the host and for a
-# Cortex-M4.
+# package.sh: installs fxdyn and builds firmware/example_drive against the installed package only, for the host, where damaged
+# tables are refused, and for a Cortex-M4.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 work=$(mktemp -d)
@@ -18,6 +18,15 @@ build() {  # NAME ARGUMENT..
 }
 build host
 "$work/host/my_drive"
+# Tables that a flash has lost bits of: the drive says so, by its exit code here.
+objcopy -O binary --only-section=.fxdyn_tables "$work/host/my_drive" "$work/tables.bin"
+flashed() { objcopy --update-section .fxdyn_tables="$work/tables.bin" "$work/host/my_drive" "$work/flashed" && "$work/flashed"; }
+flashed
+printf 'lost' | dd of="$work/tables.bin" bs=1 seek=1000 conv=notrunc status=none
+if flashed; then
+  echo "package: the example drive runs with damaged tables" >&2
+  exit 1
+fi
 build cortex-m4 --toolchain "$work/prefix/share/fxdyn/toolchains/arm-none-eabi.cmake" -DFXDYN_CPU=cortex-m4
 arm-none-eabi-nm "$work/cortex-m4/my_drive.elf" | grep -q fxdyn_tables_begin
 if grep -rqF "$root/" "$work/host/CMakeFiles/my_drive.dir" "$work/cortex-m4/CMakeFiles/my_drive.dir"; then

@@ -52,5 +52,19 @@ expect_refusal() {  # FILE MESSAGE
 expect_refusal "$work/nothing.bin" "no such file"
 { printf 'FXD1\1\2\3\4'; tail -c +9 "$work/tables.bin"; } >"$work/other.bin"
 expect_refusal "$work/other.bin" "another model or layout"
+# patched FILE WORD VALUE
+patched() { printf "$(printf '\\x%02x' $(($3 & 255)) $(($3 >> 8 & 255)) $(($3 >> 16 & 255)) $(($3 >> 24)))" | dd of="$1" bs=4 seek="$2" conv=notrunc status=none; }
+word() { od -A n -t u4 -j $((4 * $2)) -N 4 "$1" | tr -d ' '; }
+cp "$work/tables.bin" "$work/changed.bin"
+patched "$work/changed.bin" 4 $(($(word "$work/tables.bin" 4) ^ 1))
+expect_refusal "$work/changed.bin" "an update of another model"
+cp "$work/tables.bin" "$work/changed.bin"
+patched "$work/changed.bin" 3 1
+expect_refusal "$work/changed.bin" "would not take it"  # of the same number, but not the image's own
+patched "$work/changed.bin" 5 0
+expect_refusal "$work/changed.bin" "has sequence 0"
+patched "$work/changed.bin" 5 $(($(word "$work/tables.bin" 5) + 1))
+said=$(tables "$work/changed.bin") || fail "refuses an update: $said"
+[[ $said == *"0x08078000" ]] || fail "programs $said"
 head -c 40000 /dev/zero >"$work/large.bin"
 expect_refusal "$work/large.bin" "the slot has 32768"

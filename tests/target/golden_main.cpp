@@ -4,9 +4,8 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "tests/golden/vectors.hpp"
-
 #include FXDYN_TABLES_HEADER
+#include FXDYN_VECTORS_HEADER
 
 #ifdef __arm__
 #include "hal/cortex_m/semihosting.hpp"
@@ -15,6 +14,8 @@
 #endif
 #ifdef FXDYN_COUNTS_INSTRUCTIONS
 #include "hal/mps2/systick.hpp"
+#elif defined(FXDYN_COUNTS_CYCLES)
+#include "hal/cortex_m/core.hpp"
 #endif
 
 namespace {
@@ -38,6 +39,8 @@ void print(const char* name, std::uint32_t number) {
 
 #ifdef FXDYN_COUNTS_INSTRUCTIONS
 using Counter = fxdyn::hal::mps2::ExactSysTick;
+#elif defined(FXDYN_COUNTS_CYCLES)
+using Counter = fxdyn::hal::cortex_m::CycleCounter;  // what tests/cycles looks for
 #else
 struct Counter {
   void start() {}
@@ -49,13 +52,6 @@ Model::State state;
 Model::Setpoints* setpoints;  // made in main(): Eigen's constructors are not constexpr
 Model::Torques* torques;
 fxdyn::Saturations saturations;
-
-/// The tables as the flash holds them: the compiler must not compute with the values that it knows.
-const auto& parameters_in_flash() {
-  const auto* parameters = &fxdyn::tables::parameters;
-  asm volatile("" : "+r"(parameters));
-  return *parameters;
-}
 
 /// A function of its own, so that no part of the tick can leave the measured stretch.
 [[gnu::noinline]] void compute(const Model::Parameters& parameters) {
@@ -69,7 +65,7 @@ const auto& parameters_in_flash() {
 int main() {
   static_assert(golden::joints == Model::joints && fxdyn::tables::page.header.crc32 == golden::tables_crc,
                 "tables.hpp and vectors.hpp are not of one run of make.sh");
-  const Model::Parameters& parameters = parameters_in_flash();
+  const Model::Parameters& parameters = fxdyn::as_flashed(fxdyn::tables::parameters);
   static Model::Setpoints in_ram{};
   static Model::Torques out{};
   setpoints = &in_ram;

@@ -7,7 +7,7 @@ import pathlib
 import sys
 
 from bus import Silent, SlcanBus
-from node_test import NODE, Node, counter, mps2
+from node_test import NODE, Node, counter, in_lockstep, mps2
 
 BOOT_UP, PRE_OPERATIONAL = b'\0', b'\x7f'
 WATCHDOG_RESETS = 17  # item of 0x2001
@@ -15,7 +15,7 @@ WATCHDOG_RESETS = 17  # item of 0x2001
 
 def hang(node):
     """Four ticks, and a fifth that is not answered but ends with a boot-up."""
-    node.write(0x1006, 0, 10_000_000, 4)  # no SYNC is overdue
+    in_lockstep(node)
     node.command(0x01)
     for _ in range(4):
         node.bus.send(0x080)

@@ -5,12 +5,12 @@
 #include <cstdint>
 
 #include FXDYN_TABLES_HEADER
+#include FXDYN_VECTORS_HEADER
 
 #include "firmware/drive_node.hpp"
 #include "hal/absent.hpp"
 #include "hal/cortex_m/semihosting.hpp"
 #include "hal/mps2/systick.hpp"
-#include "tests/golden/vectors.hpp"
 
 namespace {
 
@@ -63,8 +63,7 @@ void print(const char* name, std::uint32_t number) {
 }  // namespace
 
 int main() {
-  const auto* page = &fxdyn::tables::page;
-  asm volatile("" : "+r"(page));  // the compiler must not compute with the values that it knows
+  const auto& page = fxdyn::as_flashed(fxdyn::tables::page);
   static MemoryBus bus;
   static CountedClock clock;
   static fxdyn::hal::mps2::ExactSysTick counter;
@@ -73,7 +72,8 @@ int main() {
   static fxdyn::hal::AbsentOutput fault, tick_busy;
   static fxdyn::DriveHardware hardware{bus, clock, counter, watchdog, enable, fault, tick_busy};
   static fxdyn::DriveNode<Model, decltype(hardware)> node(
-      hardware, {page->parameters, page->header, fxdyn::page_is_valid(*page), false, rated}, {.board = "cost"});
+      hardware, {page.parameters, page.header, fxdyn::page_is_valid(page), fxdyn::UpdateSlot::empty, rated},
+      {.board = "cost"});
 
   const auto cost = [](std::uint8_t item) {
     fxdyn::dictionary::Object object;

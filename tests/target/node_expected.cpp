@@ -1,4 +1,4 @@
-// What a drive node with the golden tables must answer: for every tick of the golden setpoints, quantised as on the
+// What a drive node with a golden model's tables must answer: for every tick of the golden setpoints, quantised as on the
 // bus, the six setpoints and the six torques (per mille and mN*m, little endian), in hexadecimal. A line "reset" where
 // the model starts at rest.
 
@@ -7,9 +7,10 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include FXDYN_TABLES_HEADER
+#include FXDYN_VECTORS_HEADER
+
 #include "firmware/setpoint_codec.hpp"
-#include "tests/golden/tables.hpp"
-#include "tests/golden/vectors.hpp"
 
 namespace {
 

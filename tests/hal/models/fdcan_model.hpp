@@ -1,7 +1,7 @@
 #pragma once
 
 #include <array>
-#include <deque>
+#include <bit>
 #include <optional>
 
 #include "hal/can.hpp"
@@ -19,6 +19,13 @@ class FdcanModel : public RegisterModel {
   bool fd_enabled() const { return (cccr_ & 0x300U) == 0x300; }
   std::uint32_t field(hal::Address offset, int from, int bits) {
     return registers_[base + offset] >> from & ((1U << bits) - 1);
+  }
+
+  std::uint32_t bit_rate(std::uint32_t clock_hz) {  // NBTP
+    return clock_hz / ((field(0x1c, 16, 9) + 1) * (1 + field(0x1c, 8, 8) + 1 + field(0x1c, 0, 7) + 1));
+  }
+  std::uint32_t data_bit_rate(std::uint32_t clock_hz) {  // DBTP
+    return clock_hz / ((field(0x0c, 16, 5) + 1) * (1 + field(0x0c, 8, 5) + 1 + field(0x0c, 4, 4) + 1));
   }
 
   /// A frame comes in from the bus. Blocking mode: a full FIFO drops it.
@@ -46,17 +53,21 @@ class FdcanModel : public RegisterModel {
     std::uint32_t head, shape;
     std::array<std::uint32_t, 16> words;
   };
-  /// The oldest frame that waits goes out onto the bus.
+  /// The frame that wins the arbitration goes out onto the bus.
   std::optional<Sent> transmit() {
-    if (pending_.empty() || initialising() || off_) return {};
-    const std::uint32_t index = pending_.front();
-    pending_.pop_front();
-    const hal::Address element = ram + 0x278 + 72 * index;
+    if (pending_ == 0 || initialising() || off_) return {};
+    std::uint32_t first = 0;
+    for (std::uint32_t index = 0; index < 3; ++index) {
+      if ((pending_ >> index & 1U) == 0) continue;
+      if ((pending_ >> first & 1U) == 0 || on_the_bus(head(index)) < on_the_bus(head(first))) first = index;
+    }
+    pending_ &= ~(1U << first);
+    const hal::Address element = ram + 0x278 + 72 * first;
     Sent sent{memory_[element], memory_[element + 4], {}};
     for (std::uint32_t i = 0; i < 16; ++i) sent.words[i] = memory_[element + 8 + 4 * i];
     return sent;
   }
-  std::size_t waiting() const { return pending_.size(); }
+  int waiting() const { return std::popcount(pending_); }
 
   void set_counters(std::uint32_t transmit, std::uint32_t receive) {
     registers_[base + 0x40] = transmit | receive << 8;
@@ -95,7 +106,9 @@ class FdcanModel : public RegisterModel {
       case 0x90:
         return level_ | get_ << 8 | (get_ + level_) % 3 << 16 | (level_ == 3 ? 1U << 24 : 0);
       case 0xc4:
-        return static_cast<std::uint32_t>(3 - pending_.size()) | put_ << 16 | (pending_.size() == 3 ? 1U << 21 : 0);
+        return pending_ == 0b111 ? 1U << 21 : put() << 16;  // of a queue TFGI and TFFL are zero
+      case 0xc8:
+        return pending_;
       default:
         return registers_[address];
     }
@@ -105,7 +118,7 @@ class FdcanModel : public RegisterModel {
     if (in_ram(address)) {
       require(address % 4 == 0, "message RAM is written in words");
       if (address >= ram + 0x278 && !initialising())
-        require((address - ram - 0x278) / 72 == put_ && pending_.size() < 3, "writes an element that may be in use");
+        require(pending_ != 0b111 && (address - ram - 0x278) / 72 == put(), "writes an element that may be in use");
       memory_[address] = value;
       return;
     }
@@ -125,6 +138,7 @@ class FdcanModel : public RegisterModel {
       case 0x80:
       case 0xc0:
       case 0x100:
+        if (address == base + 0xc0) require(value == 1U << 24, "TXBC: this model knows the queue alone (TFQM)");
         require(open, "configuration needs INIT and CCE");
         if (open) registers_[address] = value;
         return;
@@ -132,6 +146,7 @@ class FdcanModel : public RegisterModel {
       case 0x44:
       case 0x90:
       case 0xc4:
+      case 0xc8:
         require(false, "writes a register that only reads");
         return;
       case 0x50:
@@ -144,12 +159,13 @@ class FdcanModel : public RegisterModel {
         return;
       case 0xcc:
         require(!initialising() && !off_, "asks to send while off the bus");
-        require(value == 1U << put_ && pending_.size() < 3, "asks to send another element than the put index");
-        pending_.push_back(put_);
-        put_ = (put_ + 1) % 3;
+        require(pending_ != 0b111 && value == 1U << put(), "asks to send another element than the put index");
+        for (std::uint32_t i = 0; i < 3; ++i)
+          require((pending_ >> i & 1U) == 0 || head(i) != head(put()), "an identifier twice: their order is not known");
+        pending_ |= value;
         return;
       case 0xd0:
-        pending_.clear();
+        pending_ &= ~value;
         return;
       case 0x54:
       case 0x58:
@@ -184,6 +200,16 @@ class FdcanModel : public RegisterModel {
     }
     return (global >> 4 & 0b11) == 0;
   }
+  /// The free element with the lowest number.
+  std::uint32_t put() const { return static_cast<std::uint32_t>(std::countr_one(pending_)); }
+  std::uint32_t head(std::uint32_t index) { return memory_[ram + 0x278 + 72 * index]; }
+  /// The bits of the arbitration field in their order, zeros first (ISO 11898-1): base identifier, RTR or SRR, IDE,
+  /// then the rest of 29 bits and RTR.
+  static std::uint32_t on_the_bus(std::uint32_t head) {
+    const std::uint32_t remote = head >> 29 & 1U, id = head & 0x1fff'ffff;
+    if ((head & 1U << 30) == 0) return (id >> 18) << 21 | remote << 20;
+    return (id >> 18) << 21 | 0b11U << 19 | (id & 0x3'ffff) << 1 | remote;
+  }
   bool in_ram(hal::Address address) {
     if (address < ram || address >= ram + 0x2000) {
       require(address >= base && address < base + 0x400, "outside the controller");
@@ -193,8 +219,8 @@ class FdcanModel : public RegisterModel {
     return true;
   }
   std::uint32_t cccr_ = 1, interrupts_ = 0xff;
-  std::uint32_t get_ = 0, level_ = 0, put_ = 0;
-  std::deque<std::uint32_t> pending_;
+  std::uint32_t get_ = 0, level_ = 0;
+  std::uint32_t pending_ = 0;  ///< TXBRP
   std::map<hal::Address, std::uint32_t> memory_;
   bool off_ = false, passive_ = false;
   int sequences_ = 0;

@@ -1,0 +1,14 @@
+#pragma once
+
+#include "hal/stm32/watchdog.hpp"
+
+namespace fxdyn::hal::stm32f4 {
+
+inline constexpr stm32::LsiRange lsi{17'000, 47'000};  // DS8626, "LSI oscillator characteristics"
+
+template <Registers R = MemoryMapped>
+using BasicWatchdog = stm32::BasicWatchdog<lsi, R>;
+using Watchdog = BasicWatchdog<>;
+static_assert(hal::Watchdog<Watchdog>);
+
+}  // namespace fxdyn::hal::stm32f4
