@@ -132,6 +132,14 @@ void FaultCampaign::start() {
   }
 }
 
+/// A tick of the motion. Without a period it is SYNC that makes a tick, so one that did not come made none: as a host in
+/// lockstep does, the same setpoints are sent again.
+void FaultCampaign::next_setpoints() {
+  if (!is_timed() && !motion_has_had_sync_) return;
+  setpoints_ = motion_.next();
+  motion_has_had_sync_ = false;
+}
+
 /// The node forgets what it was told, its model starts anew, and its torque goes to zero without a frame.
 void FaultCampaign::left_operation() {
   picture_.leave_operation();
@@ -186,6 +194,12 @@ void FaultCampaign::end_tick(bool with_sync, can::Duration late) {
   next_sync_ += spacing_;
 }
 
+/// Without a period a second SYNC is a tick of the motion too, one whose setpoints did not come.
+void FaultCampaign::next_tick_of_lockstep() {
+  if (!is_timed() && motion_has_had_sync_) next_setpoints();
+  motion_has_had_sync_ = true;
+}
+
 /// SYNC, and the torques that have to come. What the node has to count follows from what has arrived.
 void FaultCampaign::sync() {
   drain();
@@ -195,11 +209,13 @@ void FaultCampaign::sync() {
   }
   own_ticks_ = own_frames_ = 0;
   ++ticks_;
+  next_tick_of_lockstep();
   torques_.fill(std::nullopt);
   tick_frames_ = 0;
   answering_ = true;
   const bool fresh = picture_.sync(node_.bus().now());
   note_tick(fresh);
+  last_request_ = node_.bus().now();
   node_.bus().send({.id = canopen::sync_id});
   can::Frame frame;
   const can::Duration end = node_.bus().now() + answer_time;
@@ -240,7 +256,7 @@ void FaultCampaign::whole_tick() {
 }
 
 void FaultCampaign::good_tick() {
-  setpoints_ = motion_.next();
+  next_setpoints();
   whole_tick();
 }
 
@@ -269,16 +285,14 @@ void FaultCampaign::take(const can::Frame& frame) {
 /// Out of operation the node goes on ramping without counting ticks: there the time that passed tells how many there
 /// were.
 void FaultCampaign::take_torque(std::size_t j, const WireTorque& torque) {
-  const can::Duration now = node_.bus().now();
   std::int64_t ticks = static_cast<std::uint8_t>(torque.tick - last_tick_[j]);
-  if (ramped_unseen_[j])
-    ticks += std::chrono::duration_cast<std::chrono::milliseconds>(now - last_time_[j]).count() / 2 + 1;
+  if (ramped_unseen_[j] || ramps_by_time_) ticks += (node_.bus().now() - last_time_[j]) / tick + 1;
   since_ramp_[j] = ramped_unseen_[j] || (torque.status & torque_status::ramping) != 0 ? 0 : since_ramp_[j] + 1;
   const std::int64_t step = std::abs(std::int64_t{torque.milli} - last_milli_[j]);
   const std::int64_t most = std::int64_t{step_milli_[j] + 1} * ticks + 1;
   if (step > most && ++large_steps_ <= 10)
-    std::printf("FAILED: torque of joint %zu steps by %lld mN m in %lld ticks\n", j + 1, static_cast<long long>(step),
-                static_cast<long long>(ticks));
+    std::printf("FAILED: %s: torque of joint %zu steps by %lld mN m in %lld ticks\n", name_of(fault_), j + 1,
+                static_cast<long long>(step), static_cast<long long>(ticks));
   largest_step_share_ = std::max(largest_step_share_, static_cast<double>(step) / static_cast<double>(most));
   if (const std::int64_t even = even_step(j); even < most) {
     if (step > even && ++uneven_steps_ <= 10)
@@ -292,7 +306,7 @@ void FaultCampaign::take_torque(std::size_t j, const WireTorque& torque) {
   torques_[j] = torque;
   last_milli_[j] = torque.milli;
   last_tick_[j] = torque.tick;
-  last_time_[j] = now;
+  last_time_[j] = answering_ ? last_request_ : node_.bus().now();
 }
 
 /// The largest step that a torque may make where it follows the model: the motion's own largest step around this tick
@@ -342,7 +356,7 @@ void FaultCampaign::inject(Fault fault) {
   Tally& tally = tallies_[static_cast<std::size_t>(fault)];
   ++tally.injected;
   fault_ = fault;
-  setpoints_ = motion_.next();
+  next_setpoints();
   const can::Duration since = node_.bus().now();
   const std::uint64_t ticks_before = ticks_;
   const Counts before = picture_.counts;
@@ -444,7 +458,7 @@ void FaultCampaign::drop() {
   for (std::size_t ticks = many ? 1 + random_() % 80 : 0; ticks > 0; --ticks) {
     begin_setpoints();
     end_tick(true);
-    setpoints_ = motion_.next();
+    next_setpoints();
   }
   const std::size_t which = random_() % (joints + 1);
   send_all_but(which);
@@ -458,7 +472,7 @@ void FaultCampaign::burst() {
       if (random_() % 2 == 0) send_setpoint(j, setpoints_[j]);
     }
     end_tick(true);
-    setpoints_ = motion_.next();
+    next_setpoints();
   }
   whole_tick();
 }
@@ -492,7 +506,7 @@ void FaultCampaign::late_lost() {
   const WireSetpoint late = setpoints_[which];
   send_all_but(which);
   end_tick(true);
-  setpoints_ = motion_.next();
+  next_setpoints();
   send_setpoint(which, late);
   send_all_but(which);
   end_tick(true);
@@ -647,12 +661,12 @@ void FaultCampaign::sync_lost() {
   const bool with_setpoints = random_() % 2 == 0;
   const std::int64_t periods = 1 + any(60), left = picture_.own_ticks_left();
   for (std::int64_t i = 0; i < periods; ++i) {
-    if (i > 0) setpoints_ = motion_.next();
+    if (i > 0) next_setpoints();
     begin_setpoints();
     if (with_setpoints) send_all();
     end_tick(false);
   }
-  setpoints_ = motion_.next();
+  next_setpoints();
   begin_setpoints();
   wait_until(next_sync_);
   check_own_ticks(std::min(periods, left), std::min(periods, left));
@@ -693,6 +707,7 @@ void FaultCampaign::heartbeat() {
   const std::size_t how = random_() % (is_timed() ? 3 : 2);
   const bool by_time = how == 2;
   const auto ms = static_cast<std::uint32_t>((by_time ? alive : can::Duration(patient)) / std::chrono::milliseconds(1));
+  ramps_by_time_ = !is_timed();
   master_.write(id, 0x1016, 1, std::uint32_t{master_id} << 16 | ms, 4);
   master_.heartbeat(master_id, random_() % 2 == 0 ? NmtState::operational : NmtState::pre_operational);
   whole_tick();
@@ -707,6 +722,7 @@ void FaultCampaign::heartbeat() {
   if (how == 1) master_.heartbeat(master_id, NmtState::stopped);  // it still is
   master_.heartbeat(master_id, NmtState::operational);
   good_tick();
+  ramps_by_time_ = false;
   master_.write(id, 0x1016, 1, 0, 4);
 }
 

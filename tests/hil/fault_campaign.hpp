@@ -134,6 +134,8 @@ class FaultCampaign {
   void wait_until(can::Duration time);
   void drain();
   void send(const can::Frame& frame);
+  void next_setpoints();
+  void next_tick_of_lockstep();
   void begin_setpoints();
   void send_setpoint(std::size_t j, const WireSetpoint& setpoint);
   void send_all();
@@ -169,6 +171,7 @@ class FaultCampaign {
                 missing_torques_ = 0, wrong_torques_ = 0;
   Fault fault_{};
   std::vector<WireSetpoint> setpoints_;  ///< of this tick
+  bool motion_has_had_sync_ = true;      ///< since they were its next
   std::uint32_t recently_stale_ = 0;     ///< bit i: the tick i ticks ago was stale
 
   // What came from it.
@@ -177,8 +180,11 @@ class FaultCampaign {
   std::array<std::int32_t, joints> step_milli_{}, last_milli_{};
   std::array<std::uint8_t, joints> last_tick_{};
   std::array<std::uint32_t, joints> since_ramp_{};  ///< torques
-  std::array<can::Duration, joints> last_time_{};
+  std::array<can::Duration, joints> last_time_{};  ///< not after the node's tick
+  can::Duration last_request_{};                   ///< when SYNC was sent
   std::array<bool, joints> ramped_unseen_{};  ///< it has been out of operation since: the torque moved without frames
+  /// A torque that may not go out goes to zero between ticks too, where those are slower than the tables' tick.
+  bool ramps_by_time_ = false;
   std::uint32_t tick_frames_ = 0, own_ticks_ = 0, own_frames_ = 0;
   std::optional<can::Frame> sdo_answer_;
   double largest_step_share_ = 0, largest_uneven_share_ = 0;
