@@ -519,7 +519,7 @@ bool Fdcan::sees_itself(const WireRates& wire) const {
 
 Time Wire::duration(const Frame& frame) const {
   const bus_load::Rates both{rates.nominal, rates.data};
-  constexpr Time nanosecond = microsecond / 1000;
+  const Time nanosecond = microsecond / 1000 / speed;
   const std::uint32_t bytes = frame.remote ? 0U : frame.size;
   if (frame.fd) return bus_load::fd_ns(bytes, both) * nanosecond;
   return bus_load::classic_ns(bytes, both) * nanosecond + (frame.extended ? bit_time(25) : 0);
@@ -528,7 +528,7 @@ Time Wire::duration(const Frame& frame) const {
 void Wire::count_idle(Time now) {
   idle_counted_ = std::max({idle_counted_, idle_since_, node_.joins_after()});
   if (node_.initialising() || node_.sequences_left() == 0 || now < idle_counted_) return;
-  const std::uint64_t sequences = whole_periods(now - idle_counted_, rates.nominal) / 11;
+  const std::uint64_t sequences = (now - idle_counted_) / bit_time(11);
   idle_counted_ += bit_time(static_cast<std::uint32_t>(11 * sequences));
   node_.recessive_sequences(static_cast<std::uint32_t>(sequences));
 }

@@ -127,6 +127,7 @@ class Wire {
 
   explicit Wire(Fdcan& node) : node_(node) {}
   WireRates rates;
+  std::uint32_t speed = 1;      ///< so many times as fast as its rates say, for tests that a full bus has no part in
   bool host_listens = true;     ///< and acknowledges
   bool stuck_dominant = false;  ///< a short circuit: nothing goes through, no bus idle either
   std::uint32_t disturbed = 0;  ///< so many of the part's next frames are destroyed
@@ -142,7 +143,7 @@ class Wire {
 
  private:
   Time duration(const Frame& frame) const;
-  Time bit_time(std::uint32_t bits) const { return periods(bits, rates.nominal); }
+  Time bit_time(std::uint32_t bits) const { return periods(bits, rates.nominal) / speed; }
   void finish();
   bool start(Time now);
   void count_idle(Time now);

@@ -37,10 +37,11 @@ class ProcessNode final : public hil::NodeUnderTest {
   can::Bus& bus() override { return bus_; }
 
   /// As a driver tells it: off the bus, and a little later on it again. A virtual interface lets any program say so.
-  void fall_off_the_bus() override {
+  std::uint32_t fall_off_the_bus() override {
     error_frame(CAN_ERR_BUSOFF);
     ::usleep(20'000);
     error_frame(CAN_ERR_RESTARTED);
+    return 0;
   }
   void restart(bool good_tables) override {
     stop();

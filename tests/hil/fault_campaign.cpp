@@ -274,7 +274,7 @@ void FaultCampaign::take(const can::Frame& frame) {
     ++own_frames_;
     if (j == 0) {
       ++own_ticks_;
-      picture_.own_tick(node_.bus().now());
+      picture_.own_tick();
       note_tick(false);
     }
   }
@@ -570,7 +570,7 @@ void FaultCampaign::send_foreign(std::size_t count) {
     }
     std::generate_n(frame.data.begin(), frame.size, [&] { return any_byte(); });
     send(frame);
-    expect(Counter::foreign_frames);
+    if (node_.sees_foreign_frames()) expect(Counter::foreign_frames);
   }
   whole_tick();
 }
@@ -729,7 +729,7 @@ void FaultCampaign::heartbeat() {
 /// What is sent meanwhile it does not hear.
 void FaultCampaign::bus_off() {
   begin_setpoints();
-  node_.fall_off_the_bus();
+  expect(Counter::lost_sent, node_.fall_off_the_bus());
   expect(Counter::bus_offs);
   if (!is_timed()) return master_.listen(quiet);
   end_tick(false);

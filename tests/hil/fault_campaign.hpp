@@ -54,8 +54,10 @@ class NodeUnderTest {
  public:
   virtual ~NodeUnderTest() = default;
   virtual can::Bus& bus() = 0;
-  /// Bus-off; it is on the bus again within a period and a half, or when this returns.
-  virtual void fall_off_the_bus() = 0;
+  /// Bus-off; it is on the bus again within half a period, or when this returns. How many of its frames that cost.
+  virtual std::uint32_t fall_off_the_bus() = 0;
+  /// False: its controller has acceptance filters.
+  virtual bool sees_foreign_frames() const { return true; }
   /// Power off and on again, with good tables or with corrupt ones.
   virtual void restart(bool good_tables) = 0;
 };

@@ -23,7 +23,10 @@ class MemoryNode final : public hil::NodeUnderTest, public can::Bus {
  public:
   MemoryNode() { restart(true); }
   can::Bus& bus() override { return *this; }
-  void fall_off_the_bus() override { controller_->fall_off_the_bus(3); }
+  std::uint32_t fall_off_the_bus() override {
+    controller_->fall_off_the_bus(3);
+    return 0;
+  }
   void restart(bool good_tables) override {
     node_.reset();
     wire_ = std::make_unique<hal::fake::CanWire<Frame>>(clock_);

@@ -56,10 +56,10 @@ class NodePicture {
     has_last_ = false;
     state_ = {};
   }
-  /// SYNC is overdue.
-  void own_tick(can::Duration now) {
+  /// SYNC is overdue: half a period after its time, then a tick at a time. When it was due counts, not when it was done.
+  void own_tick() {
     expect(Counter::overdue_syncs);
-    own_us_ = now;
+    own_ = own_ticks_ == 0 ? sync_ + tick_ + tick_ / 2 : own_ + tick_;
     ++own_ticks_;
     stale_tick();
   }
@@ -83,7 +83,7 @@ class NodePicture {
 
   std::uint32_t periods_since_sync(can::Duration now) const {
     if (!watched_ || own_ticks_ == 0) return 1;
-    return own_ticks_ + (now - own_us_ < tick_ / 4 ? 0U : 1U);
+    return own_ticks_ + (now - own_ < tick_ / 4 ? 0U : 1U);
   }
 
   bool accept(std::uint32_t periods) {
@@ -140,7 +140,7 @@ class NodePicture {
   }
 
   const typename Model::Parameters& parameters_;
-  can::Duration tick_, own_us_{}, sync_ = -tick_ * 10;  ///< when the last own tick was
+  can::Duration tick_, own_{}, sync_ = -tick_ * 10;  ///< own_: when the last own tick was due
   std::uint32_t longest_gap_;
   bool watched_;
   std::array<std::uint32_t, joints> arrivals_{};  ///< of setpoints since the last SYNC
