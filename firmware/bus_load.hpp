@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "firmware/setpoint_codec.hpp"
+#include "firmware/protocol/setpoint_codec.hpp"
 #include "hal/can.hpp"
 
 // How long frames and ticks occupy a bus at most: with every stuff bit that can occur, the pause between frames

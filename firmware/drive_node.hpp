@@ -8,13 +8,13 @@
 #include <span>
 #include <string_view>
 
-#include "firmware/canopen.hpp"
 #include "firmware/emergency.hpp"
-#include "firmware/object_dictionary.hpp"
+#include "firmware/protocol/canopen.hpp"
+#include "firmware/protocol/object_dictionary.hpp"
+#include "firmware/protocol/setpoint_codec.hpp"
+#include "firmware/protocol/torque_output.hpp"
 #include "firmware/sdo_server.hpp"
-#include "firmware/setpoint_codec.hpp"
 #include "firmware/slow_division.hpp"
-#include "firmware/torque_output.hpp"
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
 #include "hal/gpio.hpp"

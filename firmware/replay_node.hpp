@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <span>
 
-#include "firmware/serial_protocol.hpp"
+#include "firmware/protocol/serial_protocol.hpp"
 #include "hal/clock.hpp"
 #include "hal/serial.hpp"
 #include "model/fixed.hpp"

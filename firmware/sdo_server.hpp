@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <span>
 
-#include "firmware/canopen.hpp"
+#include "firmware/protocol/canopen.hpp"
 #include "model/wrapping.hpp"
 
 namespace fxdyn {

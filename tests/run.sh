@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # run.sh [LABEL...]: builds and runs the tests, all of them or those with one of the labels
-#   unit target hil real diagnosis fuzz bench
+#   format unit target hil real diagnosis fuzz bench
 # Without a label the unit tests also run with address and undefined-behaviour sanitizers.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
-labels=(unit target hil real diagnosis fuzz bench)
+labels=(format unit target hil real diagnosis fuzz bench)
 for label in "$@"; do
   if [[ " ${labels[*]} " != *" $label "* ]]; then
     echo "run.sh: unknown label '$label'; known: ${labels[*]}" >&2

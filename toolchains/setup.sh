@@ -16,8 +16,8 @@ packages=(
   # target
   gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm
   binutils-aarch64-linux-gnu openocd libunicorn-dev libcapstone-dev
-  # a second compiler, its linker and its checks
-  clang-14 lld-14 libclang-rt-14-dev
+  # a second compiler, its linker, its checks, the sources' format
+  clang-14 lld-14 libclang-rt-14-dev clang-format-14 clang-tidy-14
   # tests
   libgtest-dev libunicorn-dev librapidcheck-dev libbenchmark-dev liborocos-kdl-dev libmujoco-dev libpagmo-dev python3 llvm-14
 )

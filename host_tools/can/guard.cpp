@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <array>
 
-#include "firmware/canopen.hpp"
+#include "firmware/protocol/canopen.hpp"
 
 namespace fxdyn::can {
 namespace {

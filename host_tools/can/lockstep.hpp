@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "firmware/setpoint_codec.hpp"
+#include "firmware/protocol/setpoint_codec.hpp"
 #include "host_tools/can/master.hpp"
 
 namespace fxdyn::can {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "firmware/canopen.hpp"
+#include "firmware/protocol/canopen.hpp"
 #include "host_tools/can/bus.hpp"
 
 namespace fxdyn::can {

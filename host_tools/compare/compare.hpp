@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/log/project.hpp"
+#include "host_tools/project/project.hpp"
 
 namespace fxdyn {
 

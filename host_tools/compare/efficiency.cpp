@@ -5,11 +5,12 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/compare/compare.hpp"
-#include "host_tools/error.hpp"
-#include "host_tools/files.hpp"
 #include "host_tools/identify/identify.hpp"
-#include "host_tools/pipeline/provenance.hpp"
-#include "host_tools/progress.hpp"
+#include "host_tools/project/provenance.hpp"
+#include "host_tools/simulate/recordings.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/files.hpp"
+#include "host_tools/support/progress.hpp"
 
 namespace fxdyn {
 namespace {

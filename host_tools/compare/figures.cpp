@@ -5,8 +5,9 @@
 #include <cmath>
 #include <functional>
 
-#include "host_tools/files.hpp"
-#include "host_tools/report/plot.hpp"
+#include "host_tools/page/plot.hpp"
+#include "host_tools/report/comparison_section.hpp"
+#include "host_tools/support/files.hpp"
 
 namespace fxdyn {
 namespace {

@@ -4,7 +4,7 @@
 #include <deque>
 #include <vector>
 
-#include "host_tools/random.hpp"
+#include "host_tools/support/random.hpp"
 
 namespace fxdyn {
 

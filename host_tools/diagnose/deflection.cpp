@@ -8,10 +8,10 @@
 
 #include "host_tools/diagnose/autoregression.hpp"
 #include "host_tools/diagnose/linearised.hpp"
-#include "host_tools/identify/regressor.hpp"
-#include "host_tools/identify/solver.hpp"
-#include "host_tools/model/effects.hpp"
-#include "host_tools/parallel.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/regression/regressor.hpp"
+#include "host_tools/regression/solver.hpp"
+#include "host_tools/support/parallel.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/identify/dataset.hpp"
-#include "host_tools/model/identified_model.hpp"
+#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/regression/dataset.hpp"
 
 namespace fxdyn::diagnosis {
 

@@ -12,10 +12,10 @@
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/diagnose/sessions.hpp"
 #include "host_tools/diagnose/verdict.hpp"
-#include "host_tools/error.hpp"
-#include "host_tools/identify/regressor.hpp"
-#include "host_tools/identify/solver.hpp"
-#include "host_tools/model/effects.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/regression/regressor.hpp"
+#include "host_tools/regression/solver.hpp"
+#include "host_tools/support/error.hpp"
 
 namespace fxdyn {
 namespace {

@@ -4,9 +4,9 @@
 #include <numbers>
 
 #include "host_tools/diagnose/search.hpp"
-#include "host_tools/identify/regressor.hpp"
-#include "host_tools/model/effects.hpp"
-#include "host_tools/parallel.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/regression/regressor.hpp"
+#include "host_tools/support/parallel.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {

@@ -8,9 +8,9 @@
 #include <optional>
 
 #include "host_tools/diagnose/forward.hpp"
-#include "host_tools/error.hpp"
 #include "host_tools/export/export.hpp"
-#include "host_tools/report/metrics.hpp"
+#include "host_tools/regression/metrics.hpp"
+#include "host_tools/support/error.hpp"
 
 namespace fxdyn {
 namespace {

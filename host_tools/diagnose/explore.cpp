@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "host_tools/diagnose/refit.hpp"
-#include "host_tools/model/effects.hpp"
-#include "host_tools/parallel.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/support/parallel.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host_tools/error.hpp"
-#include "host_tools/model/effects.hpp"
-#include "host_tools/parallel.hpp"
+#include "host_tools/effects/effects.hpp"
 #include "host_tools/simulate/closed_loop.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {
 namespace {

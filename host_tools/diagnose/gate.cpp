@@ -5,9 +5,9 @@
 #include <memory>
 
 #include "host_tools/diagnose/refit.hpp"
-#include "host_tools/model/effects.hpp"
-#include "host_tools/model/evaluator.hpp"
-#include "host_tools/parallel.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/evaluator.hpp"
+#include "host_tools/support/parallel.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {

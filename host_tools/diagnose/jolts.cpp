@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host_tools/parallel.hpp"
+#include "host_tools/support/parallel.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {

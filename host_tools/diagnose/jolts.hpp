@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/identify/dataset.hpp"
+#include "host_tools/regression/dataset.hpp"
 
 namespace fxdyn::diagnosis {
 

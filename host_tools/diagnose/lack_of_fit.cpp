@@ -7,9 +7,9 @@
 #include <numbers>
 #include <unsupported/Eigen/FFT>
 
-#include "host_tools/identify/solver.hpp"
-#include "host_tools/model/effects.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/regression/solver.hpp"
+#include "host_tools/support/random.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {

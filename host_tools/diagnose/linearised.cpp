@@ -6,11 +6,11 @@
 
 #include "host_tools/diagnose/autoregression.hpp"
 #include "host_tools/diagnose/lack_of_fit.hpp"
-#include "host_tools/error.hpp"
-#include "host_tools/identify/solver.hpp"
-#include "host_tools/model/effects.hpp"
-#include "host_tools/model/evaluator.hpp"
-#include "host_tools/parallel.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/evaluator.hpp"
+#include "host_tools/regression/solver.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/parallel.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {

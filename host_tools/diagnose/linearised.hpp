@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "host_tools/excite/motion.hpp"
-#include "host_tools/identify/dataset.hpp"
-#include "host_tools/identify/regressor.hpp"
-#include "host_tools/model/robot_columns.hpp"
+#include "host_tools/effects/robot_columns.hpp"
+#include "host_tools/regression/dataset.hpp"
+#include "host_tools/regression/regressor.hpp"
+#include "host_tools/signals/motion.hpp"
 
 namespace fxdyn::diagnosis {
 

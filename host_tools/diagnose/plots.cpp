@@ -8,9 +8,10 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
-#include "host_tools/files.hpp"
-#include "host_tools/log/spectrum.hpp"
-#include "host_tools/report/plot.hpp"
+#include "host_tools/page/plot.hpp"
+#include "host_tools/report/diagnosis_section.hpp"
+#include "host_tools/signals/spectrum.hpp"
+#include "host_tools/support/files.hpp"
 
 namespace fxdyn {
 namespace {
@@ -144,10 +145,6 @@ std::vector<std::size_t> shown_joints(const json& diagnosis, std::size_t joints)
 }
 
 }  // namespace
-
-fs::path diagnosis_plot(const fs::path& directory, std::size_t joint) {
-  return directory / "plots" / fmt::format("diagnosis_joint_{}.svg", joint + 1);
-}
 
 std::vector<fs::path> write_diagnosis_plots(const IdentifiedModel& nominal, const IdentifiedModel& diagnosed,
                                             const std::vector<ProcessedLog>& held_out, const json& diagnosis,

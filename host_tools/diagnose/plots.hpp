@@ -4,7 +4,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <vector>
 
-#include "host_tools/identify/dataset.hpp"
+#include "host_tools/regression/dataset.hpp"
 
 namespace fxdyn {
 
@@ -20,8 +20,5 @@ std::vector<std::filesystem::path> write_diagnosis_plots(const IdentifiedModel& 
                                                          const std::vector<ProcessedLog>& held_out,
                                                          const nlohmann::json& diagnosis,
                                                          const std::filesystem::path& directory);
-
-/// Where the plot of a joint (from 0) is.
-std::filesystem::path diagnosis_plot(const std::filesystem::path& directory, std::size_t joint);
 
 }  // namespace fxdyn

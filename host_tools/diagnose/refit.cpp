@@ -4,8 +4,8 @@
 #include <cmath>
 #include <memory>
 
-#include "host_tools/identify/solver.hpp"
-#include "host_tools/model/effects.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/regression/solver.hpp"
 
 namespace fxdyn::diagnosis {
 

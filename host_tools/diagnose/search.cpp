@@ -4,10 +4,10 @@
 #include <cmath>
 #include <set>
 
-#include "host_tools/identify/solver.hpp"
-#include "host_tools/model/effects.hpp"
-#include "host_tools/parallel.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/regression/solver.hpp"
+#include "host_tools/support/parallel.hpp"
+#include "host_tools/support/random.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {

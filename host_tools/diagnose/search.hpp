@@ -1,11 +1,11 @@
 #pragma once
 
-#include <string>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "host_tools/diagnose/linearised.hpp"
-#include "host_tools/progress.hpp"
+#include "host_tools/support/progress.hpp"
 
 namespace fxdyn::diagnosis {
 

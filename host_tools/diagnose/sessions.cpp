@@ -7,9 +7,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "host_tools/error.hpp"
-#include "host_tools/model/effects.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/random.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {

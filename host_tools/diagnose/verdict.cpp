@@ -8,10 +8,10 @@
 #include <set>
 
 #include "host_tools/diagnose/where.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/evaluator.hpp"
 #include "host_tools/excite/sight.hpp"
-#include "host_tools/model/effects.hpp"
-#include "host_tools/model/evaluator.hpp"
-#include "host_tools/parallel.hpp"
+#include "host_tools/support/parallel.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {

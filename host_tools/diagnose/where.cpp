@@ -4,8 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host_tools/log/spectrum.hpp"
-#include "host_tools/model/evaluator.hpp"
+#include "host_tools/effects/evaluator.hpp"
+#include "host_tools/signals/spectrum.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {

@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 #include <fmt/ostream.h>
 
-#include "firmware/canopen.hpp"
+#include "firmware/protocol/canopen.hpp"
 #include "host_tools/dictionary/dictionary.hpp"
 
 namespace fxdyn {

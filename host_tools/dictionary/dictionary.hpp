@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "firmware/object_dictionary.hpp"
-#include "firmware/setpoint_codec.hpp"
+#include "firmware/protocol/object_dictionary.hpp"
+#include "firmware/protocol/setpoint_codec.hpp"
 #include "model/numbers.hpp"
 #include "model/rigid_body.hpp"
 #include "model/version.hpp"

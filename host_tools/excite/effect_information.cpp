@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host_tools/error.hpp"
-#include "host_tools/model/effects.hpp"
-#include "host_tools/parallel.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {
 namespace {

@@ -5,8 +5,8 @@
 #include <numeric>
 #include <vector>
 
-#include "host_tools/parallel.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/support/parallel.hpp"
+#include "host_tools/support/random.hpp"
 
 namespace fxdyn {
 

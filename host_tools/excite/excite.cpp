@@ -6,12 +6,12 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host_tools/error.hpp"
 #include "host_tools/excite/nominal.hpp"
 #include "host_tools/excite/sight.hpp"
-#include "host_tools/files.hpp"
-#include "host_tools/log/log.hpp"
-#include "host_tools/report/plot.hpp"
+#include "host_tools/page/plot.hpp"
+#include "host_tools/signals/log.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/files.hpp"
 
 namespace fxdyn {
 namespace {

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/excite/motion.hpp"
-#include "host_tools/log/project.hpp"
-#include "host_tools/model/identified_model.hpp"
+#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/project/project.hpp"
+#include "host_tools/signals/motion.hpp"
 
 namespace fxdyn {
 

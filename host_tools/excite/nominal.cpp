@@ -6,9 +6,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "host_tools/error.hpp"
-#include "host_tools/model/evaluator.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/effects/evaluator.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/random.hpp"
 
 namespace fxdyn {
 namespace {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/model/identified_model.hpp"
+#include "host_tools/effects/identified_model.hpp"
 
 namespace fxdyn {
 

@@ -4,7 +4,7 @@
 
 #include "host_tools/excite/excite.hpp"
 #include "host_tools/excite/paper_table1.hpp"
-#include "host_tools/files.hpp"
+#include "host_tools/support/files.hpp"
 
 namespace fxdyn {
 

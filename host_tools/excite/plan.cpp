@@ -9,10 +9,10 @@
 #include <numbers>
 #include <numeric>
 
-#include "host_tools/error.hpp"
 #include "host_tools/excite/evolution.hpp"
-#include "host_tools/parallel.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/parallel.hpp"
+#include "host_tools/support/random.hpp"
 
 namespace fxdyn {
 namespace {

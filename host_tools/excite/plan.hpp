@@ -4,11 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/excite/fourier.hpp"
-#include "host_tools/excite/information.hpp"
 #include "host_tools/excite/limits.hpp"
-#include "host_tools/excite/motion.hpp"
-#include "host_tools/progress.hpp"
+#include "host_tools/regression/information.hpp"
+#include "host_tools/signals/fourier.hpp"
+#include "host_tools/signals/motion.hpp"
+#include "host_tools/support/progress.hpp"
 
 namespace fxdyn {
 

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <set>
 
-#include "host_tools/error.hpp"
+#include "host_tools/effects/effects.hpp"
 #include "host_tools/excite/effect_information.hpp"
-#include "host_tools/model/effects.hpp"
-#include "host_tools/parallel.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {
 namespace {

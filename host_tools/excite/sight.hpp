@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/excite/motion.hpp"
-#include "host_tools/model/robot_columns.hpp"
-#include "host_tools/progress.hpp"
+#include "host_tools/effects/robot_columns.hpp"
+#include "host_tools/signals/motion.hpp"
+#include "host_tools/support/progress.hpp"
 
 // What an experiment will see, before anyone moves the robot. docs/guide/sight.md explains the figures.
 

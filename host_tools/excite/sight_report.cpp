@@ -6,8 +6,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "host_tools/effects/effects.hpp"
 #include "host_tools/excite/sight.hpp"
-#include "host_tools/model/effects.hpp"
 
 namespace fxdyn {
 namespace {

@@ -4,8 +4,8 @@
 #include <nlohmann/json_fwd.hpp>
 #include <vector>
 
-#include "host_tools/identify/dataset.hpp"
-#include "host_tools/model/evaluator.hpp"
+#include "host_tools/effects/evaluator.hpp"
+#include "host_tools/regression/dataset.hpp"
 
 namespace fxdyn {
 

@@ -3,12 +3,12 @@
 #include <cmath>
 #include <limits>
 
-#include "host_tools/error.hpp"
+#include "host_tools/effects/effects.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/export/proof.hpp"
-#include "host_tools/model/effects.hpp"
 #include "host_tools/numbers/bounded.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/random.hpp"
 
 #include <nlohmann/json.hpp>
 

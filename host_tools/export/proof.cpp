@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <queue>
 
-#include "host_tools/error.hpp"
-#include "host_tools/model/evaluator.hpp"
-#include "host_tools/parallel.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/effects/evaluator.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/parallel.hpp"
+#include "host_tools/support/random.hpp"
 
 namespace fxdyn {
 namespace {

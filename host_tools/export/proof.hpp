@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "host_tools/numbers/bounded.hpp"
-#include "host_tools/progress.hpp"
+#include "host_tools/support/progress.hpp"
 
 namespace fxdyn {
 

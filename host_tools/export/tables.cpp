@@ -4,10 +4,10 @@
 #include <cmath>
 #include <cstring>
 
+#include "host_tools/effects/broad_learning_types.hpp"
+#include "host_tools/effects/effects.hpp"
 #include "host_tools/export/export.hpp"
-#include "host_tools/files.hpp"
-#include "host_tools/model/broad_learning_types.hpp"
-#include "host_tools/model/effects.hpp"
+#include "host_tools/support/files.hpp"
 #include "model/catalogue.hpp"
 #include "model/table_page.hpp"
 #include "model/version.hpp"

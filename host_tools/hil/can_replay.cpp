@@ -9,9 +9,9 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "firmware/object_dictionary.hpp"
+#include "firmware/protocol/object_dictionary.hpp"
 #include "host_tools/can/guard.hpp"
-#include "host_tools/error.hpp"
+#include "host_tools/support/error.hpp"
 #include "model/table_page.hpp"
 
 namespace fxdyn {

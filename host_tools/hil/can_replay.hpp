@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "firmware/torque_output.hpp"
+#include "firmware/protocol/torque_output.hpp"
 #include "host_tools/can/lockstep.hpp"
 #include "host_tools/export/export.hpp"
 
@@ -15,7 +15,7 @@ namespace fxdyn {
 
 /// Drive nodes on a CAN bus that together put out the torques of a model, in lockstep with the host: all setpoints of a
 /// tick, SYNC, then it waits for all torques. The host computes what every torque frame has to say, byte for byte,
-/// with the node's own functions (firmware/setpoint_codec.hpp, firmware/torque_output.hpp).
+/// with the node's own functions (firmware/protocol/setpoint_codec.hpp, firmware/protocol/torque_output.hpp).
 class CanDrives {
  public:
   struct Settings {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string>
 
-#include "host_tools/files.hpp"
+#include "host_tools/support/files.hpp"
 
 namespace fxdyn {
 namespace {

@@ -19,9 +19,9 @@
 #include <fstream>
 #include <utility>
 
-#include "host_tools/error.hpp"
-#include "host_tools/files.hpp"
 #include "host_tools/hil/elf.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/files.hpp"
 
 namespace fxdyn {
 namespace {

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "firmware/serial_protocol.hpp"
+#include "firmware/protocol/serial_protocol.hpp"
 
 namespace fxdyn {
 

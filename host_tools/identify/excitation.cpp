@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host_tools/random.hpp"
+#include "host_tools/support/random.hpp"
 
 namespace fxdyn {
 

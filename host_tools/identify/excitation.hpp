@@ -1,7 +1,7 @@
 #pragma once
 
-#include "host_tools/excite/information.hpp"
-#include "host_tools/identify/fitter.hpp"
+#include "host_tools/regression/fitter.hpp"
+#include "host_tools/regression/information.hpp"
 
 namespace fxdyn {
 

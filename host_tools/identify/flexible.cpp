@@ -8,10 +8,10 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "host_tools/identify/regressor.hpp"
-#include "host_tools/model/effects.hpp"
-#include "host_tools/model/evaluator.hpp"
-#include "host_tools/parallel.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/evaluator.hpp"
+#include "host_tools/regression/regressor.hpp"
+#include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {
 namespace {

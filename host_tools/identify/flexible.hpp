@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "host_tools/identify/dataset.hpp"
-#include "host_tools/model/identified_model.hpp"
+#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/regression/dataset.hpp"
 
 // Flexible joints from a second encoder on the link, paper Eqs. 12 and 42 (whose sum misses J ddq):
 //   motor  J_eff ddq + friction(dq) + K delta + B d(delta)/dt = tau,  delta = q - qlink

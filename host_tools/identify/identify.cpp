@@ -5,12 +5,13 @@
 #include <cmath>
 #include <limits>
 
-#include "host_tools/error.hpp"
-#include "host_tools/files.hpp"
-#include "host_tools/identify/essential.hpp"
 #include "host_tools/identify/flexible.hpp"
 #include "host_tools/identify/plausible.hpp"
-#include "host_tools/parallel.hpp"
+#include "host_tools/regression/essential.hpp"
+#include "host_tools/simulate/recordings.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/files.hpp"
+#include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {
 namespace {

@@ -3,9 +3,10 @@
 #include <memory>
 
 #include "host_tools/identify/excitation.hpp"
-#include "host_tools/identify/fitter.hpp"
-#include "host_tools/identify/physical.hpp"
-#include "host_tools/progress.hpp"
+#include "host_tools/project/project.hpp"
+#include "host_tools/regression/fitter.hpp"
+#include "host_tools/regression/physical.hpp"
+#include "host_tools/support/progress.hpp"
 
 namespace fxdyn {
 

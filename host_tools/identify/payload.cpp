@@ -6,10 +6,10 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "host_tools/error.hpp"
-#include "host_tools/identify/physical.hpp"
-#include "host_tools/identify/solver.hpp"
-#include "host_tools/model/evaluator.hpp"
+#include "host_tools/effects/evaluator.hpp"
+#include "host_tools/regression/physical.hpp"
+#include "host_tools/regression/solver.hpp"
+#include "host_tools/support/error.hpp"
 #include "model/effects/coulomb.hpp"
 #include "model/effects/offset.hpp"
 #include "model/effects/payload.hpp"

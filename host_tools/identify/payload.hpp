@@ -3,8 +3,8 @@
 #include <array>
 #include <nlohmann/json_fwd.hpp>
 
-#include "host_tools/identify/dataset.hpp"
-#include "host_tools/model/identified_model.hpp"
+#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/regression/dataset.hpp"
 
 namespace fxdyn {
 

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host_tools/identify/physical.hpp"
-#include "host_tools/identify/regressor.hpp"
-#include "host_tools/identify/solver.hpp"
+#include "host_tools/regression/physical.hpp"
+#include "host_tools/regression/regressor.hpp"
+#include "host_tools/regression/solver.hpp"
 #include "model/math.hpp"
 
 namespace fxdyn {

@@ -1,6 +1,6 @@
 #include "host_tools/identify/structure.hpp"
 
-#include "host_tools/model/effects.hpp"
+#include "host_tools/effects/effects.hpp"
 
 namespace fxdyn {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <compare>
 
-#include "host_tools/error.hpp"
 #include "host_tools/numbers/formats.hpp"
+#include "host_tools/support/error.hpp"
 #include "model/math.hpp"
 #include "model/numbers.hpp"
 

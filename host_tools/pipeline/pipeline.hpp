@@ -78,30 +78,4 @@ void predict_log(const std::filesystem::path& model, const std::filesystem::path
 void identify_payload(const std::filesystem::path& model, const std::filesystem::path& log,
                       const std::filesystem::path& directory);
 
-struct Replay {
-  bool same = false;           ///< every torque and saturation count
-  std::filesystem::path file;  ///< replay.json: in DIR, or in DIR/joint_N for the drive of one joint
-};
-/// `fxdyn replay`: streams the test logs (and a perturbed copy) to the firmware image under QEMU.
-Replay replay(Pipeline& pipeline, const std::filesystem::path& image, Eigen::Index max_ticks);
-
-struct CanReplaySettings {
-  std::string interface;            ///< as in "can0"
-  std::vector<std::uint8_t> nodes;  ///< ids; empty: whoever answers of 1 .. number of joints
-  bool fd = false;
-  bool closed_loop = false;  ///< no log: the vibration experiment with the torque of the bus
-  Eigen::Index most_ticks = 20000;
-  std::size_t most_moves = 0;  ///< of the closed loop; 0: all
-};
-struct CanReplay {
-  bool same = false;  ///< every torque frame byte for byte, none lost
-  nlohmann::json result;
-};
-/// `fxdyn replay --can`: streams the test and validate logs under SYNC to the drive nodes of a bus, in lockstep,
-/// compares every torque frame with the host's fixed-point model and the torque with the measured one:
-/// DIR/can_replay.json.
-/// @throws InputError: no such interface, it is down, no node answers, other tables
-CanReplay replay_on_can(Pipeline& pipeline, const CanReplaySettings& settings);
-std::string can_replay_table(const nlohmann::json& result);
-
 }  // namespace fxdyn

@@ -1,13 +1,13 @@
 #include <fmt/format.h>
 
-#include "host_tools/compare/section.hpp"
-#include "host_tools/diagnose/section.hpp"
-#include "host_tools/files.hpp"
-#include "host_tools/model/evaluator.hpp"
-#include "host_tools/report/page.hpp"
-#include "host_tools/report/plot.hpp"
+#include "host_tools/effects/evaluator.hpp"
+#include "host_tools/page/page.hpp"
+#include "host_tools/page/plot.hpp"
+#include "host_tools/report/comparison_section.hpp"
+#include "host_tools/report/diagnosis_section.hpp"
 #include "host_tools/report/report.hpp"
 #include "host_tools/report/results.hpp"
+#include "host_tools/support/files.hpp"
 
 namespace fxdyn {
 namespace {

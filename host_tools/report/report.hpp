@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "host_tools/identify/dataset.hpp"
+#include "host_tools/regression/dataset.hpp"
 
 namespace fxdyn {
 

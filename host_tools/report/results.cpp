@@ -6,8 +6,8 @@
 #include <limits>
 #include <utility>
 
-#include "host_tools/files.hpp"
-#include "host_tools/pipeline/provenance.hpp"
+#include "host_tools/project/provenance.hpp"
+#include "host_tools/support/files.hpp"
 
 namespace fxdyn {
 namespace {

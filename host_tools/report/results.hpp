@@ -13,7 +13,7 @@ namespace fxdyn {
 struct Results {
   nlohmann::json metrics, exported, replayed, diagnosis, compared, efficiency, vibration;
   std::vector<std::string> stale;  ///< verbs whose results are left out because they belong to something else
-  std::string role;  ///< of the logs that a reader wants to see: test, else validate, else train
+  std::string role;                ///< of the logs that a reader wants to see: test, else validate, else train
 };
 Results read_results(const std::filesystem::path& directory);
 

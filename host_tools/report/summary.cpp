@@ -1,6 +1,6 @@
 #include <fmt/format.h>
 
-#include "host_tools/diagnose/terminal.hpp"
+#include "host_tools/report/diagnosis_table.hpp"
 #include "host_tools/report/report.hpp"
 #include "host_tools/report/results.hpp"
 

@@ -9,8 +9,8 @@
 #include <fstream>
 #include <iterator>
 
-#include "host_tools/error.hpp"
 #include "host_tools/robot/robot.hpp"
+#include "host_tools/support/error.hpp"
 
 namespace fxdyn {
 namespace {

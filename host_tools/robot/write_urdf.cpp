@@ -7,8 +7,8 @@
 #include <set>
 #include <string>
 
-#include "host_tools/error.hpp"
-#include "host_tools/files.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/files.hpp"
 
 namespace fxdyn {
 namespace {

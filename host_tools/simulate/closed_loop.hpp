@@ -3,8 +3,8 @@
 #include <Eigen/Dense>
 #include <functional>
 
-#include "host_tools/error.hpp"
-#include "host_tools/model/identified_model.hpp"
+#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/support/error.hpp"
 
 namespace fxdyn {
 

@@ -6,7 +6,7 @@
 #include <array>
 #include <cstring>
 
-#include "host_tools/error.hpp"
+#include "host_tools/support/error.hpp"
 
 namespace fxdyn {
 namespace {

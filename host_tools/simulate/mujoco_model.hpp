@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "host_tools/model/identified_model.hpp"
+#include "host_tools/effects/identified_model.hpp"
 
 namespace fxdyn {
 

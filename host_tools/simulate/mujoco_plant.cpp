@@ -3,9 +3,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "host_tools/error.hpp"
 #include "host_tools/simulate/mujoco_forces.hpp"
 #include "host_tools/simulate/mujoco_model.hpp"
+#include "host_tools/support/error.hpp"
 
 namespace fxdyn {
 namespace {

@@ -5,10 +5,10 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "host_tools/files.hpp"
-#include "host_tools/model/effects.hpp"
+#include "host_tools/effects/effects.hpp"
 #include "host_tools/simulate/mujoco_plant.hpp"
-#include "host_tools/toml.hpp"
+#include "host_tools/support/files.hpp"
+#include "host_tools/support/toml.hpp"
 
 namespace fxdyn {
 namespace {
@@ -163,7 +163,8 @@ void read_plan(const Value& file, const Value& name, const fs::path& directory, 
         const auto vector = [](const std::vector<double>& v) {
           return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size())));
         };
-        if (a.empty() || a.size() != b.size()) file.place().fail(path.string() + ": a and b of a series differ in length");
+        if (a.empty() || a.size() != b.size())
+          file.place().fail(path.string() + ": a and b of a series differ in length");
         log.series.push_back({joint.at("centre"), vector(a), vector(b)});
       }
       return;

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/excite/fourier.hpp"
-#include "host_tools/model/identified_model.hpp"
+#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/signals/fourier.hpp"
 
 namespace fxdyn {
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "host_tools/random.hpp"
+#include "host_tools/support/random.hpp"
 
 namespace fxdyn {
 namespace {

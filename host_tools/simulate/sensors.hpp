@@ -1,6 +1,6 @@
 #pragma once
 
-#include "host_tools/log/log.hpp"
+#include "host_tools/signals/log.hpp"
 #include "host_tools/simulate/scenario.hpp"
 
 namespace fxdyn {

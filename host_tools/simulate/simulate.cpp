@@ -3,15 +3,15 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host_tools/error.hpp"
-#include "host_tools/excite/fourier.hpp"
-#include "host_tools/files.hpp"
-#include "host_tools/model/evaluator.hpp"
+#include "host_tools/effects/evaluator.hpp"
+#include "host_tools/signals/fourier.hpp"
 #include "host_tools/simulate/closed_loop.hpp"
 #include "host_tools/simulate/mujoco_plant.hpp"
 #include "host_tools/simulate/scenario.hpp"
 #include "host_tools/simulate/sensors.hpp"
-#include "host_tools/toml.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/files.hpp"
+#include "host_tools/support/toml.hpp"
 
 namespace fxdyn {
 namespace {
@@ -24,9 +24,9 @@ Reference play(const Scenario& scenario, const ScenarioLog& log, double step_s, 
   Reference motion{step_s, Eigen::MatrixXd(samples, cols), Eigen::MatrixXd(samples, cols),
                    Eigen::MatrixXd(samples, cols), Eigen::MatrixXd()};
   for (std::size_t j = 0; j < n; ++j) {
-    FourierJoint joint = log.series.empty() ? random_fourier(log.seed * 1000 + j, log.order, log.period_s,
-                                                             scenario.bounds[j], log.speed)
-                                            : log.series[j];
+    FourierJoint joint =
+        log.series.empty() ? random_fourier(log.seed * 1000 + j, log.order, log.period_s, scenario.bounds[j], log.speed)
+                           : log.series[j];
     joint.a *= log.amplitude;
     joint.b *= log.amplitude;
     const auto col = static_cast<Eigen::Index>(j);

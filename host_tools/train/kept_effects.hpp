@@ -1,6 +1,6 @@
 #pragma once
 
-#include "host_tools/identify/dataset.hpp"
+#include "host_tools/regression/dataset.hpp"
 
 namespace fxdyn {
 

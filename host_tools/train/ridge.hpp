@@ -2,7 +2,7 @@
 
 #include <Eigen/Dense>
 
-#include "host_tools/identify/solver.hpp"
+#include "host_tools/regression/solver.hpp"
 
 namespace fxdyn {
 

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "host_tools/error.hpp"
-#include "host_tools/files.hpp"
-#include "host_tools/parallel.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/files.hpp"
+#include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {
 namespace {

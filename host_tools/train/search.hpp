@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/progress.hpp"
+#include "host_tools/support/progress.hpp"
 #include "host_tools/train/swarm.hpp"
 
 namespace fxdyn {

@@ -4,8 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "host_tools/error.hpp"
-#include "host_tools/files.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/files.hpp"
 
 namespace fxdyn {
 namespace {

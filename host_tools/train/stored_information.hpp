@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "host_tools/identify/fitter.hpp"
+#include "host_tools/regression/fitter.hpp"
 
 namespace fxdyn {
 

@@ -4,8 +4,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "host_tools/error.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/random.hpp"
 
 namespace fxdyn {
 namespace {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host_tools/model/broad_learning_types.hpp"
-#include "host_tools/parallel.hpp"
+#include "host_tools/effects/broad_learning_types.hpp"
+#include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/identify/fitter.hpp"
-#include "host_tools/progress.hpp"
+#include "host_tools/regression/fitter.hpp"
+#include "host_tools/support/progress.hpp"
 #include "host_tools/train/search.hpp"
 #include "host_tools/train/tuning.hpp"
 

@@ -5,7 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/identify/fitter.hpp"
+#include "host_tools/project/project.hpp"
+#include "host_tools/regression/fitter.hpp"
 
 namespace fxdyn {
 

@@ -5,13 +5,14 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host_tools/error.hpp"
 #include "host_tools/export/export.hpp"
-#include "host_tools/files.hpp"
 #include "host_tools/identify/plausible.hpp"
-#include "host_tools/pipeline/provenance.hpp"
-#include "host_tools/report/metrics.hpp"
+#include "host_tools/project/provenance.hpp"
+#include "host_tools/regression/metrics.hpp"
 #include "host_tools/report/results.hpp"
+#include "host_tools/simulate/recordings.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/files.hpp"
 #include "host_tools/train/kept_effects.hpp"
 #include "host_tools/train/stored_information.hpp"
 

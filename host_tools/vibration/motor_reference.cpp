@@ -1,8 +1,8 @@
 #include "host_tools/vibration/motor_reference.hpp"
 
-#include "host_tools/log/log.hpp"
-#include "host_tools/model/effects.hpp"
-#include "host_tools/model/evaluator.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/evaluator.hpp"
+#include "host_tools/signals/log.hpp"
 
 namespace fxdyn {
 namespace {

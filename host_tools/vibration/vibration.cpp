@@ -7,16 +7,16 @@
 #include <numbers>
 #include <utility>
 
-#include "host_tools/error.hpp"
 #include "host_tools/export/export.hpp"
-#include "host_tools/files.hpp"
 #include "host_tools/identify/structure.hpp"
-#include "host_tools/parallel.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
-#include "host_tools/pipeline/provenance.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/project/provenance.hpp"
 #include "host_tools/simulate/mujoco_plant.hpp"
 #include "host_tools/simulate/scenario.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/files.hpp"
+#include "host_tools/support/parallel.hpp"
+#include "host_tools/support/random.hpp"
 #include "host_tools/vibration/motor_reference.hpp"
 #include "host_tools/vibration/moves.hpp"
 #include "model/catalogue.hpp"

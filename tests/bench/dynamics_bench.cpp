@@ -6,8 +6,8 @@
 
 #include <kdl/chainidsolver_recursive_newton_euler.hpp>
 
-#include "host_tools/files.hpp"
-#include "host_tools/identify/regressor.hpp"
+#include "host_tools/regression/regressor.hpp"
+#include "host_tools/support/files.hpp"
 #include "tests/support/chains.hpp"
 #include "tests/support/kdl.hpp"
 

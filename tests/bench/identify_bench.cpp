@@ -2,9 +2,9 @@
 
 #include <benchmark/benchmark.h>
 
-#include "host_tools/files.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
 #include "host_tools/simulate/simulate.hpp"
+#include "host_tools/support/files.hpp"
 #include "tests/support/chains.hpp"
 
 namespace fxdyn {

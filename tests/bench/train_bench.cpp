@@ -5,9 +5,9 @@
 #include <array>
 #include <cmath>
 
-#include "host_tools/identify/bls_rows.hpp"
-#include "host_tools/identify/fitter.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/regression/bls_rows.hpp"
+#include "host_tools/regression/fitter.hpp"
+#include "host_tools/support/random.hpp"
 #include "host_tools/train/ridge.hpp"
 #include "host_tools/train/tuning.hpp"
 #include "tests/support/chains.hpp"

@@ -1,13 +1,13 @@
 // What the report shows of compare.json, vibration.json and efficiency.json.
 
-#include "host_tools/compare/section.hpp"
+#include "host_tools/report/comparison_section.hpp"
 
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
 #include "host_tools/compare/figures.hpp"
-#include "host_tools/files.hpp"
+#include "host_tools/support/files.hpp"
 #include "tests/support/files.hpp"
 
 namespace fxdyn {

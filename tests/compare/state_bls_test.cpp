@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "host_tools/random.hpp"
+#include "host_tools/support/random.hpp"
 #include "host_tools/train/ridge.hpp"
 
 namespace fxdyn {

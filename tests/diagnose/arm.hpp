@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/identify/dataset.hpp"
+#include "host_tools/regression/dataset.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "tests/support/files.hpp"
 #include "tests/support/filter.hpp"

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/files.hpp"
-#include "host_tools/log/log.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
+#include "host_tools/signals/log.hpp"
 #include "host_tools/simulate/simulate.hpp"
+#include "host_tools/support/files.hpp"
 #include "tests/support/files.hpp"
 
 namespace fxdyn::test {

@@ -4,8 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "host_tools/files.hpp"
-#include "host_tools/model/evaluator.hpp"
+#include "host_tools/effects/evaluator.hpp"
+#include "host_tools/support/files.hpp"
 #include "tests/diagnose/arm.hpp"
 
 namespace fxdyn {

@@ -1,4 +1,4 @@
-#include "host_tools/diagnose/terminal.hpp"
+#include "host_tools/report/diagnosis_table.hpp"
 
 #include <gtest/gtest.h>
 

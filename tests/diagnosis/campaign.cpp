@@ -10,8 +10,8 @@
 #include <mutex>
 #include <thread>
 
-#include "host_tools/error.hpp"
-#include "host_tools/files.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/files.hpp"
 #include "tests/diagnosis/run_case.hpp"
 #include "tests/diagnosis/write_up.hpp"
 

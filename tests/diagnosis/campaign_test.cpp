@@ -3,9 +3,9 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "host_tools/files.hpp"
-#include "host_tools/model/effects.hpp"
-#include "host_tools/model/evaluator.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/evaluator.hpp"
+#include "host_tools/support/files.hpp"
 #include "tests/diagnosis/generate.hpp"
 #include "tests/diagnosis/score.hpp"
 #include "tests/diagnosis/truth.hpp"

@@ -1,6 +1,6 @@
 #include <fmt/format.h>
 
-#include "host_tools/random.hpp"
+#include "host_tools/support/random.hpp"
 #include "tests/diagnosis/case.hpp"
 #include "tests/diagnosis/outside.hpp"
 

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host_tools/model/evaluator.hpp"
+#include "host_tools/effects/evaluator.hpp"
 #include "tests/diagnosis/score.hpp"
 #include "tests/diagnosis/truth.hpp"
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "host_tools/error.hpp"
-#include "host_tools/model/effects.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/support/error.hpp"
 
 namespace fxdyn::campaign {
 namespace {

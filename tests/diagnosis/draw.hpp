@@ -2,7 +2,7 @@
 
 #include <functional>
 
-#include "host_tools/random.hpp"
+#include "host_tools/support/random.hpp"
 #include "tests/diagnosis/plan.hpp"
 
 namespace fxdyn::campaign {

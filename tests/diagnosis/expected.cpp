@@ -4,10 +4,10 @@
 #include <cmath>
 #include <numeric>
 
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/robot_columns.hpp"
 #include "host_tools/excite/effect_information.hpp"
-#include "host_tools/identify/regressor.hpp"
-#include "host_tools/model/effects.hpp"
-#include "host_tools/model/robot_columns.hpp"
+#include "host_tools/regression/regressor.hpp"
 
 namespace fxdyn::campaign {
 namespace {

@@ -5,10 +5,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "host_tools/files.hpp"
-#include "host_tools/log/log.hpp"
-#include "host_tools/model/effects.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/signals/log.hpp"
 #include "host_tools/simulate/simulate.hpp"
+#include "host_tools/support/files.hpp"
 #include "tests/diagnosis/truth.hpp"
 
 namespace fxdyn::campaign {

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "host_tools/error.hpp"
-#include "host_tools/log/log.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/signals/log.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/random.hpp"
 
 namespace fxdyn::campaign {
 

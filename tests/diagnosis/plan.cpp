@@ -1,7 +1,7 @@
 #include "tests/diagnosis/plan.hpp"
 
-#include "host_tools/model/effects.hpp"
-#include "host_tools/model/evaluator.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/evaluator.hpp"
 
 namespace fxdyn::campaign {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "host_tools/excite/motion.hpp"
+#include "host_tools/signals/motion.hpp"
 #include "tests/diagnosis/case.hpp"
 
 namespace fxdyn::campaign {

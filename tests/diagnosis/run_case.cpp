@@ -9,8 +9,8 @@
 #include <chrono>
 #include <thread>
 
-#include "host_tools/error.hpp"
-#include "host_tools/files.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/files.hpp"
 #include "tests/diagnosis/generate.hpp"
 #include "tests/diagnosis/score.hpp"
 

@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "host_tools/model/effects.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/support/random.hpp"
 
 namespace fxdyn::campaign {
 namespace {

@@ -2,9 +2,9 @@
 
 #include <filesystem>
 
-#include "host_tools/log/log.hpp"
-#include "host_tools/log/truth.hpp"
 #include "host_tools/robot/robot.hpp"
+#include "host_tools/signals/log.hpp"
+#include "host_tools/signals/truth.hpp"
 
 namespace fxdyn::campaign {
 

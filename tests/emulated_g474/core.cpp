@@ -91,9 +91,7 @@ void Core::reset() {
   debug_control_ = counter_control_ = system_control_ = coprocessors_ = 0;
   it_begin_ = it_end_ = 0;
   next_event_ = held_until_ = 0;
-  std::fill(kinds_.begin(), kinds_.end(), Kind::unknown);  // another image may be in the flash
-  check(uc_ctl_remove_cache(engine_, std::uint64_t{flash_.base}, std::uint64_t{flash_.base} + flash_.bytes.size()),
-        "uc_ctl_remove_cache");
+  forget_changed_code();
   for (const int id : {UC_ARM_REG_R0, UC_ARM_REG_R1, UC_ARM_REG_R2, UC_ARM_REG_R3, UC_ARM_REG_R4, UC_ARM_REG_R5,
                        UC_ARM_REG_R6, UC_ARM_REG_R7, UC_ARM_REG_R8, UC_ARM_REG_R9, UC_ARM_REG_R10, UC_ARM_REG_R11,
                        UC_ARM_REG_R12, UC_ARM_REG_PRIMASK})
@@ -105,6 +103,21 @@ void Core::reset() {
   set(UC_ARM_REG_SP, vector[0]);
   pc_ = vector[1] & ~1U;
   if ((vector[1] & 1U) == 0) fault("the reset vector is no Thumb address");
+}
+
+/// What lies elsewhere in the flash now may be code of another image. The rest stays translated: Unicorn never gives
+/// memory of translations back, and crashes when it is full.
+void Core::forget_changed_code() {
+  constexpr std::size_t page = 2048;
+  const auto all = flash_.bytes;
+  const bool first = translated_.empty();
+  for (std::size_t at = 0; !first && at < all.size(); at += page) {
+    if (std::memcmp(&all[at], &translated_[at], page) == 0) continue;
+    std::fill_n(kinds_.begin() + static_cast<std::ptrdiff_t>(at / 2), page / 2, Kind::unknown);
+    const std::uint64_t from = flash_.base + at;
+    check(uc_ctl_remove_cache(engine_, from, from + page), "uc_ctl_remove_cache");
+  }
+  translated_.assign(all.begin(), all.end());
 }
 
 // --- running ---------------------------------------------------------------------------------------------------------

@@ -120,6 +120,7 @@ class Core {
     Address base = 0;
   };
 
+  void forget_changed_code();
   void before(Address pc, std::uint32_t size);
   void stop(Stop why);
   Kind kind_of(Address pc);
@@ -157,6 +158,7 @@ class Core {
   bool trapped_ = false;
   Address pc_ = 0, it_begin_ = 0, it_end_ = 0;
   std::vector<Kind> kinds_;
+  std::vector<std::uint8_t> translated_;  ///< the flash at the last reset
 
   std::bitset<interrupts> enabled_, pending_, lines_;
   std::array<std::uint8_t, interrupts> priority_{};

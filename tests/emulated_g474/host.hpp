@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "firmware/canopen.hpp"
-#include "firmware/setpoint_codec.hpp"
+#include "firmware/protocol/canopen.hpp"
+#include "firmware/protocol/setpoint_codec.hpp"
 #include "tests/emulated_g474/board.hpp"
 
 namespace fxdyn::emulated {

@@ -1,4 +1,4 @@
-#include "host_tools/excite/fourier.hpp"
+#include "host_tools/signals/fourier.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,8 @@
 
 #include "host_tools/excite/evolution.hpp"
 #include "host_tools/excite/excite.hpp"
-#include "host_tools/files.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/support/files.hpp"
+#include "host_tools/support/random.hpp"
 #include "tests/support/files.hpp"
 
 namespace fxdyn {

@@ -1,8 +1,8 @@
-#include "host_tools/excite/information.hpp"
+#include "host_tools/regression/information.hpp"
 
 #include <gtest/gtest.h>
 
-#include "host_tools/random.hpp"
+#include "host_tools/support/random.hpp"
 
 namespace fxdyn {
 namespace {

@@ -6,10 +6,10 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "host_tools/error.hpp"
 #include "host_tools/excite/excite.hpp"
-#include "host_tools/files.hpp"
-#include "host_tools/log/log.hpp"
+#include "host_tools/signals/log.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/files.hpp"
 #include "tests/support/files.hpp"
 #include "tests/support/sanitizers.hpp"
 

@@ -8,14 +8,14 @@
 #include <numbers>
 #include <sstream>
 
-#include "host_tools/error.hpp"
-#include "host_tools/excite/fourier.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/evaluator.hpp"
 #include "host_tools/excite/nominal.hpp"
-#include "host_tools/identify/regressor.hpp"
-#include "host_tools/log/log.hpp"
-#include "host_tools/model/effects.hpp"
-#include "host_tools/model/evaluator.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/regression/regressor.hpp"
+#include "host_tools/signals/fourier.hpp"
+#include "host_tools/signals/log.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/random.hpp"
 #include "tests/support/sanitizers.hpp"
 
 namespace fxdyn {

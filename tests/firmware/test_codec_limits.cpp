@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <limits>
 
-#include "firmware/serial_protocol.hpp"
-#include "firmware/setpoint_codec.hpp"
+#include "firmware/protocol/serial_protocol.hpp"
+#include "firmware/protocol/setpoint_codec.hpp"
 #include "firmware/slow_division.hpp"
 
 namespace fxdyn {

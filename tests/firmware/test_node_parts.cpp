@@ -9,8 +9,8 @@
 #include <string>
 
 #include "firmware/emergency.hpp"
-#include "firmware/object_dictionary.hpp"
-#include "firmware/torque_output.hpp"
+#include "firmware/protocol/object_dictionary.hpp"
+#include "firmware/protocol/torque_output.hpp"
 
 namespace fxdyn {
 namespace {

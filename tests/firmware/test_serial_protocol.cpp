@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "firmware/serial_protocol.hpp"
+#include "firmware/protocol/serial_protocol.hpp"
 
 namespace fxdyn::serial {
 namespace {

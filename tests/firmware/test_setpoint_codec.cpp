@@ -6,7 +6,7 @@
 #include <random>
 
 #include "firmware/bus_load.hpp"
-#include "firmware/setpoint_codec.hpp"
+#include "firmware/protocol/setpoint_codec.hpp"
 #include "firmware/slow_division.hpp"
 
 namespace fxdyn {

@@ -48,8 +48,8 @@ struct Shapes<RobotModel<N, outputs, Joints...>> {
 bool is_declared_unused(std::size_t word) {
   constexpr std::size_t geometry = 4, inertia = geometry + 7 * joints, constants = inertia + 10 * joints;
   if (word == 3) return !Model::deflects;  // ticks per second
-  // Joint 1 turns about the vertical: no torque depends on where it stands, nor, unless its position does something else,
-  // on the limits of that.
+  // Joint 1 turns about the vertical: no torque depends on where it stands, nor, unless its position does something
+  // else, on the limits of that.
   if (word == geometry + 6) return true;
   if (word == constants || word == constants + 1) return !Model::deflects;
   if (word < geometry || word >= constants) return false;

@@ -1,5 +1,5 @@
-// make_golden DIR OUT.hpp [TICKS RUNS]: golden vectors of the exported model in DIR (model.json), computed by the host's
-// fixed point; TICKS a run, RUNS with random setpoints of a kind.
+// make_golden DIR OUT.hpp [TICKS RUNS]: golden vectors of the exported model in DIR (model.json), computed by the
+// host's fixed point; TICKS a run, RUNS with random setpoints of a kind.
 
 #include <fmt/format.h>
 
@@ -8,8 +8,8 @@
 #include <exception>
 
 #include "host_tools/export/export.hpp"
-#include "host_tools/files.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/support/files.hpp"
+#include "host_tools/support/random.hpp"
 
 namespace fxdyn {
 namespace {

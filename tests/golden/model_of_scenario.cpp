@@ -1,6 +1,6 @@
-// model_of_scenario SCENARIO.toml DIR: the scenario's robot and effects as they stand there, with a BLS of drawn weights
-// on two joints, exported: model.json and tables.hpp. Nothing is identified, so that the model may have what no log tells
-// apart.
+// model_of_scenario SCENARIO.toml DIR: the scenario's robot and effects as they stand there, with a BLS of drawn
+// weights on two joints, exported: model.json and tables.hpp. Nothing is identified, so that the model may have what no
+// log tells apart.
 
 #include <fmt/format.h>
 
@@ -8,12 +8,12 @@
 #include <exception>
 #include <nlohmann/json.hpp>
 
-#include "host_tools/error.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/export/proof.hpp"
-#include "host_tools/files.hpp"
 #include "host_tools/simulate/scenario.hpp"
 #include "host_tools/simulate/simulate.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/files.hpp"
 #include "tests/support/broad_learning.hpp"
 
 namespace fxdyn {

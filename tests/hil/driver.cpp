@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "firmware/object_dictionary.hpp"
+#include "firmware/protocol/object_dictionary.hpp"
 #include "host_tools/can/lockstep.hpp"
 #include "tests/golden/tables.hpp"
 #include "tests/hil/motion.hpp"

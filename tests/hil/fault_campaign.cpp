@@ -132,8 +132,8 @@ void FaultCampaign::start() {
   }
 }
 
-/// A tick of the motion. Without a period it is SYNC that makes a tick, so one that did not come made none: as a host in
-/// lockstep does, the same setpoints are sent again.
+/// A tick of the motion. Without a period it is SYNC that makes a tick, so one that did not come made none: as a host
+/// in lockstep does, the same setpoints are sent again.
 void FaultCampaign::next_setpoints() {
   if (!is_timed() && !motion_has_had_sync_) return;
   setpoints_ = motion_.next();

@@ -9,7 +9,7 @@
 
 #include FXDYN_TABLES_HEADER
 
-#include "firmware/object_dictionary.hpp"
+#include "firmware/protocol/object_dictionary.hpp"
 #include "host_tools/can/lockstep.hpp"
 #include "tests/hil/node_picture.hpp"
 #include "tests/hil/undisturbed.hpp"
@@ -182,8 +182,8 @@ class FaultCampaign {
   std::array<std::int32_t, joints> step_milli_{}, last_milli_{};
   std::array<std::uint8_t, joints> last_tick_{};
   std::array<std::uint32_t, joints> since_ramp_{};  ///< torques
-  std::array<can::Duration, joints> last_time_{};  ///< not after the node's tick
-  can::Duration last_request_{};                   ///< when SYNC was sent
+  std::array<can::Duration, joints> last_time_{};   ///< not after the node's tick
+  can::Duration last_request_{};                    ///< when SYNC was sent
   std::array<bool, joints> ramped_unseen_{};  ///< it has been out of operation since: the torque moved without frames
   /// A torque that may not go out goes to zero between ticks too, where those are slower than the tables' tick.
   bool ramps_by_time_ = false;

@@ -1,5 +1,5 @@
-// The fault campaign on the STM32G474's own image in the emulated part: every instruction, register and interrupt of the
-// drive. fault_g474 ELF [EVENTS [SEED [before|after]]], the last: when the setpoints of a SYNC come.
+// The fault campaign on the STM32G474's own image in the emulated part: every instruction, register and interrupt of
+// the drive. fault_g474 ELF [EVENTS [SEED [before|after]]], the last: when the setpoints of a SYNC come.
 
 #include <algorithm>
 #include <cstdio>
@@ -31,7 +31,7 @@ class EmulatedNode final : public hil::NodeUnderTest, public can::Bus {
 
   /// Its answer to a request is destroyed again and again.
   std::uint32_t fall_off_the_bus() override {
-    board_.wire.disturbed = 32;  // 8 errors each: 256
+    board_.wire.disturbed = 32;                                                        // 8 errors each: 256
     send({.id = canopen::sdo_request_id + 1, .size = 8, .data = {0x40, 0x00, 0x10}});  // device type
     if (board_.wire.disturbed != 0) fail("did not answer");
     return 1;
@@ -83,6 +83,9 @@ class EmulatedNode final : public hil::NodeUnderTest, public can::Bus {
     };
     const Time end = board_.now() + 5 * emulated::millisecond;
     while (!is_settled() && board_.now() < end) board_.run(2 * emulated::microsecond);
+    board_.core.forget_taken();
+    board_.port_a.edges.clear();
+    board_.port_b.edges.clear();
   }
   [[noreturn]] static void fail(const char* what) {
     std::printf("FAILED: the node %s\n", what);

@@ -8,8 +8,8 @@
 #include <random>
 #include <vector>
 
-#include "firmware/setpoint_codec.hpp"
-#include "firmware/torque_output.hpp"
+#include "firmware/protocol/setpoint_codec.hpp"
+#include "firmware/protocol/torque_output.hpp"
 #include "model/joint_model.hpp"
 
 namespace fxdyn::hil {

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include "firmware/object_dictionary.hpp"
+#include "firmware/protocol/object_dictionary.hpp"
 #include "host_tools/can/bus.hpp"
 #include "tests/hil/motion.hpp"
 
@@ -56,7 +56,8 @@ class NodePicture {
     has_last_ = false;
     state_ = {};
   }
-  /// SYNC is overdue: half a period after its time, then a tick at a time. When it was due counts, not when it was done.
+  /// SYNC is overdue: half a period after its time, then a tick at a time. When it was due counts, not when it was
+  /// done.
   void own_tick() {
     expect(Counter::overdue_syncs);
     own_ = own_ticks_ == 0 ? sync_ + tick_ + tick_ / 2 : own_ + tick_;

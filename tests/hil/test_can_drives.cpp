@@ -8,10 +8,10 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "firmware/object_dictionary.hpp"
-#include "host_tools/error.hpp"
+#include "firmware/protocol/object_dictionary.hpp"
 #include "host_tools/hil/can_replay.hpp"
 #include "host_tools/robot/robot.hpp"
+#include "host_tools/support/error.hpp"
 
 namespace fxdyn {
 namespace {

@@ -7,11 +7,11 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "host_tools/identify/fitter.hpp"
-#include "host_tools/model/evaluator.hpp"
-#include "host_tools/parallel.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/effects/evaluator.hpp"
+#include "host_tools/regression/fitter.hpp"
 #include "host_tools/simulate/simulate.hpp"
+#include "host_tools/support/parallel.hpp"
+#include "host_tools/support/random.hpp"
 #include "tests/support/files.hpp"
 #include "tests/support/filter.hpp"
 #include "tests/support/sanitizers.hpp"

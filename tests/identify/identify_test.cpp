@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "host_tools/files.hpp"
-#include "host_tools/model/evaluator.hpp"
+#include "host_tools/effects/evaluator.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
 #include "host_tools/simulate/simulate.hpp"
+#include "host_tools/support/files.hpp"
 #include "tests/support/files.hpp"
 
 namespace fxdyn {

@@ -4,12 +4,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include "host_tools/excite/fourier.hpp"
-#include "host_tools/files.hpp"
-#include "host_tools/identify/physical.hpp"
-#include "host_tools/model/evaluator.hpp"
+#include "host_tools/effects/evaluator.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/regression/physical.hpp"
+#include "host_tools/signals/fourier.hpp"
+#include "host_tools/support/files.hpp"
+#include "host_tools/support/random.hpp"
 #include "tests/support/chains.hpp"
 #include "tests/support/files.hpp"
 #include "tests/support/filter.hpp"

@@ -1,12 +1,12 @@
-#include "host_tools/identify/physical.hpp"
-#include "host_tools/identify/solver.hpp"
+#include "host_tools/regression/physical.hpp"
+#include "host_tools/regression/solver.hpp"
 
 #include <gtest/gtest.h>
 
 #include <chrono>
 
-#include "host_tools/model/identified_model.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/support/random.hpp"
 #include "tests/support/chains.hpp"
 
 namespace fxdyn {

@@ -2,9 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include "host_tools/excite/fourier.hpp"
-#include "host_tools/model/evaluator.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/effects/evaluator.hpp"
+#include "host_tools/signals/fourier.hpp"
+#include "host_tools/support/random.hpp"
 #include "tests/support/chains.hpp"
 
 #include "tests/support/filter.hpp"

@@ -5,13 +5,13 @@
 
 #include <numbers>
 
-#include "host_tools/excite/fourier.hpp"
-#include "host_tools/identify/essential.hpp"
+#include "host_tools/effects/evaluator.hpp"
 #include "host_tools/identify/identify.hpp"
-#include "host_tools/identify/solver.hpp"
-#include "host_tools/model/evaluator.hpp"
-#include "host_tools/parallel.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/regression/essential.hpp"
+#include "host_tools/regression/solver.hpp"
+#include "host_tools/signals/fourier.hpp"
+#include "host_tools/support/parallel.hpp"
+#include "host_tools/support/random.hpp"
 #include "tests/support/chains.hpp"
 #include "tests/support/filter.hpp"
 #include "tests/support/sanitizers.hpp"

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <set>
 
+#include "host_tools/effects/broad_learning_types.hpp"
 #include "host_tools/export/export.hpp"
-#include "host_tools/model/broad_learning_types.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/support/random.hpp"
 #include "tests/support/broad_learning.hpp"
 
 namespace fxdyn {

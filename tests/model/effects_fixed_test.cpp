@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "host_tools/model/effects.hpp"
+#include "host_tools/effects/effects.hpp"
 #include "host_tools/numbers/run_time_fixed.hpp"
 
 // Every effect in the firmware's fixed point against double, both fed with the same quantised inputs and parameters, so

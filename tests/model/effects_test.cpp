@@ -4,11 +4,11 @@
 #include <complex>
 #include <numbers>
 
-#include "host_tools/error.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/evaluator.hpp"
 #include "host_tools/export/export.hpp"
-#include "host_tools/model/effects.hpp"
-#include "host_tools/model/evaluator.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/random.hpp"
 
 namespace fxdyn {
 namespace {

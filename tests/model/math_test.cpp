@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "host_tools/numbers/run_time_fixed.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/support/random.hpp"
 
 namespace fxdyn {
 namespace {

@@ -2,10 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include "host_tools/effects/effects.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/export/proof.hpp"
-#include "host_tools/model/effects.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/support/random.hpp"
 #include "tests/support/broad_learning.hpp"
 
 namespace fxdyn {

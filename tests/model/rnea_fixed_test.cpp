@@ -1,11 +1,11 @@
 #include <gtest/gtest.h>
 
-#include "host_tools/error.hpp"
+#include "host_tools/effects/evaluator.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/export/proof.hpp"
-#include "host_tools/identify/regressor.hpp"
-#include "host_tools/model/evaluator.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/regression/regressor.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/random.hpp"
 
 namespace fxdyn {
 namespace {

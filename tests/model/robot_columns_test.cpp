@@ -1,13 +1,13 @@
-#include "host_tools/model/robot_columns.hpp"
+#include "host_tools/effects/robot_columns.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "host_tools/error.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/evaluator.hpp"
 #include "host_tools/excite/nominal.hpp"
-#include "host_tools/model/effects.hpp"
-#include "host_tools/model/evaluator.hpp"
+#include "host_tools/support/error.hpp"
 
 namespace fxdyn {
 namespace {

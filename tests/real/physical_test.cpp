@@ -1,15 +1,16 @@
-#include "host_tools/identify/physical.hpp"
+#include "host_tools/regression/physical.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <chrono>
 
+#include "host_tools/effects/evaluator.hpp"
 #include "host_tools/identify/identify.hpp"
 #include "host_tools/identify/plausible.hpp"
-#include "host_tools/model/evaluator.hpp"
-#include "host_tools/report/metrics.hpp"
+#include "host_tools/regression/metrics.hpp"
 #include "host_tools/robot/write_urdf.hpp"
+#include "host_tools/simulate/recordings.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/files.hpp"
 

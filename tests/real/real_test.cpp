@@ -4,8 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host_tools/files.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
+#include "host_tools/support/files.hpp"
 #include "tests/support/data.hpp"
 #include "tests/support/files.hpp"
 

@@ -3,7 +3,7 @@
 #include <fstream>
 #include <numbers>
 
-#include "host_tools/error.hpp"
+#include "host_tools/support/error.hpp"
 #include "tests/support/chains.hpp"
 
 namespace fxdyn {

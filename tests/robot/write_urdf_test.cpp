@@ -4,8 +4,8 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "host_tools/error.hpp"
-#include "host_tools/files.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/files.hpp"
 #include "tests/support/chains.hpp"
 #include "tests/support/files.hpp"
 

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "host_tools/model/effects.hpp"
-#include "host_tools/model/evaluator.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/evaluator.hpp"
 #include "host_tools/simulate/mujoco_plant.hpp"
 #include "tests/simulate/support.hpp"
 

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host_tools/excite/fourier.hpp"
-#include "host_tools/files.hpp"
-#include "host_tools/log/project.hpp"
-#include "host_tools/model/evaluator.hpp"
+#include "host_tools/effects/evaluator.hpp"
+#include "host_tools/project/project.hpp"
+#include "host_tools/signals/fourier.hpp"
 #include "host_tools/simulate/scenario.hpp"
 #include "host_tools/simulate/simulate.hpp"
+#include "host_tools/support/files.hpp"
 #include "tests/simulate/support.hpp"
 
 namespace fxdyn {
@@ -64,9 +64,9 @@ TEST(Scenario, AnEffectOnSeveralJoints) {
   const Played a = play("one_by_one", test::puma_scenario("", "") + one_by_one + log_text);
   const Played b = play("together", test::puma_scenario("", "") + together + log_text);
   EXPECT_EQ(a.log.tau, b.log.tau);
-  const Played all = play("all", test::puma_scenario("", "") +
-                                     "[[effect]]\nname = \"viscous\"\njoint = \"all\"\nparameters = { coefficient = 2 }\n" +
-                                     log_text);
+  const Played all =
+      play("all", test::puma_scenario("", "") +
+                      "[[effect]]\nname = \"viscous\"\njoint = \"all\"\nparameters = { coefficient = 2 }\n" + log_text);
   for (const JointFit& joint : all.plant.joints) EXPECT_NE(joint.find("viscous"), nullptr);
 }
 
@@ -253,15 +253,18 @@ INSTANTIATE_TEST_SUITE_P(
         test::Bad{"self",
                   scenario("", "", test::effect_text(2, "joint_coupling", "joint = 2, coulomb = 1, viscous = 1")),
                   {":12:", "another joint of 1 .. 6"}},
-        test::Bad{"joints",
-                  scenario("", "", "[[effect]]\nname = \"viscous\"\njoint = [1, 7]\nparameters = { coefficient = 1 }\n"),
-                  {":11:", "the robot has 6 joints"}},
-        test::Bad{"twice",
-                  scenario("", "", "[[effect]]\nname = \"viscous\"\njoint = [1, 1]\nparameters = { coefficient = 1 }\n"),
-                  {":11:", "joint 1 has viscous already"}},
-        test::Bad{"each",
-                  scenario("", "", "[[effect]]\nname = \"viscous\"\njoint = [1, 2]\nparameters = { coefficient = [1] }\n"),
-                  {":12:", "has 1 values, expected 2"}},
+        test::Bad{
+            "joints",
+            scenario("", "", "[[effect]]\nname = \"viscous\"\njoint = [1, 7]\nparameters = { coefficient = 1 }\n"),
+            {":11:", "the robot has 6 joints"}},
+        test::Bad{
+            "twice",
+            scenario("", "", "[[effect]]\nname = \"viscous\"\njoint = [1, 1]\nparameters = { coefficient = 1 }\n"),
+            {":11:", "joint 1 has viscous already"}},
+        test::Bad{
+            "each",
+            scenario("", "", "[[effect]]\nname = \"viscous\"\njoint = [1, 2]\nparameters = { coefficient = [1] }\n"),
+            {":12:", "has 1 values, expected 2"}},
         test::Bad{"plan", scenario("", "") + "plan = \"nowhere.json\"\ntrajectory = \"fast\"\n", {"nowhere.json"}},
         test::Bad{"backlash",
                   scenario("plant = \"mujoco\"\nmotion = \"closed_loop\"", "",

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <string>
 
-#include "host_tools/excite/fourier.hpp"
+#include "host_tools/signals/fourier.hpp"
 #include "host_tools/simulate/closed_loop.hpp"
 #include "tests/support/chains.hpp"
 #include "tests/support/files.hpp"

@@ -4,8 +4,8 @@
 #include <utility>
 #include <vector>
 
-#include "host_tools/model/broad_learning_types.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/effects/broad_learning_types.hpp"
+#include "host_tools/support/random.hpp"
 
 namespace fxdyn::test {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/error.hpp"
+#include "host_tools/support/error.hpp"
 
 namespace fxdyn::test {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "host_tools/model/identified_model.hpp"
+#include "host_tools/effects/identified_model.hpp"
 
 namespace fxdyn::test {
 

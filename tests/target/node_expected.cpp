@@ -1,6 +1,6 @@
-// What a drive node with a golden model's tables must answer: for every tick of the golden setpoints, quantised as on the
-// bus, the six setpoints and the six torques (per mille and mN*m, little endian), in hexadecimal. A line "reset" where
-// the model starts at rest.
+// What a drive node with a golden model's tables must answer: for every tick of the golden setpoints, quantised as on
+// the bus, the six setpoints and the six torques (per mille and mN*m, little endian), in hexadecimal. A line "reset"
+// where the model starts at rest.
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 #include FXDYN_TABLES_HEADER
 #include FXDYN_VECTORS_HEADER
 
-#include "firmware/setpoint_codec.hpp"
+#include "firmware/protocol/setpoint_codec.hpp"
 
 namespace {
 

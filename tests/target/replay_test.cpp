@@ -5,13 +5,14 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
+#include "host_tools/effects/effects.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/export/proof.hpp"
-#include "host_tools/files.hpp"
 #include "host_tools/hil/qemu_target.hpp"
-#include "host_tools/model/effects.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/replay/replay.hpp"
+#include "host_tools/support/files.hpp"
+#include "host_tools/support/random.hpp"
 #include "host_tools/update/update.hpp"
 #include "tests/diagnose/arm.hpp"
 #include "tests/support/broad_learning.hpp"

@@ -7,13 +7,13 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "host_tools/excite/fourier.hpp"
+#include "host_tools/effects/evaluator.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/export/proof.hpp"
-#include "host_tools/files.hpp"
-#include "host_tools/model/evaluator.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
-#include "host_tools/random.hpp"
+#include "host_tools/signals/fourier.hpp"
+#include "host_tools/support/files.hpp"
+#include "host_tools/support/random.hpp"
 #include "host_tools/train/sparse_features.hpp"
 #include "host_tools/train/tuning.hpp"
 #include "tests/support/chains.hpp"

@@ -1,11 +1,11 @@
-#include "host_tools/identify/bls_rows.hpp"
+#include "host_tools/regression/bls_rows.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "host_tools/random.hpp"
-#include "host_tools/vectors.hpp"
+#include "host_tools/support/random.hpp"
+#include "host_tools/support/vectors.hpp"
 #include "model/broad_learning.hpp"
 
 namespace fxdyn {

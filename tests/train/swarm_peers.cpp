@@ -18,10 +18,10 @@
 #include <pagmo/problem.hpp>
 #include <sstream>
 
-#include "host_tools/error.hpp"
-#include "host_tools/files.hpp"
 #include "host_tools/identify/identify.hpp"
-#include "host_tools/parallel.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/files.hpp"
+#include "host_tools/support/parallel.hpp"
 #include "host_tools/train/swarm.hpp"
 #include "host_tools/train/train.hpp"
 #include "host_tools/train/tuning.hpp"

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "host_tools/error.hpp"
+#include "host_tools/support/error.hpp"
 
 namespace fxdyn {
 namespace {

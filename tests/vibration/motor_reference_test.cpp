@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "host_tools/model/evaluator.hpp"
+#include "host_tools/effects/evaluator.hpp"
 #include "host_tools/simulate/mujoco_plant.hpp"
 #include "host_tools/vibration/moves.hpp"
 #include "tests/simulate/support.hpp"

@@ -1,0 +1,158 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <array>
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host_tools/numbers/formats.hpp"
+#include "host_tools/robot/robot.hpp"
+#include "host_tools/signals/log.hpp"
+#include "model/broad_learning_inputs.hpp"
+
+namespace fxdyn {
+
+/// One effect of one joint with its fitted parameters, in the order of the effect's ParameterInfo lists.
+struct EffectFit {
+  std::string effect;
+  std::vector<double> shape, linear;
+  std::vector<double> shape_std, linear_std;  ///< empty or 0: not estimated
+  bool named = false;                         ///< found by diagnosis; else nominal
+};
+
+/// The BLS of one joint (model/broad_learning.hpp).
+struct BroadLearningFit : BroadLearningScales {
+  std::string inputs = "physical";  ///< names of types there: physical, extended, state
+  std::string activation = "tanh";  ///< tanh, relu
+  Eigen::MatrixXd weights;          ///< nodes x (inputs + 1): input weights, bias [-]
+  Eigen::VectorXd coefficients;     ///< of inputs, then nodes [N*m | N]
+  double ridge = 0;
+  Eigen::Index nodes() const { return weights.rows(); }
+  Eigen::Index input_count() const { return weights.cols() - 1; }
+  Eigen::Index coefficient_count() const { return input_count() + nodes(); }
+};
+
+/// One joint's gear, by a second encoder on its link (host_tools/identify/flexible.hpp). Prismatic joints: N/m, N*s/m,
+/// kg.
+struct FlexibleJoint {
+  std::size_t joint = 0;                          ///< from 0
+  double stiffness = 0, stiffness_std = 0;        ///< K [N*m/rad]
+  double damping = 0, damping_std = 0;            ///< B [N*m*s/rad]
+  double effective_inertia = 0, inertia_std = 0;  ///< J_eff: rotor and gears [kg*m^2]; 0: not known
+  double deflection_rms = 0;                      ///< of q - qlink about its mean, filtered [rad | m]
+  double explained = 0;                           ///< share of its power that the fit explains
+  bool found = false;                             ///< else the figures are noise and `note` says why
+  std::string note;                               ///< what a reader should know, empty if nothing
+};
+
+struct JointFit {
+  double sign_width = 0.01;   ///< s = tanh(dq / width) [rad/s | m/s]
+  double sign_width_std = 0;  ///< 0: not estimated
+  std::vector<EffectFit> effects;
+  std::optional<BroadLearningFit> bls;
+  std::optional<FlexibleJoint> flexible;  ///< where the joint has a link encoder
+  double rated_torque = 0;                ///< [N*m | N]
+  double q_lower = 0, q_upper = 0, dq_limit = 0, ddq_limit = 0, tau_limit = 0;
+  const EffectFit* find(std::string_view effect) const;
+};
+
+/// A base parameter: the standard parameter that stands for its group.
+struct BaseParameter {
+  std::size_t column = 0;  ///< 10 * link + parameter (model/rigid_body.hpp)
+  std::string name;        ///< e.g. "hx3": first moment of link 3 about x, DH frame
+  double value = 0, std = 0;
+  bool essential = true;   ///< the data would be explained worse without it
+  std::string expression;  ///< the sum of standard parameters that it is, e.g. "Jzz1 + Jxx2 + 0.18 m3"
+};
+
+struct FilterFit {
+  double position_cutoff_hz = 0, torque_cutoff_hz = 0, edge_s = 0;
+  /// The logs' torque column is this far ahead of the motion: measured tau(t) = torque of the motion at t + lead. A
+  /// drive that answers a command a while later has it, or signals that were sampled at different moments.
+  double torque_lead_s = 0;
+  // Why: see choose_filter().
+  double excited_hz = 0;                             ///< holds 99.9 % of the velocities' energy, joints alike
+  double crossing_hz = 0;                            ///< where the last joint's motion sinks into its noise
+  std::vector<double> encoder_step, position_noise;  ///< per joint; no step found: 0; RMS of white noise [rad | m]
+};
+
+struct LogReference {
+  std::string file, role, hash;
+  double from_s = 0, to_s = 0;
+};
+
+/// What the layout of exported tables takes from the values in them, beside the formats: it stays when an update
+/// replaces the values, so that firmware that is built for the layout takes the new ones.
+struct TableLayout {
+  std::vector<unsigned> parameters;  ///< per link, bit k: inertial parameter k is computed, else it is zero
+  std::vector<int> node_bits;        ///< per joint: fractional bits of the BLS's node coefficients; 0 without one
+};
+
+/// Which page of tables is newer than which (model/table_page.hpp). No clock: the same input makes the same bytes.
+struct Lineage {
+  std::uint32_t origin = 0;    ///< CRC-32 of the parameters that the first export wrote
+  std::uint32_t sequence = 0;  ///< 0: not exported yet
+};
+
+/// When the robot ran, by the logs' own time stamps: what drifts has done so since the start.
+struct Session {
+  double start_s = 0, end_s = 0;
+};
+
+/// Everything that predict, export and simulate need: the content of model.json.
+struct IdentifiedModel {
+  Robot robot;
+  std::vector<LinkInertia<Real>> inertia;  ///< representative: Y [beta; 0] = Y_b beta, DH frames
+  std::vector<BaseParameter> base;
+  std::vector<JointFit> joints;
+  std::vector<EffectFit> body;  ///< payload, gravity_tilt
+  FilterFit filter;
+  /// How to read logs, by file name; "" stands for logs that the project does not name.
+  std::map<std::string, LogFormat> log_formats;
+  double tick_s = 0.002;
+  std::uint64_t seed = 1;
+  std::string project, project_hash;
+  std::vector<LogReference> logs;
+  std::vector<std::string> notes;     ///< what a reader should know of data and fit
+  std::string stage = "identified";   ///< or "diagnosed", "trained"
+  std::optional<Session> session;     ///< of the diagnosed logs, where their windows do not overlap
+  std::vector<LogReference> updates;  ///< logs that `fxdyn update` has refitted the coefficients with, in their order
+  /// Of the exported tables; a stage that changes the model drops them.
+  std::optional<Formats> formats;
+  std::optional<TableLayout> layout;
+  std::uint32_t tables_crc = 0;
+  Lineage lineage;
+
+  /// For other tables of the same model.
+  void drop_formats() {
+    formats.reset();
+    layout.reset();
+    tables_crc = 0;
+  }
+  /// It is another model now.
+  void drop_tables() {
+    drop_formats();
+    lineage = {};
+  }
+};
+
+nlohmann::json to_json(const IdentifiedModel& model);
+/// "flexible" of a joint in model.json.
+nlohmann::json flexible_json(const FlexibleJoint& joint, const Robot& robot);
+/// Formats as in model.json and export.json.
+nlohmann::json formats_json(const Formats& formats);
+/// @throws InputError naming the file and the missing or wrong key.
+IdentifiedModel read_model(const std::filesystem::path& file);
+
+/// The parameters of one link as ten numbers, the order of the regressor's columns.
+inline std::array<double, parameters_per_link> to_array(const LinkInertia<Real>& link) {
+  return {link.m, link.h.x, link.h.y, link.h.z, link.xx, link.yy, link.zz, link.xy, link.xz, link.yz};
+}
+inline LinkInertia<Real> to_inertia(const std::array<double, parameters_per_link>& v) {
+  return {v[0], {v[1], v[2], v[3]}, v[4], v[5], v[6], v[7], v[8], v[9]};
+}
+
+}  // namespace fxdyn

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <filesystem>
+
+#include "host_tools/project/project.hpp"
+#include "host_tools/support/error.hpp"
+
+namespace fxdyn {
+
+/// Where an entry's log is, once its scenario has been simulated.
+std::filesystem::path log_file(const LogEntry& entry, const std::filesystem::path& directory);
+
+/// Whether the windows of two logs have a moment in common.
+bool share_time(const LogEntry& a, const LogEntry& b);
+
+/// Whether two files hold the same bytes. Files that are missing are complained of where they are read.
+bool same_content(const std::filesystem::path& a, const std::filesystem::path& b);
+
+/// The complaint that two logs of a project share data; `how` says in which way.
+InputError overlap(const Project& project, const LogEntry& a, const LogEntry& b, const char* how);
+inline constexpr const char* same_bytes = "the same content under another name";
+
+}  // namespace fxdyn

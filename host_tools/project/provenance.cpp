@@ -1,0 +1,69 @@
+#include "host_tools/project/provenance.hpp"
+
+#include <cstring>
+
+#include "host_tools/project/log_entries.hpp"
+#include "host_tools/support/files.hpp"
+
+namespace fxdyn {
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+json hash_of_model(const fs::path& directory) {
+  const fs::path file = directory / "model.json";
+  if (!fs::exists(file)) return nullptr;
+  json model = json::parse(read_file(file));
+  // An export makes them anew without touching the model.
+  for (const char* key : {"formats", "layout", "tables_crc", "origin", "sequence"}) model.erase(key);
+  return hash_of(model.dump());
+}
+
+json read_seconds(const fs::path& directory) {
+  const fs::path file = directory / "timing.json";
+  if (!fs::exists(file)) return json::object();
+  return json::parse(read_file(file)).value("seconds", json::object());
+}
+
+}  // namespace
+
+json made_from(const Project& project, const fs::path& directory, bool of_model) {
+  json out{{"logs", json::object()}};
+  for (const LogEntry& entry : project.logs) {
+    const fs::path file = log_file(entry, directory);
+    out["logs"][fs::relative(file, directory).generic_string()] = hash_of_file(file);
+  }
+  if (of_model) out["model"] = hash_of_model(directory);
+  return out;
+}
+
+bool is_unchanged(const json& made_from, const fs::path& directory) {
+  if (!made_from.is_object()) return false;
+  for (const auto& [file, hash] : made_from.at("logs").items()) {
+    if (!fs::exists(directory / file) || hash_of_file(directory / file) != hash) return false;
+  }
+  return !made_from.contains("model") || made_from.at("model") == hash_of_model(directory);
+}
+
+void note_seconds(const fs::path& directory, const char* verb, double seconds) {
+  json all = read_seconds(directory);
+  all[verb] = seconds;
+  write_file(directory / "timing.json", json{{"schema", "fxdyn.timing/1"}, {"seconds", all}}.dump(1) + "\n");
+}
+
+json training_seconds(const fs::path& directory) {
+  const json all = read_seconds(directory);
+  if (!all.contains("diagnose") || !all.contains("train")) return nullptr;
+  return all.at("diagnose").get<double>() + all.at("train").get<double>();
+}
+
+PageHeader header_of(const fs::path& page) {
+  const std::string bytes = read_file(page);
+  PageHeader header;
+  if (bytes.size() < sizeof header) return {.magic = 0};
+  std::memcpy(&header, bytes.data(), sizeof header);
+  return header;
+}
+
+}  // namespace fxdyn

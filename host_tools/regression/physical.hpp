@@ -1,0 +1,110 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host_tools/regression/fitter.hpp"
+#include "host_tools/regression/regressor.hpp"
+#include "host_tools/robot/robot.hpp"
+
+namespace fxdyn {
+
+/// P = integral of [r; 1] [r; 1]^T dm = [[J, h], [h^T, m]] of a link (Wensing, Kim, Slotine 2018). A body of matter has
+/// P > 0, and every P > 0 belongs to one: mass positive, inertia tensor positive with the triangle inequality.
+Eigen::Matrix4d pseudo_inertia(const LinkInertia<Real>& link);
+LinkInertia<Real> from_pseudo_inertia(const Eigen::Matrix4d& p);
+
+/// Bodies pi (10 a body) that are physically possible, and coefficients theta within bounds, closest to the data:
+///   minimise (z - z*)^T information (z - z*) / variance, z = [beta; theta], beta = grouping * pi,
+///   subject to P_i > 0 and lower <= theta <= upper.
+struct ConsistentProblem {
+  Eigen::MatrixXd information;         ///< X^T W X over [beta; theta]
+  Eigen::VectorXd projection;          ///< X^T W tau
+  Eigen::VectorXd lower, upper;        ///< of theta; +-1e30: unbounded
+  Eigen::MatrixXd grouping;            ///< beta x 10 bodies, the unit matrix in `columns`
+  std::vector<Eigen::Index> columns;   ///< the parameters that stand for beta
+  std::vector<Eigen::Matrix4d> prior;  ///< one a body, P > 0
+  double variance = 1;                 ///< of a row's weighted residual: 1 where W is one over the residual's variance
+};
+
+struct ConsistentFit {
+  std::vector<Eigen::Matrix4d> bodies;
+  Eigen::VectorXd beta, theta;
+  bool constrained = false;  ///< false: beta and theta are the least squares solution itself
+};
+
+/// Interior-point Newton whose barrier is the prior: the divergence between pseudo-inertias
+///   D(P || P0) = tr(P0^-1 P) - log det(P0^-1 P) - 4
+/// (Lee, Wensing, Park, "Geometric robot dynamic identification", T-RO 2020), which no choice of units or frames
+/// changes. Its weight falls to a hundredth of what one independent row tells. Where some possible bodies make the
+/// least squares solution, that is the result and the prior only chooses among those.
+ConsistentFit fit_consistent(const ConsistentProblem& problem);
+
+/// The fit of a robot: see ConsistentProblem.
+struct PhysicalProblem {
+  const Robot& robot;
+  const DhChain& chain;
+  const BaseSet& base;
+  Eigen::MatrixXd information;   ///< (base + theta)^2: weighted X^T W X of the fit
+  Eigen::VectorXd projection;    ///< X^T W tau
+  Eigen::VectorXd lower, upper;  ///< of theta (all joints' coefficients); +-1e30: unbounded
+  double variance = 1;           ///< of a row's weighted residual: 1 where W is one over the residual's variance
+};
+
+/// How much of a parameter the data decided: 1 - variance after / variance before, before being the prior with a
+/// standard deviation of about its own size. 0: the value is the prior's.
+struct DataShare {
+  double mass = 0;
+  // x, y, z of the link's URDF frame
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  Eigen::Vector3d first_moment = Eigen::Vector3d::Zero();  ///< m c, what gravity acts on
+};
+/// From here on a parameter counts as determined by the data.
+inline constexpr double determined_share = 0.99;
+
+struct PhysicalFit {
+  std::vector<LinkInertia<Real>> inertia;  ///< DH frames, all ten parameters of each link
+  Eigen::VectorXd beta, theta;
+  bool constrained = false;                 ///< false: beta and theta are the unconstrained solution itself
+  std::vector<double> smallest_eigenvalue;  ///< of each pseudo-inertia
+  std::vector<DataShare> share;
+  std::string prior;      ///< what it was, for people
+  double mass = 0;        ///< of all links together [kg]
+  double mass_share = 0;  ///< how much of that the data decided
+};
+
+/// Prior: the URDF's inertias where it has them; for other links solid ellipsoids of one density around the segment to
+/// the next joint, the density that fits the data best.
+PhysicalFit fit_physical(const PhysicalProblem& problem);
+
+/// The same of a fitter whose weights are one over the residuals' variance; coefficients keep the bounds of the
+/// catalogue (those of a BLS have none).
+PhysicalFit fit_physical(const Fitter& fitter, const Robot& robot, double variance = 1);
+/// The same with the information of other logs in place of the fitter's own (X^T W X and X^T W tau of its unknowns).
+PhysicalFit fit_physical(const Fitter& fitter, const Robot& robot, Eigen::MatrixXd information,
+                         Eigen::VectorXd projection, double variance);
+/// A fitter's solution with beta and theta of the physical fit in place of its own.
+Solution physical_solution(Solution solution, const PhysicalFit& fit);
+
+/// Masses and centres of the fit beside the URDF's, in the links' URDF frames.
+struct LinkMass {
+  std::string link;
+  Inertial identified;
+  DataShare share;
+  std::optional<Inertial> urdf;
+};
+struct MassCheck {
+  std::vector<LinkMass> links;
+  double mass = 0, mass_share = 0;
+  std::optional<double> urdf_mass;  ///< where all links have an inertia there
+};
+MassCheck mass_check(const Robot& robot, const DhChain& chain, const PhysicalFit& fit);
+
+/// The same with the prior and what the data decided of it, for metrics and report: every mass, centre and first moment
+/// m c (what gravity acts on) with its share, the URDF's beside it.
+nlohmann::json physical_json(const Robot& robot, const DhChain& chain, const PhysicalFit& fit);
+
+}  // namespace fxdyn

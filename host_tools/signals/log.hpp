@@ -1,0 +1,107 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace fxdyn {
+
+/// Which data decides what: see docs/guide. `baseline` serves `diagnose` only.
+enum class Role { baseline, train, validate, test };
+std::string to_string(Role role);
+
+/// A load on the flange: a point mass at `com` in the last link's URDF frame.
+struct Load {
+  double mass = 0;                                ///< [kg]
+  Eigen::Vector3d com = Eigen::Vector3d::Zero();  ///< [m]
+};
+
+/// A measured or simulated log on a uniform time grid, SI units, joint side of the gearbox. Matrices are samples x
+/// joints. Signals that the file does not have are empty (0 x 0).
+struct Log {
+  std::filesystem::path file;
+  Role role = Role::train;
+  double from_s = 0, to_s = 0;  ///< the half-open window that was cut out
+  double step_s = 0;            ///< sampling interval
+  bool resampled = false;       ///< the file's time stamps were irregular
+  Eigen::VectorXd t;            ///< [s]
+  Eigen::VectorXd stamps;       ///< the file's own time stamps in the window [s]; empty: t
+  Eigen::MatrixXd q, dq, ddq, tau, qlink;
+  Eigen::VectorXd encoder_step;  ///< of a resampled log: encoder_step() of the q that was recorded; empty: of q
+  std::optional<Load> load;      ///< known from the project
+  Eigen::Index samples() const { return t.size(); }
+  Eigen::Index joints() const { return q.cols(); }
+};
+
+/// How to read a log; the defaults are the file format of the design (t, q1.., dq1.., ddq1.., tau1.., qlink1..).
+struct LogFormat {
+  std::map<std::string, std::string> columns;  ///< signal (t q dq ddq tau qlink temp) -> column prefix in the file
+  std::vector<double> torque_gain;             ///< measured column -> N*m; empty: 1
+};
+
+/// Reads `joints` joints. Irregular stamps (jitter > 1 % of the median step) are resampled to the median step by
+/// monotone-safe linear interpolation and `resampled` is set; a gap > 10 steps is an error. Revolute joints
+/// are unwrapped where q jumps by about 2 pi between samples.
+/// @throws InputError naming file, line and column: missing column (names the nearest existing one), NaN or a
+/// non-number, time going backwards or standing still, a row with another number of fields, fewer than 2 rows; revolute
+/// q that looks like degrees (says "looks like degrees, multiply by pi/180"), window outside the file.
+/// `torque_required`: predict reads logs without torque.
+Log read_log(const std::filesystem::path& file, std::size_t joints, const std::vector<bool>& revolute,
+             const LogFormat& format, std::optional<double> from_s, std::optional<double> to_s,
+             bool torque_required = true);
+
+/// [signals] of a project file; what is not given is chosen from the logs.
+struct SignalSettings {
+  std::optional<double> position_cutoff_hz, torque_cutoff_hz;
+  std::optional<double> torque_lead_s;  ///< see FilterFit
+  std::optional<double> edge_s;         ///< dropped at both ends after filtering
+};
+
+/// Writes t, q, dq?, ddq?, tau? with 17 significant digits (to a temporary file, then renamed).
+void write_log(const std::filesystem::path& file, const Log& log);
+
+/// Smallest step of an encoder [rad | m]: what all differences between neighbouring samples are multiples of; 0 if
+/// there is none.
+double encoder_step(const Eigen::Ref<const Eigen::VectorXd>& q);
+
+/// Columns sampled at t, linearly interpolated at other instants (ascending).
+Eigen::MatrixXd interpolate(const Eigen::MatrixXd& columns, const Eigen::VectorXd& t, const Eigen::VectorXd& at);
+
+/// Columns at `steps` (any number, a fraction too) samples later, by cubic interpolation; the ends stand still.
+Eigen::MatrixXd at_other_times(const Eigen::Ref<const Eigen::MatrixXd>& columns, double steps);
+
+/// Zero-phase low-pass Butterworth filter: forward and backward over each column, with odd reflection at both ends and
+/// steady-state initial conditions. `order` is the order of one pass (the baseline of shared data: 4).
+class ZeroPhaseFilter {
+ public:
+  /// A cut-off at or above 0.95 of the Nyquist frequency, or <= 0, makes it the identity.
+  ZeroPhaseFilter(double cutoff_hz, double step_s, int order = 4);
+  Eigen::MatrixXd apply(const Eigen::Ref<const Eigen::MatrixXd>& columns) const;
+  /// Samples at either end that the transient of the filter can reach.
+  Eigen::Index edge_samples() const;
+  double cutoff_hz() const { return cutoff_hz_; }
+  /// (b0 + b1 / z + b2 / z^2) / (1 + a1 / z + a2 / z^2), one after another; none: the identity.
+  struct Section {
+    double b0, b1, b2, a1, a2;
+  };
+  const std::vector<Section>& sections() const { return sections_; }
+
+ private:
+  template <int columns>
+  void apply_to(double* side_by_side, Eigen::Index samples) const;
+
+  double cutoff_hz_;
+  double step_s_;
+  std::vector<Section> sections_;
+};
+
+/// d/dt of each column by central differences of sixth order (one-sided towards the ends), error O(h^6).
+Eigen::MatrixXd differentiate(const Eigen::Ref<const Eigen::MatrixXd>& columns, double step_s);
+/// d^2/dt^2, likewise.
+Eigen::MatrixXd differentiate_twice(const Eigen::Ref<const Eigen::MatrixXd>& columns, double step_s);
+
+}  // namespace fxdyn

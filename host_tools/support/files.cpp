@@ -1,0 +1,93 @@
+#include "host_tools/support/files.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+#include <vector>
+
+#include "host_tools/support/error.hpp"
+
+namespace fxdyn {
+
+std::string read_file(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  // Inserting nothing, from an empty file, sets the fail bit.
+  if (!in || (in.peek() != std::ifstream::traits_type::eof() && !(text << in.rdbuf()))) {
+    throw InputError(fmt::format("{}: can't be read: {}", file.string(), std::strerror(errno)));
+  }
+  return text.str();
+}
+
+void write_file(const std::filesystem::path& file, std::string_view content) {
+  std::error_code error;
+  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), error);
+  const std::filesystem::path temporary = fmt::format("{}.{}.tmp", file.string(), ::getpid());
+  {
+    std::ofstream out(temporary, std::ios::binary);
+    out.write(content.data(), static_cast<std::streamsize>(content.size()));
+    out.close();
+    if (!out) {
+      const int cause = errno;
+      std::filesystem::remove(temporary, error);
+      throw InputError(fmt::format("{}: can't be written: {}", file.string(), std::strerror(cause)));
+    }
+  }
+  std::filesystem::rename(temporary, file, error);
+  if (error) {
+    std::filesystem::remove(temporary);
+    throw InputError(fmt::format("{}: can't be written: {}", file.string(), error.message()));
+  }
+}
+
+void check_writable(const std::filesystem::path& directory) {
+  if (directory.empty()) throw InputError("--out \"\": name the directory for the results");
+  std::error_code error;
+  std::filesystem::path there = std::filesystem::absolute(directory);
+  while (!std::filesystem::exists(there, error) && there.has_parent_path() && there != there.parent_path())
+    there = there.parent_path();
+  const bool is_directory = std::filesystem::is_directory(there, error);
+  if (is_directory && ::access(there.c_str(), W_OK | X_OK) == 0) return;
+  throw InputError(fmt::format("{}: can't be written: {} {}; choose another --out", directory.string(), there.string(),
+                               is_directory ? "is not yours to write to" : "is a file"));
+}
+
+namespace {
+
+class Fnv1a {
+ public:
+  void add(std::string_view content) {
+    for (const char c : content) hash_ = (hash_ ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
+  }
+  std::string text() const { return fmt::format("{:016x}", hash_); }
+
+ private:
+  std::uint64_t hash_ = 14695981039346656037ULL;
+};
+
+}  // namespace
+
+std::string hash_of(std::string_view content) {
+  Fnv1a hash;
+  hash.add(content);
+  return hash.text();
+}
+
+std::string hash_of_file(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::vector<char> piece(std::size_t{1} << 20);
+  Fnv1a hash;
+  while (stream) {
+    stream.read(piece.data(), static_cast<std::streamsize>(piece.size()));
+    hash.add({piece.data(), static_cast<std::size_t>(stream.gcount())});
+  }
+  if (!stream.eof()) throw InputError(file.string() + ": can't be read");
+  return hash.text();
+}
+
+}  // namespace fxdyn

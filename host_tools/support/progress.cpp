@@ -1,0 +1,49 @@
+#include "host_tools/support/progress.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <mutex>
+
+namespace fxdyn {
+namespace {
+constexpr std::size_t width = 30;
+std::mutex drawing;
+bool on_terminal() {
+  static const bool yes = ::isatty(STDERR_FILENO) != 0;
+  return yes;
+}
+}  // namespace
+
+void Progress::stage(const std::string& name, std::size_t total) {
+  done();
+  name_ = name;
+  total_ = total;
+  steps_ = 0;
+  if (on_terminal()) {
+    draw(0);
+  } else {
+    fmt::print(stderr, "{}\n", name_);
+  }
+}
+
+void Progress::step() {
+  const std::size_t steps = ++steps_;
+  if (on_terminal()) draw(steps);
+}
+
+void Progress::draw(std::size_t steps) {
+  const std::lock_guard lock(drawing);
+  const std::size_t filled = total_ == 0 ? width : width * std::min(steps, total_) / total_;
+  fmt::print(stderr, "\r{:<34} [{:#<{}}{:<{}}] {}/{} ", name_, "", filled, "", width - filled, std::min(steps, total_),
+             total_);
+  std::fflush(stderr);
+}
+
+void Progress::done() {
+  if (!name_.empty() && on_terminal()) fmt::print(stderr, "\n");
+  name_.clear();
+}
+
+}  // namespace fxdyn

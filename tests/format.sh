@@ -1,0 +1,36 @@
+#!/usr/bin/env bash
+# format.sh style | tidy BUILD_DIR [REF]: clang-format over all sources; clang-tidy over those that differ from REF (HEAD~1),
+# for 300 s at most. Says what to do: clang-format-14 -i FILE.
+set -euo pipefail
+root=$(cd "$(dirname "$0")/.." && pwd)
+cd "$root"
+longest_s=300
+
+sources() { find model hal firmware host_tools tests -name '*.[ch]pp' | grep -v '^tests/golden/.*\(tables\|vectors\)\.hpp$' | sort; }
+
+case ${1:-} in
+  style)
+    sources | xargs clang-format-14 --dry-run -Werror
+    ;;
+  tidy)
+    # gcc's precompiled headers are not clang's
+    commands=$(mktemp -d)
+    trap 'rm -r "$commands"' EXIT
+    database=$commands/compile_commands.json
+    sed 's/-Winvalid-pch -include [^ ]*cmake_pch.hxx//' "$2/compile_commands.json" >"$database"
+    mapfile -t files < <(git diff --name-only "${3:-HEAD~1}" -- '*.cpp' 2>/dev/null | sort)
+    done=0 failed=0
+    for file in "${files[@]}"; do
+      [ "$SECONDS" -lt "$longest_s" ] || break
+      grep -q "\"file\": \"$root/$file\"" "$database" || continue  # of a target: another compiler
+      clang-tidy-14 -p "$commands" --quiet --warnings-as-errors='*' "$file" 2>/dev/null || failed=1
+      done=$((done + 1))
+    done
+    echo "clang-tidy: $done of ${#files[@]} changed files in $SECONDS s"
+    exit $failed
+    ;;
+  *)
+    echo "usage: format.sh style | tidy BUILD_DIR [REF]" >&2
+    exit 2
+    ;;
+esac
