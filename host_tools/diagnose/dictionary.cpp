@@ -1,7 +1,10 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <numbers>
+#include <stdexcept>
 
 #include "host_tools/diagnose/search.hpp"
 #include "host_tools/effects/effects.hpp"
@@ -88,6 +91,8 @@ std::vector<std::vector<double>> grids(const EffectInfo& info, std::size_t joint
         const bool mates = (k + 1 == joint || k == joint + 1) && joints[k].type == joints[joint].type;
         if (k != joint && (info.name != MotorCoupling::name || mates)) values.push_back(static_cast<double>(k + 1));
       }
+    } else {
+      throw std::logic_error(fmt::format("no values to try for shape '{}' of effect '{}'", shape.name, info.name));
     }
     for (double& value : values) value = std::clamp(value, least, most);
     out.push_back(std::move(values));

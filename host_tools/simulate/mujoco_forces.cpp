@@ -1,8 +1,14 @@
 #include "host_tools/simulate/mujoco_forces.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <string_view>
 
 #include "host_tools/simulate/mujoco_model.hpp"
+#include "host_tools/support/error.hpp"
 
 namespace fxdyn {
 namespace {
@@ -13,7 +19,13 @@ using Eigen::VectorXd;
 /// Sign of a velocity with a soft zero.
 double soft_sign(double v, double width) { return v / std::sqrt(v * v + width * width); }
 
+/// Effects that are no torque of force(): MuJoCo's own, those of the body, of the gears and of the sensors.
+constexpr std::array<std::string_view, 12> elsewhere{"viscous",      "coulomb",     "rotor_inertia", "elasticity",
+                                                     "backlash",     "presliding",  "eccentricity",  "payload",
+                                                     "gravity_tilt", "torque_gain", "saturation",    "delay"};
+
 /// Torque of an effect with no memory on joint j [N*m | N].
+/// @throws InputError: an effect that this plant has no formula for
 double force(const EffectFit& fit, const JointFit& joint, Index j, const DriveState& now,
              const IdentifiedModel& plant) {
   const std::string& name = fit.effect;
@@ -38,7 +50,8 @@ double force(const EffectFit& fit, const JointFit& joint, Index j, const DriveSt
     const double ratio = fit.shape[1], geared = ratio * now.dq[peer()];
     return p[0] * soft_sign(v + geared, fit.shape[2]) + p[1] * geared + p[2] * ratio * now.ddq[peer()];
   }
-  return 0;  // viscous, coulomb, rotor_inertia and elasticity are MuJoCo's; the rest are no torques of the motion
+  if (std::find(elsewhere.begin(), elsewhere.end(), name) != elsewhere.end()) return 0;
+  throw InputError(fmt::format("effect '{}' has no formula in MuJoCo's plant; use the internal plant", name));
 }
 
 /// Value between the samples of a column; before the first it has always been the same.

@@ -22,6 +22,7 @@ class DriveForces {
  public:
   explicit DriveForces(const IdentifiedModel& plant);
   /// Torque that every drive has to give for them [N*m | N].
+  /// @throws InputError: an effect that this plant has no formula for
   Eigen::VectorXd operator()(const DriveState& state);
 
  private:

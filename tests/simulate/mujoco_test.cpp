@@ -2,13 +2,16 @@
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/simulate/mujoco_forces.hpp"
 #include "host_tools/simulate/mujoco_plant.hpp"
+#include "host_tools/support/error.hpp"
 #include "tests/simulate/support.hpp"
 
 namespace fxdyn {
 namespace {
 
 using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
 MatrixXd model_torque(const IdentifiedModel& plant, const Reference& motion, double age_s = 0) {
   return predict(plant, motion.q, motion.dq, motion.ddq, motion.step_s, nullptr, age_s);
@@ -104,6 +107,25 @@ TEST(Mujoco, GearsThatGiveAreTheModelsWhereThisIsSlow) {
     EXPECT_LT(error(run.deflections, deflections), 0.02) << effect.effect;
     EXPECT_LT(error(run.tau, tau), 0.02) << effect.effect;
   }
+}
+
+/// Forces of joint 2's drive with one effect more.
+VectorXd drive_forces(const EffectFit& effect) {
+  IdentifiedModel plant = test::puma_with_friction();
+  plant.joints[1].effects.push_back(effect);
+  const VectorXd some = VectorXd::Constant(6, 0.3);
+  return DriveForces(plant)({some, some, some, some, 1});
+}
+
+TEST(Mujoco, KnowsEveryEffectOfTheCatalogue) {
+  for (const EffectInfo& info : effect_infos()) {
+    const std::vector<double> shape(info.shape.size(), 1), linear(info.linear.size(), 0.1);
+    EXPECT_NO_THROW(drive_forces(test::effect(std::string(info.name), shape, linear))) << info.name;
+  }
+}
+
+TEST(Mujoco, RefusesAnEffectThatItDoesNotKnow) {
+  EXPECT_THROW(drive_forces(test::effect("new_friction", {}, {1})), InputError);
 }
 
 TEST(Mujoco, ClosedLoopWithEveryEffectItTakes) {
