@@ -115,6 +115,9 @@ TEST(ByHand, ADeflectionBeginsAnewWhereTooLittleOrTooOldIsKnown) {
   EXPECT_EQ(young.step(14), (Step{14, 6, 4}));
   young.skip();  // three ticks are enough to go on, by 3 to 17
   EXPECT_EQ(young.step(20), (Step{20, 6, 0}));
+  Deflects unborn;
+  unborn.skip();
+  EXPECT_EQ(unborn.step(5), (Step{5, 0, 0}));
   Deflects old;
   for (const double delta : {1, 2, 3, 4}) old.step(delta);
   for (int i = 0; i < 3; ++i) old.skip();
