@@ -348,7 +348,11 @@ TEST(Stm32g4, ClockRegistersEndAsTheManualHasThem) {
   for (const bool crystal : {true, false}) {
     test::RccModel<test::G4> model;
     model.crystal_starts = crystal;
-    model.write(0x4002'1008, 0b1111U << 4 | 0b01U);  // a boot loader has divided AHB by 512
+    // A boot loader has left the PLL on, with the largest of every field, and AHB divided by 512.
+    model.write(0x4002'100c, 0b11U | 0xfU << 4 | 0x7fU << 8 | 0b11U << 21 | 0b11U << 25);
+    model.write(0x4002'1000, model.read(0x4002'1000) | 1U << 24);
+    model.write(0x4002'1008, 0b1111U << 4 | 0b01U);
+    model.violations.clear();
     ASSERT_EQ(stm32g4::start_clock(Modelled{&model}).mhz, 168U);
     const std::uint32_t source_and_m = crystal ? 0b11U | 5U << 4 : 0b10U | 3U << 4;
     EXPECT_EQ(model.read(0x4002'100c), source_and_m | 84U << 8 | 1U << 20 | 1U << 21 | 1U << 24)
@@ -410,6 +414,17 @@ TEST(Stm32g4, ItDoesNotSwitchWithoutWaitStatesNorStayHalfWay) {
             stm32::ClockSource::internal_slow);
   EXPECT_FALSE(system.runs_from_pll());
   EXPECT_EQ(system.read(0x4002'1008) & 0xf0U, 0U) << "undivided again";
+}
+TEST(Stm32g4, APllThatDoesNotStopIsLeftAlone) {
+  struct Running {
+    test::RccModel<test::G4>* model;
+    std::uint32_t read(Address at) const { return model->read(at) | (at == 0x4002'1000 ? 1U << 25 : 0); }
+    void write(Address at, std::uint32_t value) const { model->write(at, value); }
+  };
+  test::RccModel<test::G4> model;
+  const std::uint32_t before = model.read(0x4002'100c);
+  EXPECT_EQ(stm32g4::start_clock(Running{&model}).source, stm32::ClockSource::internal_slow);
+  EXPECT_EQ(model.read(0x4002'100c), before);
 }
 
 TEST(Stm32f4, ClocksOfThePeripheralsAndTheCauseOfTheReset) {
