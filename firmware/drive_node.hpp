@@ -283,6 +283,7 @@ class DriveNode {
     errors_.clear(Error::heartbeat_lost);
     listen();
     leave_operation();
+    boot_up_is_out_ = false;
     state_ = NmtState::initialising;  // until the boot-up message has gone
     heartbeat_us_ = wrapping_subtract(now, boot_up_retry_us);
     pending_ = 0;  // nothing of before goes out ahead of the boot-up message
@@ -782,7 +783,7 @@ class DriveNode {
     if (!emergency_may_go_ && wrapping_subtract(now, emergency_us_) >= 100 * configuration_.emergency_inhibit)
       emergency_may_go_ = true;
     if (!emergency_may_go_ || off_bus_ || is_pending(emergency_place) ||
-        (state_ != NmtState::pre_operational && state_ != NmtState::operational))
+        (state_ != NmtState::pre_operational && state_ != NmtState::operational) || !has_booted_up())
       return;
     ErrorLog::Message message;
     if (!errors_.next(message)) return;
@@ -793,6 +794,15 @@ class DriveNode {
     frame.data[2] = errors_.error_register();
     canopen::store<2>(&frame.data[3], message.detail);
     std::fill_n(frame.data.begin() + 5, 3, std::uint8_t{0});
+  }
+
+  /// Whether the boot-up message is out: a bus that sorts would send an EMCY ahead of it.
+  bool has_booted_up() {
+    if constexpr (hal::SortingCanBus<Bus>) {
+      boot_up_is_out_ = boot_up_is_out_ || hardware_.bus.has_sent_all();
+      return boot_up_is_out_;
+    }
+    return true;
   }
 
   void show_fault() {
@@ -860,6 +870,7 @@ class DriveNode {
   std::string_view text_of(dictionary::Variable variable) const {
     using V = dictionary::Variable;
     if (variable == V::device_name) return dictionary::device_name;
+    if (variable == V::cost_unit) return hardware_.counter.unit();
     if (variable == V::hardware_version) return settings_.board;
     if (variable == V::software_version) return version;
     return {label_.data(), label_size_};
@@ -988,6 +999,7 @@ class DriveNode {
       case V::device_name:
       case V::hardware_version:
       case V::software_version:
+      case V::cost_unit:
       case V::label:
         break;  // text_of()
     }
@@ -1163,6 +1175,7 @@ class DriveNode {
   std::array<std::uint32_t, dictionary::consumers> consumer_us_{};
   std::uint32_t heartbeat_us_ = 0, emergency_us_ = 0;
   bool emergency_may_go_ = true, off_bus_ = false, fault_is_shown_ = false, shown_fault_ = false;
+  bool boot_up_is_out_ = false;  ///< the last one
   std::uint32_t seen_lost_ = 0;
 
   Frame received_{};

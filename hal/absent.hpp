@@ -32,6 +32,7 @@ static_assert(Watchdog<AbsentWatchdog>);
 struct AbsentCycleCounter {
   void start() {}
   std::uint32_t stop() { return 0; }
+  static constexpr const char* unit() { return "nothing"; }
 };
 static_assert(CycleCounter<AbsentCycleCounter>);
 

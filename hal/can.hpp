@@ -70,4 +70,10 @@ concept FilteringCanBus = CanBus<T> && requires(T& bus, std::span<const IdRange>
   { bus.listen(ranges) } -> std::same_as<void>;
 };
 
+/// A bus that sends the lowest identifier first, whatever it was given first, and says whether all is out.
+template <class T>
+concept SortingCanBus = CanBus<T> && requires(T& bus) {
+  { bus.has_sent_all() } -> std::same_as<bool>;
+};
+
 }  // namespace fxdyn::hal

@@ -13,6 +13,7 @@ template <class T>
 concept CycleCounter = requires(T& counter) {
   { counter.start() } -> std::same_as<void>;
   { counter.stop() } -> std::same_as<std::uint32_t>;
+  { counter.unit() } -> std::same_as<const char*>;  ///< what it counts
 };
 
 /// Microseconds since some moment; runs on and wraps after 71 minutes, so that only differences mean something.

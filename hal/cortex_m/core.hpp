@@ -32,6 +32,7 @@ class BasicCycleCounter {
   }
   void start() { begin_ = registers_.read(cycles); }
   std::uint32_t stop() { return registers_.read(cycles) - begin_; }
+  static constexpr const char* unit() { return "cycles"; }
 
  private:
   static constexpr Address debug_control = 0xe000'edfc;  // DEMCR

@@ -30,6 +30,7 @@ class BasicSysTick {
     if constexpr (masks_interrupts) cortex_m::unmask_interrupts();
     return (ticks * tick_ns + instruction_ns / 2) / instruction_ns;
   }
+  static constexpr const char* unit() { return "instructions"; }
 
  private:
   static constexpr Address control = 0xe000'e010;  // SYST_CSR

@@ -114,6 +114,8 @@ class BasicFdcan {
     return Status::ok;
   }
 
+  bool has_sent_all() { return registers_.read(transmit_pending) == 0; }
+
   Status receive(Frame& frame) {
     if (received_.pop(frame)) return Status::ok;
     return off_bus() ? Status::failed : Status::busy;
@@ -224,6 +226,6 @@ class BasicFdcan {
   std::atomic<std::uint32_t> lost_{0};  // written by the interrupt
 };
 using Fdcan = BasicFdcan<>;
-static_assert(FilteringCanBus<Fdcan>);
+static_assert(FilteringCanBus<Fdcan> && SortingCanBus<Fdcan>);
 
 }  // namespace fxdyn::hal::stm32g4

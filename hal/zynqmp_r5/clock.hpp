@@ -43,6 +43,7 @@ class CycleCounter {
   }
   void start() { begin_ = read(); }
   std::uint32_t stop() { return read() - begin_; }
+  static constexpr const char* unit() { return "cycles"; }
 
  private:
   static std::uint32_t read() {

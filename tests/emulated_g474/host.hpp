@@ -91,8 +91,8 @@ class Host {
     const std::uint32_t unused = 8U * (answer[0] >> 2 & 3U);
     return canopen::load<4>(&answer[4]) & UINT32_MAX >> unused;
   }
-  std::string text(std::uint32_t index) {
-    Bytes answer = request(initiate(0x40, index, 0));
+  std::string text(std::uint32_t index, std::uint8_t sub = 0) {
+    Bytes answer = request(initiate(0x40, index, sub));
     if (answer.size() != 8 || (answer[0] & 0xe0) != 0x40) return "(abort)";
     if ((answer[0] & 2) != 0) return {answer.begin() + 4, answer.begin() + 8 - (answer[0] >> 2 & 3)};
     std::string text;

@@ -227,6 +227,19 @@ TEST(Faults, ADeadCrystalIsToldAndFdRefused) {
   EXPECT_FALSE(bench.write(0x2030, 0, 1, 1));
 }
 
+// What waits in the controller leaves by its identifier; the boot-up message goes first all the same.
+TEST(Faults, OnAFullBusTheBootUpMessageGoesBeforeAnErrorToo) {
+  Bench bench({.crystal_hz = 0});
+  for (int i = 0; i < 2000; ++i) bench.send(0x300, {1, 2, 3, 4, 5, 6, 7, 8});
+  bench.run_ms(500);
+  std::vector<std::uint32_t> ids;
+  for (const auto& heard : bench.heard()) ids.push_back(heard.frame.id);
+  ids.erase(std::remove(ids.begin(), ids.end(), 0x300), ids.end());
+  ASSERT_GE(ids.size(), 2U);
+  EXPECT_EQ(ids[0], 0x701U);
+  EXPECT_EQ(ids[1], 0x081U);
+}
+
 // M8: the fault output is low while there is a fault, and so is that of a dead controller.
 TEST(Faults, TheFaultOutputIsActiveLow) {
   Bench bench;

@@ -257,6 +257,7 @@ TEST(Node, TellsWhatATickCosts) {
   // At 2 cycles an instruction, as Core counts; the tests on QEMU hold the instructions.
   EXPECT_GT(*most, 2 * 8'000u);
   EXPECT_LT(*most, 2 * 15'000u);
+  EXPECT_EQ(bench.text(0x2002, 5), "cycles");
 }
 
 // Every place where an interrupt may come between two instructions is as good as any other: the frames' arrival is

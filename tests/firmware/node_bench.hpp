@@ -225,8 +225,8 @@ class Bench {
     bytes.resize(4);
     return canopen::load<4>(bytes.data());
   }
-  std::string text(std::uint32_t index) {
-    const Result result = upload(index, 0);
+  std::string text(std::uint32_t index, std::uint8_t sub = 0) {
+    const Result result = upload(index, sub);
     return std::holds_alternative<Bytes>(result)
                ? std::string(std::get<Bytes>(result).begin(), std::get<Bytes>(result).end())
                : "(abort)";

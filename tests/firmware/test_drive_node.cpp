@@ -156,6 +156,7 @@ TEST_F(DriveNodeTest, IdentityAndTables) {
   EXPECT_EQ(bench.text(0x1008), "fxdyn drive node");
   EXPECT_EQ(bench.text(0x1009), "bench");
   EXPECT_EQ(bench.text(0x100A), version);
+  EXPECT_EQ(bench.text(0x2002, 5), "thousandths") << "what the board's counter counts";
   EXPECT_EQ(bench.read(0x2000, 1), 0x1234'5678U);
   EXPECT_EQ(bench.read(0x2000, 2), test::Robot::layout_hash());
   EXPECT_EQ(bench.read(0x2000, 3), 1U);

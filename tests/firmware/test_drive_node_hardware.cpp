@@ -39,6 +39,8 @@ TEST(DriveNodeHardware, ABoardThatIsWellShowsNoFault) {
 class FilteringController : public hal::fake::CanController<hal::ClassicFrame> {
  public:
   using CanController::CanController;
+  bool sent_all = true;
+  bool has_sent_all() { return sent_all; }
   void listen(std::span<const hal::IdRange> ranges) { ranges_.assign(ranges.begin(), ranges.end()); }
   bool hears(std::uint32_t id) const {
     return std::any_of(ranges_.begin(), ranges_.end(),
@@ -55,7 +57,7 @@ class FilteringController : public hal::fake::CanController<hal::ClassicFrame> {
  private:
   std::vector<hal::IdRange> ranges_;
 };
-static_assert(hal::FilteringCanBus<FilteringController>);
+static_assert(hal::FilteringCanBus<FilteringController> && hal::SortingCanBus<FilteringController>);
 
 /// The first joint's drive on a bus with filters.
 struct FilteredNode : testing::Test {
@@ -88,6 +90,34 @@ struct FilteredNode : testing::Test {
     ASSERT_EQ(answer.data[0], 0x60) << std::hex << index << ':' << int{sub};
   }
 };
+
+// A bus that sends the lowest identifier first would send the error ahead of the boot-up message.
+TEST_F(FilteredNode, AnErrorWaitsUntilTheBootUpMessageIsOut) {
+  const auto sent = [&] {
+    std::vector<std::uint32_t> ids;
+    for (const auto& frame : std::exchange(wire.sent, {})) ids.push_back(frame.id);
+    return ids;
+  };
+  using Ids = std::vector<std::uint32_t>;
+  bus.sent_all = false;
+  send(0x080, {1});  // an error: SYNC with data
+  send(0x080, {1});
+  EXPECT_EQ(sent(), (Ids{0x080, 0x701, 0x080}));
+  bus.sent_all = true;
+  while (node.poll()) continue;
+  EXPECT_EQ(sent(), Ids{0x081});
+  // What waits later has nothing to do with it.
+  bus.sent_all = false;
+  clock.advance(50'000);
+  while (node.poll()) continue;
+  clock.advance(100'000);
+  while (node.poll()) continue;
+  EXPECT_EQ(sent(), (Ids{0x081, 0x701})) << "the error is gone; a heartbeat";
+  // But a reset makes a new boot-up message.
+  send(0, {0x81, 1});
+  send(0x080, {1});
+  EXPECT_EQ(sent(), (Ids{0, 0x701, 0x080}));
+}
 
 TEST_F(FilteredNode, ListensToWhatItHandlesAndNothingElse) {
   while (node.poll()) continue;

@@ -26,6 +26,9 @@ static_assert(quarter.bit_rate(100'000'000) == 250'000);
 // The sample point is the nearest one, not the nearest in whole per mille: 87.5 % of 170 quanta is 148.75.
 constexpr BitTiming of_170 = bit_timing(stm32g4::nominal_limits, 170'000'000, {.bits_per_second = 1'000'000});
 static_assert(of_170.prescaler == 1 && of_170.segment1 == 148 && of_170.segment2 == 21);
+// A quantum may be as long as a period of the clock, and that as long as it likes.
+constexpr BitTiming of_20_hertz = bit_timing(stm32g4::nominal_limits, 20, {.bits_per_second = 1});
+static_assert(of_20_hertz.prescaler == 1 && of_20_hertz.quanta() == 20);
 
 // The clock's tolerance in examples of others.
 // F. Hartwich, A. Bassemir, "The Configuration of the CAN Bit Timing", 1999: 1 Mbit/s of 10 MHz with 6 quanta of
@@ -56,6 +59,9 @@ static_assert(propagation_quanta({1, 7, 2, 1}, 10'000'000, 600) == 6);
 static_assert(propagation_quanta({1, 7, 2, 1}, 10'000'000, 601) == 7);
 
 // What the guide says of the STM32G474.
+static_assert(stm32g4::crystal_ppm == 100 && stm32g4::internal_ppm == 7'500 + 10'000 + 1'000);
+static_assert(stm32g4::full_speed_mhz * 1'000'000 == 2 * stm32g4::fdcan_full_speed_hz);
+static_assert(stm32g4::fdcan_full_speed_hz == 84'000'000 && stm32g4::fdcan_slow_hz == 16'000'000);
 static_assert(stm32g4::classic_tolerance_ppm(g4) == 5087);
 static_assert(stm32g4::fd_tolerance_ppm(g4) == 5087 && stm32g4::fd_tolerance_ppm(g4_fast) == 5087);
 static_assert(2 * stm32g4::classic_tolerance_ppm(g4) < stm32g4::internal_ppm, "no promise without the crystal");

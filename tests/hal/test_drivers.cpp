@@ -109,14 +109,17 @@ TEST_F(FdcanTest, WhatWaitsGoesOutLowestIdentifierFirst) {
   ASSERT_EQ(send(0x581), Status::ok);
   ASSERT_EQ(send(0x181), Status::ok);
   EXPECT_EQ(send(0x081), Status::busy) << "three are all there is";
+  EXPECT_FALSE(can.has_sent_all());
   EXPECT_EQ(sent(), 0x181U) << "a heartbeat that keeps losing the arbitration does not keep a torque waiting";
   ASSERT_EQ(send(0x182), Status::ok);
   EXPECT_EQ(sent(), 0x182U);
   ASSERT_EQ(send(0x181), Status::ok);
   EXPECT_EQ(sent(), 0x181U);
   EXPECT_EQ(sent(), 0x581U);
+  EXPECT_FALSE(can.has_sent_all());
   EXPECT_EQ(sent(), 0x701U);
   EXPECT_EQ(model.waiting(), 0);
+  EXPECT_TRUE(can.has_sent_all());
 }
 
 TEST_F(FdcanTest, FramesWithOneIdentifierKeepTheirOrder) {

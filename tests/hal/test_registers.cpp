@@ -23,6 +23,7 @@
 #include "hal/stm32/gpio.hpp"
 #include "hal/stm32f4/clock.hpp"
 #include "hal/stm32f4/usart.hpp"
+#include "hal/stm32g4/clock.hpp"
 #include "hal/stm32g4/fdcan.hpp"
 #include "hal/stm32g4/timer.hpp"
 #include "hal/zynqmp_r5/clock.hpp"
@@ -343,6 +344,30 @@ TEST(Stm32g4, BitTimingOfTheCanControllerStandsInItsFields) {
   EXPECT_EQ(model.read(0x4000'640c), 20U << 16 | 19U << 8 | 10U << 4 | 6U) << "DBTP: a prescaler above 2 bears no TDC";
 }
 
+TEST(Stm32g4, ClockRegistersEndAsTheManualHasThem) {
+  for (const bool crystal : {true, false}) {
+    test::RccModel<test::G4> model;
+    model.crystal_starts = crystal;
+    // A boot loader has left the PLL on, with the largest of every field, and AHB divided by 512.
+    model.write(0x4002'100c, 0b11U | 0xfU << 4 | 0x7fU << 8 | 0b11U << 21 | 0b11U << 25);
+    model.write(0x4002'1000, model.read(0x4002'1000) | 1U << 24);
+    model.write(0x4002'1008, 0b1111U << 4 | 0b01U);
+    model.violations.clear();
+    ASSERT_EQ(stm32g4::start_clock(Modelled{&model}).mhz, 168U);
+    const std::uint32_t source_and_m = crystal ? 0b11U | 5U << 4 : 0b10U | 3U << 4;
+    EXPECT_EQ(model.read(0x4002'100c), source_and_m | 84U << 8 | 1U << 20 | 1U << 21 | 1U << 24)
+        << "PLLCFGR: N = 84, Q = 4, R = 2, both on";
+    EXPECT_EQ(model.read(0x4002'1008), 0b1111U) << "CFGR: PLL, nothing divided";
+    EXPECT_EQ(model.read(0x4000'7080), 0U) << "CR5: range 1 with boost";
+    EXPECT_EQ(model.read(0x4002'1000) >> 16 & 1U, crystal ? 1U : 0U) << "HSE stays on where it works";
+    EXPECT_EQ(model.violations, std::vector<std::string>{});
+  }
+  test::RccModel<test::G4> model;
+  model.pll_locks = false;
+  EXPECT_EQ(stm32g4::start_clock(Modelled{&model}).mhz, 16U);
+  EXPECT_EQ(model.read(0x4002'1000) & (1U << 16 | 1U << 24), 0U) << "neither is left on";
+}
+
 TEST(Stm32f4, ClockRegistersEndAsTheManualHasThem) {
   for (const bool crystal : {true, false}) {
     test::RccModel<test::F4> model;
@@ -362,8 +387,9 @@ TEST(Stm32f4, ClockRegistersEndAsTheManualHasThem) {
 }
 
 /// A peripheral in which one bit field does not take what is written.
+template <class Part>
 struct Stubborn {
-  test::RccModel<test::F4>* model;
+  test::RccModel<Part>* model;
   Address address;
   std::uint32_t sticks;
   std::uint32_t read(Address at) const { return model->read(at) & (at == address ? ~sticks : ~0U); }
@@ -371,12 +397,34 @@ struct Stubborn {
 };
 TEST(Stm32f4, ItDoesNotSwitchWithoutWaitStatesNorStayHalfWay) {
   test::RccModel<test::F4> flash;
-  EXPECT_EQ(stm32f4::start_clock(Stubborn{&flash, 0x4002'3c00, 0b111}).mhz, 16U);
+  EXPECT_EQ(stm32f4::start_clock(Stubborn<test::F4>{&flash, 0x4002'3c00, 0b111}).mhz, 16U);
   EXPECT_FALSE(flash.runs_from_pll());
   test::RccModel<test::F4> system;
-  EXPECT_EQ(stm32f4::start_clock(Stubborn{&system, 0x4002'3808, 0b1100}).source, stm32::ClockSource::internal_slow);
+  EXPECT_EQ(stm32f4::start_clock(Stubborn<test::F4>{&system, 0x4002'3808, 0b1100}).source,
+            stm32::ClockSource::internal_slow);
   EXPECT_FALSE(system.runs_from_pll());
   EXPECT_EQ(system.read(0x4002'3808) & (0b111U << 10 | 0b111U << 13), 0U) << "the buses undivided again";
+}
+TEST(Stm32g4, ItDoesNotSwitchWithoutWaitStatesNorStayHalfWay) {
+  test::RccModel<test::G4> flash;
+  EXPECT_EQ(stm32g4::start_clock(Stubborn<test::G4>{&flash, 0x4002'2000, 0xf}).mhz, 16U);
+  EXPECT_FALSE(flash.runs_from_pll());
+  test::RccModel<test::G4> system;
+  EXPECT_EQ(stm32g4::start_clock(Stubborn<test::G4>{&system, 0x4002'1008, 0b1100}).source,
+            stm32::ClockSource::internal_slow);
+  EXPECT_FALSE(system.runs_from_pll());
+  EXPECT_EQ(system.read(0x4002'1008) & 0xf0U, 0U) << "undivided again";
+}
+TEST(Stm32g4, APllThatDoesNotStopIsLeftAlone) {
+  struct Running {
+    test::RccModel<test::G4>* model;
+    std::uint32_t read(Address at) const { return model->read(at) | (at == 0x4002'1000 ? 1U << 25 : 0); }
+    void write(Address at, std::uint32_t value) const { model->write(at, value); }
+  };
+  test::RccModel<test::G4> model;
+  const std::uint32_t before = model.read(0x4002'100c);
+  EXPECT_EQ(stm32g4::start_clock(Running{&model}).source, stm32::ClockSource::internal_slow);
+  EXPECT_EQ(model.read(0x4002'100c), before);
 }
 
 TEST(Stm32f4, ClocksOfThePeripheralsAndTheCauseOfTheReset) {

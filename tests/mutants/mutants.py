@@ -17,7 +17,6 @@ import dataclasses
 import fcntl
 import fnmatch
 import hashlib
-import itertools
 import json
 import multiprocessing
 import pathlib
@@ -158,7 +157,7 @@ def _start_worker(settings, work, sanitize, quick):
 
 
 def _judge_one(mutant, deadline):
-    return mutant, _judge.judge(mutant, deadline)
+    return _judge.judge(mutant, deadline)
 
 
 class Judges:
@@ -179,9 +178,17 @@ class Judges:
         if self.pool:
             self.pool.terminate()
 
-    def __call__(self, mutants, deadline):
-        todo = [(m, deadline) for m in mutants]
-        return self.pool.starmap(_judge_one, todo, 1) if self.pool else itertools.starmap(_judge_one, todo)
+    @property
+    def ahead(self):
+        """Mutants under way at once: more than jobs, so that one that takes long does not keep the others waiting."""
+        return 8 * self.jobs if self.pool else 1
+
+    def begin(self, mutant, deadline):
+        """A function that waits for the verdict."""
+        if self.pool:
+            return self.pool.apply_async(_judge_one, (mutant, deadline)).get
+        verdict = _judge.judge(mutant, deadline)
+        return lambda: verdict
 
 
 # --- lists -------------------------------------------------------------------------------------------------------------
@@ -368,24 +375,26 @@ def main():
     noted = Results(path, tree_hash(settings, (options.no_sanitizers, options.quick))) if options.known is None else None
     results, start = [], time.monotonic()
 
-    def deadline():
-        """The first verdict may take longer: a run without one says nothing."""
-        return start + options.seconds * (1 if results else FIRST_VERDICT)
-
-    def verdicts():
-        todo = []
+    def verdicts(judges):
+        """(mutant, verdict, whether it is new) in the order in which the mutants are drawn, so that the same seed
+        judges the same ones however many jobs there are. The first may take longer: a run without one says nothing."""
+        under_way, begun = collections.deque(), 0
         for mutant in mutants:
-            if noted and mutant.key in noted.known:
-                yield mutant, noted.known[mutant.key], False
+            known = noted.known.get(mutant.key) if noted else None
+            if known is None:
+                deadline = start + options.seconds * (FIRST_VERDICT if begun < options.jobs else 1)
+                under_way.append((mutant, judges.begin(mutant, deadline), True))
+                begun += 1
             else:
-                todo.append(mutant)
-                if len(todo) == options.jobs:
-                    yield from ((m, v, True) for m, v in judge_all(todo, deadline()))
-                    todo = []
-        yield from ((m, v, True) for m, v in judge_all(todo, deadline()))
+                under_way.append((mutant, lambda verdict=known: verdict, False))
+            if len(under_way) == judges.ahead:
+                mutant, verdict, new = under_way.popleft()
+                yield mutant, verdict(), new
+        for mutant, verdict, new in under_way:
+            yield mutant, verdict(), new
 
-    with Judges(settings, options) as judge_all:
-        for mutant, verdict, new in verdicts():
+    with Judges(settings, options) as judges:
+        for mutant, verdict, new in verdicts(judges):
             results.append((mutant, verdict))
             if new and noted and verdict['result'] != 'undecided':
                 noted.note(mutant, verdict)

@@ -1,0 +1,146 @@
+// Formulas of the model worked out by hand: quick, and with nothing in common with the code that they check.
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <ostream>
+#include <vector>
+
+#include "model/catalogue.hpp"
+#include "model/joint_model.hpp"
+
+namespace fxdyn {
+namespace {
+
+/// phi of an effect's first tick: q = 0, dq = -3, ddq = 2, sign = -0.5, structural -8, total 5; the other joint's the same
+/// but for dq = 7 and ddq = 11.
+template <class E>
+std::vector<double> phi(std::array<double, 3> shape = {}) {
+  const std::array<JointInput<Real>, 2> peers{{{0, -3, 2, -0.5}, {0, 7, 11, 0.75}}};
+  const JointInput<Real> input{0, -3, 2, -0.5, -8, 5, peers};
+  std::array<Real::Word, 3> words{};
+  for (std::size_t i = 0; i < E::shape.size(); ++i) words[i] = E::stored_shape(i, shape[i], 0.5);
+  typename E::template State<Real> state{};
+  Saturations saturations;
+  std::vector<double> out(E::linear.size());
+  E::template basis<Real>(input, Words<Real>{words.data()}, state, saturations,
+                          [&](auto, std::size_t i, double value) { out.at(i) = value; });
+  return out;
+}
+using Phi = std::vector<double>;
+
+TEST(ByHand, EffectsWithoutMemory) {
+  EXPECT_EQ(phi<Viscous>(), Phi{-3});
+  EXPECT_EQ(phi<Coulomb>(), Phi{-0.5});
+  EXPECT_EQ(phi<Offset>(), Phi{1});
+  EXPECT_EQ(phi<RotorInertia>(), Phi{2});
+  EXPECT_EQ(phi<AsymmetricFriction>(), (Phi{0.5, 3}));
+  EXPECT_EQ(phi<ViscousQuadratic>(), Phi{-9});
+  EXPECT_EQ(phi<ViscousCubic>(), Phi{-27});
+  EXPECT_EQ(phi<LoadFriction>(), Phi{-4});
+  EXPECT_EQ(phi<TorqueGain>(), Phi{5});
+  EXPECT_EQ(phi<Spring>(), (Phi{0, 1}));
+  EXPECT_EQ(phi<Ripple>({7}), (Phi{1, 0}));
+  EXPECT_EQ(phi<GravityCompensator>(), (Phi{1, 0}));
+  EXPECT_EQ(phi<Eccentricity>(), (Phi{0, 1}));
+  EXPECT_EQ(phi<Saturation>({4}), Phi{-1});
+  EXPECT_EQ(phi<Saturation>({6}), Phi{0});
+  EXPECT_EQ(phi<JointCoupling>({2}), (Phi{0.75, 7}));
+  EXPECT_NEAR(phi<Stribeck>({3})[0], -0.5 * 0.36787944117144233, 1e-12);  // exp(-1)
+  EXPECT_NEAR(phi<Backlash>({8})[0], -0.7615941559557649, 1e-9);          // tanh(-1)
+  const auto coupled = phi<MotorCoupling>({2, 0.5, 0.25});                // -3 + 0.5 * 7 = 0.5
+  EXPECT_NEAR(coupled[0], 0.9640275800758169, 1e-9);                      // tanh(2)
+  EXPECT_EQ(coupled[1], 3.5);
+  EXPECT_EQ(coupled[2], 5.5);
+}
+
+constexpr JointLimits<Real> no_limits{-1e3, 1e3, -1e3, 1e3, -1e3, 1e3, -1e3, 1e3};
+constexpr double per_second = 2;
+
+/// What a step leaves of q = 100, dq = 0, ddq = 0: the deflection and, changed in sign, its derivatives.
+struct Step {
+  double delta, rate, acceleration;
+  bool operator==(const Step&) const = default;
+  friend void PrintTo(const Step& step, std::ostream* out) {
+    *out << step.delta << ' ' << step.rate << ' ' << step.acceleration;
+  }
+};
+struct Deflects {
+  Deflection<Real> state;
+  Saturations saturations;
+  Step step(double delta) {
+    const auto link = state.step({100, 0, 0}, delta, per_second, no_limits, saturations);
+    return {100 - link.q, -link.dq, -link.ddq};
+  }
+  void skip() { state.skip(per_second, saturations); }
+  ~Deflects() { EXPECT_EQ(saturations.count, 0U); }
+};
+
+TEST(ByHand, ADeflectionIsDifferentiatedFromItsSecondTickOn) {
+  Deflects joint;
+  EXPECT_EQ(joint.step(1), (Step{1, 0, 0}));
+  EXPECT_EQ(joint.step(3), (Step{3, 4, 0}));
+  EXPECT_EQ(joint.step(7), (Step{7, 8, 8}));
+  EXPECT_EQ(joint.step(13), (Step{13, 12, 8}));
+  EXPECT_EQ(joint.step(20), (Step{20, 14, 4}));
+  EXPECT_EQ(joint.state.ticks, 4U);
+}
+
+TEST(ByHand, OverATickWithoutSetpointsADeflectionKeepsItsAcceleration) {
+  Deflects joint;
+  for (const double delta : {1, 3, 7, 13}) joint.step(delta);
+  joint.skip();  // 6 a tick after 4 a tick: 8, to 21
+  EXPECT_EQ(joint.state.delta, 21);
+  EXPECT_EQ(joint.state.rate, 16);
+  joint.skip();  // 10, to 31
+  EXPECT_EQ(joint.state.delta, 31);
+  EXPECT_EQ(joint.step(42), (Step{42, 22, 4}));
+  joint.skip();  // one change of its own only: 11 once more, to 53
+  EXPECT_EQ(joint.state.delta, 53);
+  joint.skip();
+  EXPECT_EQ(joint.state.delta, 64);
+  EXPECT_EQ(joint.step(76), (Step{76, 24, 4}));
+  EXPECT_EQ(joint.step(89), (Step{89, 26, 4}));
+  joint.skip();  // 13 after 12: 14, to 103
+  EXPECT_EQ(joint.step(118), (Step{118, 30, 4}));
+}
+
+TEST(ByHand, ADeflectionBeginsAnewWhereTooLittleOrTooOldIsKnown) {
+  Deflects young;
+  young.step(1);
+  young.step(3);
+  young.skip();
+  EXPECT_EQ(young.step(9), (Step{9, 0, 0}));
+  EXPECT_EQ(young.step(11), (Step{11, 4, 0}));
+  EXPECT_EQ(young.step(14), (Step{14, 6, 4}));
+  young.skip();  // three ticks are enough to go on, by 3 to 17
+  EXPECT_EQ(young.step(20), (Step{20, 6, 0}));
+  Deflects unborn;
+  unborn.skip();
+  EXPECT_EQ(unborn.step(5), (Step{5, 0, 0}));
+  Deflects old;
+  for (const double delta : {1, 2, 3, 4}) old.step(delta);
+  for (int i = 0; i < 3; ++i) old.skip();
+  EXPECT_EQ(old.state.delta, 7);
+  old.skip();
+  EXPECT_EQ(old.step(8), (Step{8, 0, 0}));
+}
+
+struct Formats {
+  static constexpr int position = 20, velocity = 20, acceleration = 20, linear_acceleration = 20, length = 24, force = 20,
+                       torque = 16, inverse_velocity = 20, inverse_path = 20, weight = 20, velocity_squared = 20,
+                       velocity_cubed = 20, inverse_position = 20, inverse_torque = 20, force_sum = 40, torque_sum = 40,
+                       deflection_sum = 40;
+};
+
+TEST(ByHand, ANumberInAnotherFormatIsTheSameNumber) {
+  using N = FixedNumbers<Formats>;
+  EXPECT_EQ(N::convert<Fixed<24>>(Fixed<20>{3}).raw, 3 << 4);
+  EXPECT_EQ(N::convert<Fixed<24>>(Fixed<20>{-3}).raw, -3 * 16);
+  EXPECT_EQ(N::convert<Fixed<20>>(Fixed<20>{7}).raw, 7);
+  EXPECT_EQ(N::convert<Fixed<16>>(Fixed<20>{40}).raw, 3) << "2.5, half up";
+  EXPECT_EQ(N::convert<Fixed<16>>(Fixed<20>{-40}).raw, -2);
+}
+
+}  // namespace
+}  // namespace fxdyn
