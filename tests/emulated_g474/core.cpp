@@ -48,6 +48,7 @@ void Core::watch_flash(Address begin, Address end) {
   check(uc_hook_add(engine_, &flash_hook_, UC_HOOK_MEM_READ, reinterpret_cast<void*>(on_flash_read), this, begin,
                     end - 1),
         "UC_HOOK_MEM_READ");
+  translate_anew(flash_.base, flash_.base + flash_.bytes.size());
 }
 
 void Core::set_trace(Trace* trace) {
@@ -58,6 +59,12 @@ void Core::set_trace(Trace* trace) {
   check(uc_hook_add(engine_, &access_hook_, UC_HOOK_MEM_READ | UC_HOOK_MEM_WRITE, reinterpret_cast<void*>(on_access),
                     this, 1, 0),
         "UC_HOOK_MEM");
+  translate_anew(flash_.base, flash_.base + flash_.bytes.size());
+}
+
+/// A hook is part of the translation.
+void Core::translate_anew(std::uint64_t begin, std::uint64_t end) {
+  check(uc_ctl_remove_cache(engine_, begin, end), "uc_ctl_remove_cache");
 }
 
 std::uint32_t Core::get(int id) const {
@@ -114,8 +121,7 @@ void Core::forget_changed_code() {
   for (std::size_t at = 0; !first && at < all.size(); at += page) {
     if (std::memcmp(&all[at], &translated_[at], page) == 0) continue;
     std::fill_n(kinds_.begin() + static_cast<std::ptrdiff_t>(at / 2), page / 2, Kind::unknown);
-    const std::uint64_t from = flash_.base + at;
-    check(uc_ctl_remove_cache(engine_, from, from + page), "uc_ctl_remove_cache");
+    translate_anew(flash_.base + at, flash_.base + at + page);
   }
   translated_.assign(all.begin(), all.end());
 }

@@ -121,6 +121,7 @@ class Core {
   };
 
   void forget_changed_code();
+  void translate_anew(std::uint64_t begin, std::uint64_t end);
   void before(Address pc, std::uint32_t size);
   void stop(Stop why);
   Kind kind_of(Address pc);

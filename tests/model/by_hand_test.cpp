@@ -12,8 +12,8 @@
 namespace fxdyn {
 namespace {
 
-/// phi of an effect's first tick: q = 0, dq = -3, ddq = 2, sign = -0.5, structural -8, total 5; the other joint's the same
-/// but for dq = 7 and ddq = 11.
+/// phi of an effect's first tick: q = 0, dq = -3, ddq = 2, sign = -0.5, structural -8, total 5; the other joint's the
+/// same but for dq = 7 and ddq = 11.
 template <class E>
 std::vector<double> phi(std::array<double, 3> shape = {}) {
   const std::array<JointInput<Real>, 2> peers{{{0, -3, 2, -0.5}, {0, 7, 11, 0.75}}};
@@ -127,10 +127,10 @@ TEST(ByHand, ADeflectionBeginsAnewWhereTooLittleOrTooOldIsKnown) {
 }
 
 struct Formats {
-  static constexpr int position = 20, velocity = 20, acceleration = 20, linear_acceleration = 20, length = 24, force = 20,
-                       torque = 16, inverse_velocity = 20, inverse_path = 20, weight = 20, velocity_squared = 20,
-                       velocity_cubed = 20, inverse_position = 20, inverse_torque = 20, force_sum = 40, torque_sum = 40,
-                       deflection_sum = 40;
+  static constexpr int position = 20, velocity = 20, acceleration = 20, linear_acceleration = 20, length = 24,
+                       force = 20, torque = 16, inverse_velocity = 20, inverse_path = 20, weight = 20,
+                       velocity_squared = 20, velocity_cubed = 20, inverse_position = 20, inverse_torque = 20,
+                       force_sum = 40, torque_sum = 40, deflection_sum = 40;
 };
 
 TEST(ByHand, ANumberInAnotherFormatIsTheSameNumber) {
