@@ -1,0 +1,76 @@
+// Verbs that need no project, or not always.
+
+#include <fmt/format.h>
+
+#include "host_tools/cli/verb.hpp"
+#include "host_tools/excite/excite.hpp"
+#include "host_tools/pipeline/pipeline.hpp"
+#include "host_tools/simulate/simulate.hpp"
+#include "host_tools/support/error.hpp"
+
+namespace fxdyn::cli {
+
+Action add_excite(CLI::App& verb) {
+  struct Options {
+    std::string project, out;
+    bool paper = false;
+  };
+  const auto options = std::make_shared<Options>();
+  auto* project = verb.add_option("PROJECT", options->project, "project file (TOML); needs no log");
+  verb.add_flag("--paper", options->paper,
+                "no project: the trajectory of the paper's Table 1, as printed and corrected")
+      ->excludes(project);
+  verb.add_option("--out", options->out, "directory for the results")->required();
+  return [options] {
+    if (!options->paper && options->project.empty())
+      throw InputError("excite: name a PROJECT, or --paper; see fxdyn excite --help");
+    Progress progress;
+    fmt::print("{}", options->paper ? excite_paper(options->out)
+                                    : excite(read_project(options->project), options->out, progress));
+  };
+}
+
+Action add_simulate(CLI::App& verb) {
+  struct Options {
+    std::string scenario, out;
+  };
+  const auto options = std::make_shared<Options>();
+  verb.add_option("SCENARIO", options->scenario, "scenario file (TOML)")->required();
+  verb.add_option("--out", options->out, "directory for the logs")->required();
+  return [options] {
+    for (const auto& file : simulate(options->scenario, options->out)) fmt::print("{}\n", file.string());
+  };
+}
+
+Action add_predict(CLI::App& verb) {
+  struct Options {
+    std::string model, log, numbers = "real", out;
+  };
+  const auto options = std::make_shared<Options>();
+  verb.add_option("--model", options->model, "model.json")->required();
+  verb.add_option("--log", options->log, "log (CSV); without torque there are no metrics")->required();
+  verb.add_option("--numbers", options->numbers, "real (double) or fixed (as the firmware computes)")
+      ->check(CLI::IsMember({"real", "fixed"}))
+      ->capture_default_str();
+  verb.add_option("--out", options->out, "directory for the prediction")->required();
+  return [options] {
+    predict_log(options->model, options->log, options->numbers == "fixed", options->out);
+    fmt::print("prediction in {}\n", options->out);
+  };
+}
+
+Action add_payload(CLI::App& verb) {
+  struct Options {
+    std::string model, log, out;
+  };
+  const auto options = std::make_shared<Options>();
+  verb.add_option("--model", options->model, "model.json, identified without load")->required();
+  verb.add_option("--log", options->log, "log (CSV) recorded with the load")->required();
+  verb.add_option("--out", options->out, "directory for the results")->required();
+  return [options] {
+    identify_payload(options->model, options->log, options->out);
+    fmt::print("load in {0}/payload.json, model with it in {0}/model.json\n", options->out);
+  };
+}
+
+}  // namespace fxdyn::cli

@@ -1,0 +1,44 @@
+#include <array>
+
+#include "host_tools/cli/verb.hpp"
+
+namespace fxdyn::cli {
+
+std::span<const Verb> verbs() {
+  static constexpr std::array all{
+      Verb{"run", "diagnose, train, export and report in one go.", "robot.toml --out out/robot", add_run},
+      Verb{"identify", "Structure and friction from the train logs: model.json, metrics.json.",
+           "robot.toml --out out/robot", add_identify},
+      Verb{"diagnose", "Find and name what the nominal model lacks, add it: diagnosis.json, model.json.",
+           "robot.toml --out out/robot", add_diagnose},
+      Verb{"train", "Fit a Broad Learning System on what diagnosis left; keep it where validation improves.",
+           "robot.toml --out out/robot", add_train},
+      Verb{"export", "Choose fixed-point formats, write tables.hpp, tables.bin, export.json.",
+           "robot.toml --out out/robot", add_export},
+      Verb{"report", "Draw report.html from what the other stages wrote.", "robot.toml --out out/robot", add_report},
+      Verb{"compare", "Every method on the same logs, from plain least squares to named effects: compare.json.",
+           "robot.toml --out out/robot", add_compare},
+      Verb{"efficiency", "Test error against the seconds of train data, per method: efficiency.json.",
+           "robot.toml --out out/robot", add_efficiency},
+      Verb{"vibration", "The model as feedforward of the scenario's robot with gears that bend: vibration.json.",
+           "robot.toml --out out/robot", add_vibration},
+      Verb{"replay",
+           "Stream the held-out logs to a firmware image in QEMU (--image) or to drive nodes on a CAN bus (--can) and\n"
+           "compare bit for bit: replay.json, can_replay.json.",
+           "robot.toml --out out/robot --image drive.elf", add_replay},
+      Verb{"update", "Refit the coefficients with a new log, keep them where they are better: tables.bin, update.json.",
+           "robot.toml --out out/robot --log new.csv", add_update},
+      Verb{"excite",
+           "Plan trajectories that show the robot's parameters, within its limits: CSV to play, excite.json, plots.",
+           "robot.toml --out out/plan", add_excite},
+      Verb{"simulate", "Make logs from a scenario.", "scenario.toml --out out/logs", add_simulate},
+      Verb{"predict", "Torque of a model over a log: CSV and metrics.json.",
+           "--model out/robot/model.json --log run.csv --out out/prediction", add_predict},
+      Verb{"payload", "Load on the last link from a log recorded with it: payload.json, and the model with it.",
+           "--model out/robot/model.json --log loaded.csv --out out/loaded", add_payload},
+      Verb{"effects", "List the effects that the model knows.", "--json", add_effects},
+  };
+  return all;
+}
+
+}  // namespace fxdyn::cli
