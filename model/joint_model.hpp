@@ -52,15 +52,14 @@ constexpr JointInput<N> joint_input(const JointState<N>& joint, const JointConst
 /// delta from tick to tick, its derivatives, within the joint's limits. Zero derivatives in the first tick.
 template <class N>
 struct Deflection {
-  /// Ticks in a row that skip() may stand for: beyond, the differences begin anew. Extrapolated by constant
+  /// Ticks in a row that skip() can bridge: beyond, the differences begin anew. Extrapolated by constant
   /// acceleration the error grows with the cube of the ticks; three of them are 6 ms at 2 ms.
   static constexpr std::uint32_t most_skipped = 3;
 
   Position<N> delta{};
   Position<N> change{}, change_before{};  ///< of delta over the last tick and the one before
   Velocity<N> rate{};
-  std::uint32_t ticks = 0;    ///< since the start or the last skip(), which counts as 2; up to 4
-  std::uint32_t skipped = 0;  ///< in a row
+  std::uint32_t ticks = 0;  ///< since the start or the last skip(), which counts as 2; up to 4
 
   /// @param per_second 1 / tick [1/s]
   constexpr JointState<N> step(const JointState<N>& motor, typename N::DeflectionSum sum, Count<N> per_second,
@@ -77,30 +76,30 @@ struct Deflection {
     change = select(ticks > 0, change_now, Position<N>{});
     rate = new_rate;
     ticks += static_cast<std::uint32_t>(ticks < 4);
-    skipped = 0;
     return limit_setpoint<N>({N::template narrow<Position<N>>(motor.q - now, saturations),
                               N::template narrow<Velocity<N>>(motor.dq - new_rate, saturations),
                               N::template narrow<Acceleration<N>>(motor.ddq - acceleration, saturations)},
                              limits, saturations);
   }
 
-  /// A tick that has no setpoints. Delta goes on with its last acceleration, so that the next step() differentiates
-  /// over one tick again: delta <- delta + c, c <- c + (c - c_before). Without it two ticks' change would count as one
-  /// tick's, a jump of the rate that the second difference turns into a spike of torque. The change of a tick after a
-  /// skipped one makes up for the error of the extrapolation: an acceleration out of it would multiply that error from
-  /// gap to gap, so until two changes of their own are known the rate is held.
-  constexpr void skip(Count<N> per_second, Saturations& saturations) {
-    const bool known = ticks == 4 || skipped > 0;
+  /// `times` > 0 ticks in a row without setpoints. Delta goes on with its last acceleration, so that the next step()
+  /// differentiates over one tick again: each tick c <- c + (c - c_before), delta <- delta + c. Without it several
+  /// ticks' change would count as one tick's, a jump of the rate that the second difference turns into a spike of
+  /// torque. The change of a tick after a skipped one makes up for the error of the extrapolation: an acceleration out
+  /// of it would multiply that error from gap to gap, so until two changes of their own are known the rate is held.
+  constexpr void skip(std::uint32_t times, Count<N> per_second, Saturations& saturations) {
+    if (ticks < 3 || times > most_skipped) {
+      *this = {};
+      return;
+    }
     const auto growth =
-        select(known, N::template narrow<Position<N>>(change - change_before, saturations), Position<N>{});
-    const bool begins = (ticks < 3 && skipped == 0) || skipped == most_skipped;
-    change_before = change;
-    change = N::template narrow<Position<N>>(change + growth, saturations);
-    delta = N::template narrow<Position<N>>(delta + change, saturations);
+        select(ticks == 4, N::template narrow<Position<N>>(change - change_before, saturations), Position<N>{});
+    for (std::uint32_t i = 0; i < times; ++i) {
+      change = N::template narrow<Position<N>>(change + growth, saturations);
+      delta = N::template narrow<Position<N>>(delta + change, saturations);
+    }
     rate = N::template narrow<Velocity<N>>(change * per_second, saturations);
-    ++skipped;
     ticks = 2;
-    if (begins) *this = {};
   }
 };
 
@@ -146,11 +145,11 @@ struct JointModel {
     (std::index_sequence_for<Effects...>{});
     return total;
   }
-  /// A tick without setpoints, for the effects that have to go on through it.
+  /// `times` ticks in a row without setpoints, for the effects that have to go on through them.
   template <class N>
-  static constexpr void skip(State<N>& state, bool anew, Saturations& saturations) {
+  static constexpr void skip(State<N>& state, std::uint32_t times, Saturations& saturations) {
     [&]<std::size_t... i>(std::index_sequence<i...>) {
-      (skip_effect<Effects, N>(std::get<i>(state), anew, saturations), ...);
+      (skip_effect<Effects, N>(std::get<i>(state), times, saturations), ...);
     }
     (std::index_sequence_for<Effects...>{});
   }
@@ -171,10 +170,13 @@ struct JointModel {
     }
   }
   template <class E, class N, class State>
-  static constexpr void skip_effect(State& state, bool anew, Saturations& saturations) {
-    if constexpr (requires { E::template skip<N>(state, saturations); }) {
-      E::template skip<N>(state, saturations);
-      if (anew) state = {};
+  static constexpr void skip_effect(State& state, std::uint32_t times, Saturations& saturations) {
+    if constexpr (requires { E::template skip<N>(state, times, saturations); }) {
+      if (times > Deflection<N>::most_skipped) {
+        state = {};
+      } else {
+        E::template skip<N>(state, times, saturations);
+      }
     }
   }
   template <class E, class N, ActsOn what, class State, class Sum>
@@ -275,20 +277,17 @@ struct RobotModel {
     return tau;
   }
 
-  /// A tick that had no setpoints (lost on the bus, say), `times` in a row: call it before the next tick(), so that
+  /// Ticks that had no setpoints (lost on the bus, say), `times` in a row: call it once before the next tick(), so that
   /// what is differentiated from tick to tick goes on by itself (Deflection::skip). What effects remember stands still
   /// meanwhile: it lags by these ticks, which makes no step.
   static void skip(const Parameters& parameters, State& state, std::uint32_t times, Saturations& saturations) noexcept {
     if constexpr (deflects) {
-      // once more than Deflection can bridge is as good as many times more
-      const std::uint32_t count = times <= Deflection<N>::most_skipped ? times : Deflection<N>::most_skipped + 1;
-      for (std::uint32_t i = 0; i < count; ++i) {
-        for (auto& deflection : state.deflections) deflection.skip(parameters.ticks_per_second, saturations);
-        [&]<std::size_t... j>(std::index_sequence<j...>) {
-          (Joints::template skip<N>(std::get<j>(state.effects), times > Deflection<N>::most_skipped, saturations), ...);
-        }
-        (std::index_sequence_for<Joints...>{});
+      if (times == 0) return;
+      for (auto& deflection : state.deflections) deflection.skip(times, parameters.ticks_per_second, saturations);
+      [&]<std::size_t... j>(std::index_sequence<j...>) {
+        (Joints::template skip<N>(std::get<j>(state.effects), times, saturations), ...);
       }
+      (std::index_sequence_for<Joints...>{});
     }
   }
 

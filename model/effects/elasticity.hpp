@@ -27,10 +27,11 @@ struct Elasticity {
     return tick_s / (tick_s + relaxation);
   }
 
-  /// A tick without setpoints: the load goes on as it went.
+  /// `times` ticks in a row without setpoints: the load goes on as it went.
   template <class N>
-  static constexpr void skip(State<N>& state, Saturations& saturations) {
-    state.load = N::template narrow<Torque<N>>(state.load + state.change, saturations);
+  static constexpr void skip(State<N>& state, std::uint32_t times, Saturations& saturations) {
+    for (std::uint32_t i = 0; i < times; ++i)
+      state.load = N::template narrow<Torque<N>>(state.load + state.change, saturations);
   }
   template <class N, class Emit>
   static constexpr void basis(const JointInput<N>& u, Words<N> words, State<N>& state, Saturations& saturations,

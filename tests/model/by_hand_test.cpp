@@ -72,7 +72,7 @@ struct Deflects {
     const auto link = state.step({100, 0, 0}, delta, per_second, no_limits, saturations);
     return {100 - link.q, -link.dq, -link.ddq};
   }
-  void skip() { state.skip(per_second, saturations); }
+  void skip(std::uint32_t times) { state.skip(times, per_second, saturations); }
   ~Deflects() { EXPECT_EQ(saturations.count, 0U); }
 };
 
@@ -86,22 +86,22 @@ TEST(ByHand, ADeflectionIsDifferentiatedFromItsSecondTickOn) {
   EXPECT_EQ(joint.state.ticks, 4U);
 }
 
-TEST(ByHand, OverATickWithoutSetpointsADeflectionKeepsItsAcceleration) {
+TEST(ByHand, OverTicksWithoutSetpointsADeflectionKeepsItsAcceleration) {
   Deflects joint;
   for (const double delta : {1, 3, 7, 13}) joint.step(delta);
-  joint.skip();  // 6 a tick after 4 a tick: 8, to 21
-  EXPECT_EQ(joint.state.delta, 21);
-  EXPECT_EQ(joint.state.rate, 16);
-  joint.skip();  // 10, to 31
+  Deflects once = joint;
+  once.skip(1);  // 6 a tick after 4 a tick: 8, to 21
+  EXPECT_EQ(once.state.delta, 21);
+  EXPECT_EQ(once.state.rate, 16);
+  joint.skip(2);  // and 10, to 31
   EXPECT_EQ(joint.state.delta, 31);
+  EXPECT_EQ(joint.state.rate, 20);
   EXPECT_EQ(joint.step(42), (Step{42, 22, 4}));
-  joint.skip();  // one change of its own only: 11 once more, to 53
-  EXPECT_EQ(joint.state.delta, 53);
-  joint.skip();
+  joint.skip(2);  // one change of its own only: 11 twice more, to 64
   EXPECT_EQ(joint.state.delta, 64);
   EXPECT_EQ(joint.step(76), (Step{76, 24, 4}));
   EXPECT_EQ(joint.step(89), (Step{89, 26, 4}));
-  joint.skip();  // 13 after 12: 14, to 103
+  joint.skip(1);  // 13 after 12: 14, to 103
   EXPECT_EQ(joint.step(118), (Step{118, 30, 4}));
 }
 
@@ -109,21 +109,28 @@ TEST(ByHand, ADeflectionBeginsAnewWhereTooLittleOrTooOldIsKnown) {
   Deflects young;
   young.step(1);
   young.step(3);
-  young.skip();
+  young.skip(1);
   EXPECT_EQ(young.step(9), (Step{9, 0, 0}));
   EXPECT_EQ(young.step(11), (Step{11, 4, 0}));
   EXPECT_EQ(young.step(14), (Step{14, 6, 4}));
-  young.skip();  // three ticks are enough to go on, by 3 to 17
+  young.skip(1);  // three ticks are enough to go on, by 3 to 17
   EXPECT_EQ(young.step(20), (Step{20, 6, 0}));
   Deflects unborn;
-  unborn.skip();
+  unborn.skip(1);
   EXPECT_EQ(unborn.step(5), (Step{5, 0, 0}));
   Deflects old;
   for (const double delta : {1, 2, 3, 4}) old.step(delta);
-  for (int i = 0; i < 3; ++i) old.skip();
+  Deflects older = old;
+  old.skip(3);
   EXPECT_EQ(old.state.delta, 7);
-  old.skip();
-  EXPECT_EQ(old.step(8), (Step{8, 0, 0}));
+  EXPECT_EQ(old.step(8), (Step{8, 2, 0}));
+  older.skip(4);
+  EXPECT_EQ(older.step(8), (Step{8, 0, 0}));
+  Deflects twice;
+  for (const double delta : {1, 2, 3, 4}) twice.step(delta);
+  twice.skip(1);
+  twice.skip(1);  // one gap, one call
+  EXPECT_EQ(twice.step(6), (Step{6, 0, 0}));
 }
 
 struct Formats {

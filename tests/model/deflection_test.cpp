@@ -22,9 +22,8 @@ double largest_error(bool skips, int missing_in_a_row) {
   double largest = 0;
   for (int k = 0, until_gap = 20; k < 2000; ++k) {
     if (--until_gap == 0) {
-      for (int i = 0; i < missing_in_a_row; ++i, ++k) {
-        if (skips) deflection_state.skip(1 / tick, saturations);
-      }
+      if (skips) deflection_state.skip(static_cast<std::uint32_t>(missing_in_a_row), 1 / tick, saturations);
+      k += missing_in_a_row;
       until_gap = 20;
     }
     const auto link = deflection_state.step({}, deflection(k), 1 / tick, wide(), saturations);
@@ -50,7 +49,7 @@ TEST(Deflection, ALongGapBeginsAnew) {
   Deflection<Real> state;
   Saturations saturations;
   for (int k = 0; k < 20; ++k) state.step({}, deflection(k), 1 / tick, wide(), saturations);
-  for (std::uint32_t i = 0; i <= Deflection<Real>::most_skipped; ++i) state.skip(1 / tick, saturations);
+  state.skip(Deflection<Real>::most_skipped + 1, 1 / tick, saturations);
   EXPECT_EQ(state.ticks, 0U);
   const auto link = state.step({}, deflection(100), 1 / tick, wide(), saturations);
   EXPECT_EQ(link.dq, 0);
@@ -61,9 +60,9 @@ TEST(Deflection, ALongGapBeginsAnew) {
 TEST(Deflection, AtTheStartThereIsNothingToGoOnWith) {
   Deflection<Real> state;
   Saturations saturations;
-  state.skip(1 / tick, saturations);
+  state.skip(1, 1 / tick, saturations);
   state.step({}, 1e-3, 1 / tick, wide(), saturations);
-  state.skip(1 / tick, saturations);
+  state.skip(1, 1 / tick, saturations);
   EXPECT_EQ(state.step({}, 2e-3, 1 / tick, wide(), saturations).dq, 0);
 }
 
