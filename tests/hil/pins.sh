@@ -5,7 +5,7 @@ set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 . "$here/interfaces.sh"
 . "$here/gpio_sim.sh"
-"$1/test_pins"
+"$1/pins_test"
 
 enable() { echo "pull-$1" >"$FXDYN_GPIO_FAR/sim_gpio0/pull"; }
 level() { cat "$FXDYN_GPIO_FAR/sim_gpio$1/value"; }

@@ -1,4 +1,4 @@
-#include "tests/diagnosis/write_up.hpp"
+#include "tests/campaign/write_up.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

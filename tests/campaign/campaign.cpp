@@ -12,8 +12,8 @@
 
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
-#include "tests/diagnosis/run_case.hpp"
-#include "tests/diagnosis/write_up.hpp"
+#include "tests/campaign/run_case.hpp"
+#include "tests/campaign/write_up.hpp"
 
 namespace {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "tests/diagnosis/plan.hpp"
+#include "tests/campaign/plan.hpp"
 
 namespace fxdyn::campaign {
 

@@ -1,4 +1,4 @@
-#include "tests/diagnosis/score.hpp"
+#include "tests/campaign/score.hpp"
 
 #include <algorithm>
 #include <set>

@@ -2,11 +2,11 @@
 
 #include <filesystem>
 
-#include "tests/diagnosis/case.hpp"
-#include "tests/diagnosis/draw.hpp"
-#include "tests/diagnosis/expected.hpp"
-#include "tests/diagnosis/outside.hpp"
-#include "tests/diagnosis/session.hpp"
+#include "tests/campaign/case.hpp"
+#include "tests/campaign/draw.hpp"
+#include "tests/campaign/expected.hpp"
+#include "tests/campaign/outside.hpp"
+#include "tests/campaign/session.hpp"
 
 namespace fxdyn::campaign {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/diagnosis/case.hpp"
+#include "tests/campaign/case.hpp"
 
 namespace fxdyn::campaign {
 

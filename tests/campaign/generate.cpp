@@ -1,4 +1,4 @@
-#include "tests/diagnosis/generate.hpp"
+#include "tests/campaign/generate.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -9,7 +9,7 @@
 #include "host_tools/signals/log.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/support/files.hpp"
-#include "tests/diagnosis/truth.hpp"
+#include "tests/campaign/truth.hpp"
 
 namespace fxdyn::campaign {
 namespace {

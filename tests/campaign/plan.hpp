@@ -1,7 +1,7 @@
 #pragma once
 
 #include "host_tools/signals/motion.hpp"
-#include "tests/diagnosis/case.hpp"
+#include "tests/campaign/case.hpp"
 
 namespace fxdyn::campaign {
 

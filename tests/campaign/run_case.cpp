@@ -1,4 +1,4 @@
-#include "tests/diagnosis/run_case.hpp"
+#include "tests/campaign/run_case.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -11,8 +11,8 @@
 
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
-#include "tests/diagnosis/generate.hpp"
-#include "tests/diagnosis/score.hpp"
+#include "tests/campaign/generate.hpp"
+#include "tests/campaign/score.hpp"
 
 extern char** environ;
 

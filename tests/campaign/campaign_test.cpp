@@ -6,10 +6,10 @@
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/support/files.hpp"
-#include "tests/diagnosis/generate.hpp"
-#include "tests/diagnosis/score.hpp"
-#include "tests/diagnosis/truth.hpp"
-#include "tests/diagnosis/write_up.hpp"
+#include "tests/campaign/generate.hpp"
+#include "tests/campaign/score.hpp"
+#include "tests/campaign/truth.hpp"
+#include "tests/campaign/write_up.hpp"
 #include "tests/support/files.hpp"
 
 namespace fxdyn::campaign {

@@ -1,4 +1,4 @@
-#include "tests/diagnosis/session.hpp"
+#include "tests/campaign/session.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -1,4 +1,4 @@
-#include "tests/diagnosis/draw.hpp"
+#include "tests/campaign/draw.hpp"
 
 #include <cmath>
 #include <numbers>

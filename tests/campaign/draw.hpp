@@ -3,7 +3,7 @@
 #include <functional>
 
 #include "host_tools/support/random.hpp"
-#include "tests/diagnosis/plan.hpp"
+#include "tests/campaign/plan.hpp"
 
 namespace fxdyn::campaign {
 

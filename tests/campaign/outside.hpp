@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/diagnosis/plan.hpp"
+#include "tests/campaign/plan.hpp"
 
 namespace fxdyn::campaign {
 

@@ -2,8 +2,8 @@
 #include <cmath>
 
 #include "host_tools/effects/evaluator.hpp"
-#include "tests/diagnosis/score.hpp"
-#include "tests/diagnosis/truth.hpp"
+#include "tests/campaign/score.hpp"
+#include "tests/campaign/truth.hpp"
 
 namespace fxdyn::campaign {
 namespace {

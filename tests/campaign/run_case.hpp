@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "tests/diagnosis/case.hpp"
+#include "tests/campaign/case.hpp"
 
 namespace fxdyn::campaign {
 

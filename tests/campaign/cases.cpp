@@ -1,8 +1,8 @@
 #include <fmt/format.h>
 
 #include "host_tools/support/random.hpp"
-#include "tests/diagnosis/case.hpp"
-#include "tests/diagnosis/outside.hpp"
+#include "tests/campaign/case.hpp"
+#include "tests/campaign/outside.hpp"
 
 namespace fxdyn::campaign {
 namespace {

@@ -1,4 +1,4 @@
-#include "tests/diagnosis/case.hpp"
+#include "tests/campaign/case.hpp"
 
 namespace fxdyn::campaign {
 
@@ -23,7 +23,7 @@ const std::vector<TestRobot>& test_robots() {
        {1.2, 0.5, -0.8, 0.2, -0.15, 0.1},
        {6.2, 6.2, 2.6, 0.55, 0.55, 0.55}},
       {"scara_like",
-       "tests/diagnosis/scara.urdf",
+       "tests/campaign/scara.urdf",
        {140, 62, 160, 7.5},
        {22, 30, 7, 70},
        {2.6, 1.1, 28, 0.055},

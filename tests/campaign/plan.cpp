@@ -1,4 +1,4 @@
-#include "tests/diagnosis/plan.hpp"
+#include "tests/campaign/plan.hpp"
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"

@@ -1,4 +1,4 @@
-#include "tests/diagnosis/expected.hpp"
+#include "tests/campaign/expected.hpp"
 
 #include <algorithm>
 #include <cmath>

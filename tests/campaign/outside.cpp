@@ -1,4 +1,4 @@
-#include "tests/diagnosis/outside.hpp"
+#include "tests/campaign/outside.hpp"
 
 #include <cmath>
 #include <numbers>
