@@ -323,7 +323,7 @@ class DriveNode {
     if (state_ == NmtState::operational && state != NmtState::operational) leave_operation();
     if (state == NmtState::operational && state_ != NmtState::operational) {
       if (!tables_.valid) {
-        errors_.tell(Error::tables, 0);
+        errors_.report(Error::tables, 0);
         state = NmtState::pre_operational;
       } else {
         model_state_ = {};

@@ -9,7 +9,7 @@
 
 namespace fxdyn {
 
-/// What can be wrong with a node, in the order in which it is told.
+/// What can be wrong with a node, in the order in which it is reported.
 enum class Error : std::uint8_t {
   hardware,
   tables,
@@ -45,8 +45,8 @@ inline constexpr std::array<ErrorKind, 13> error_kinds{{{0x5000, 0x01, false},
                                                         {0x8250, 0x11, false},
                                                         {0x8700, 0x11, false}}};
 
-/// Which errors are present, which of them still have to be told, and the history of object 0x1003. An error is told
-/// once, however often it happens while it is present.
+/// Which errors are present, which of them still have to be reported, and the history of object 0x1003. An error is
+/// reported once, however often it happens while it is present.
 class ErrorLog {
  public:
   static constexpr std::size_t history_size = 8;
@@ -68,17 +68,17 @@ class ErrorLog {
     last_us_[i] = now_us;
     if (is_present(error)) return;
     present_ |= bit(error);
-    tell(error, detail);
+    report(error, detail);
   }
-  /// Tells an error that is present once more.
-  void tell(Error error, std::uint16_t detail) {
+  /// Reports an error that is present once more.
+  void report(Error error, std::uint16_t detail) {
     const auto i = static_cast<std::size_t>(error);
-    untold_ |= bit(error);
+    unreported_ |= bit(error);
     details_[i] = detail;
     for (std::size_t k = history_size - 1; k > 0; --k) history_[k] = history_[k - 1];
     history_[0] = error_kinds[i].code | static_cast<std::uint32_t>(detail) << 16;
     if (history_count_ < history_size) ++history_count_;
-    told_any_ = true;
+    reported_any_ = true;
   }
   void clear(Error error) { present_ &= ~bit(error); }
 
@@ -93,16 +93,16 @@ class ErrorLog {
   struct Message {
     std::uint16_t code = 0, detail = 0;
   };
-  /// What has to be told now, if anything: errors first, then that all are gone.
+  /// What has to be reported now, if anything: errors first, then that all are gone.
   bool next(Message& message) {
-    if (untold_ != 0) {
-      const auto i = static_cast<std::size_t>(std::countr_zero(untold_));
-      untold_ &= untold_ - 1;
+    if (unreported_ != 0) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(unreported_));
+      unreported_ &= unreported_ - 1;
       message = {error_kinds[i].code, details_[i]};
       return true;
     }
-    if (!told_any_ || any()) return false;
-    told_any_ = false;
+    if (!reported_any_ || any()) return false;
+    reported_any_ = false;
     message = {};
     return true;
   }
@@ -114,8 +114,8 @@ class ErrorLog {
  private:
   static constexpr std::uint32_t bit(Error error) { return 1U << static_cast<unsigned>(error); }
 
-  std::uint32_t present_ = 0, untold_ = 0;
-  bool told_any_ = false;  ///< and not yet that it is gone
+  std::uint32_t present_ = 0, unreported_ = 0;
+  bool reported_any_ = false;  ///< and not yet that it is gone
   std::uint8_t history_count_ = 0;
   std::array<std::uint16_t, error_kinds.size()> details_{};
   std::array<std::uint32_t, error_kinds.size()> last_us_{};

@@ -86,7 +86,7 @@ class SdoServer {
   // .. and of the server, in place.
   static constexpr std::uint8_t answers_segment = 1U << 5, answers_upload = 2U << 5, answers_download = 3U << 5,
                                 aborts_transfer = 4U << 5;
-  static constexpr std::uint8_t toggle_bit = 1U << 4, expedited = 1U << 1, size_is_told = 1U << 0, last = 1U << 0;
+  static constexpr std::uint8_t toggle_bit = 1U << 4, expedited = 1U << 1, size_is_given = 1U << 0, last = 1U << 0;
   static constexpr std::size_t segment = 7;  ///< bytes
 
   void write_abort(canopen::Abort abort, Bytes& answer) {
@@ -110,18 +110,18 @@ class SdoServer {
   template <class Dictionary>
   canopen::Abort begin_download(const Bytes& request, Dictionary& dictionary, Bytes& answer) {
     if (!object_.writable()) return canopen::Abort::read_only;
-    const bool told = (request[0] & size_is_told) != 0;
+    const bool size_given = (request[0] & size_is_given) != 0;
     if ((request[0] & expedited) != 0) {
       // Without a size the object's own counts.
-      const std::size_t size = told ? 4U - (request[0] >> 2 & 3U) : std::min<std::size_t>(4, object_.size());
+      const std::size_t size = size_given ? 4U - (request[0] >> 2 & 3U) : std::min<std::size_t>(4, object_.size());
       if (const auto abort = check_size(size); abort != canopen::Abort::none) return abort;
       if (const auto abort = dictionary.write(object_, std::span(request).subspan(4, size));
           abort != canopen::Abort::none)
         return abort;
     } else {
-      told_size_ = told ? canopen::load<4>(&request[4]) : unknown_size;
-      if (told) {
-        if (const auto abort = check_size(told_size_); abort != canopen::Abort::none) return abort;
+      announced_size_ = size_given ? canopen::load<4>(&request[4]) : unknown_size;
+      if (size_given) {
+        if (const auto abort = check_size(announced_size_); abort != canopen::Abort::none) return abort;
       }
       transfer_ = Transfer::download;
       toggle_ = 0;
@@ -143,7 +143,7 @@ class SdoServer {
     toggle_ ^= toggle_bit;
     if ((request[0] & last) == 0) return canopen::Abort::none;
     transfer_ = Transfer::none;
-    if (told_size_ != unknown_size && told_size_ != at_) return canopen::Abort::wrong_length;
+    if (announced_size_ != unknown_size && announced_size_ != at_) return canopen::Abort::wrong_length;
     if (const auto abort = check_size(at_); abort != canopen::Abort::none) return abort;
     return dictionary.write(object_, std::span<const std::uint8_t>(buffer_).first(at_));
   }
@@ -152,15 +152,15 @@ class SdoServer {
   canopen::Abort begin_upload(Dictionary& dictionary, Bytes& answer) {
     if (!object_.readable()) return canopen::Abort::write_only;
     if (!dictionary.has_data(object_)) return canopen::Abort::no_data;
-    told_size_ = static_cast<std::uint32_t>(dictionary.read(object_, buffer_.data()));
+    announced_size_ = static_cast<std::uint32_t>(dictionary.read(object_, buffer_.data()));
     put_multiplexer(answer);
-    if (told_size_ > 0 && told_size_ <= 4) {
-      answer[0] = static_cast<std::uint8_t>(answers_upload | (4 - told_size_) << 2 | expedited | size_is_told);
-      std::copy_n(buffer_.begin(), told_size_, answer.begin() + 4);
+    if (announced_size_ > 0 && announced_size_ <= 4) {
+      answer[0] = static_cast<std::uint8_t>(answers_upload | (4 - announced_size_) << 2 | expedited | size_is_given);
+      std::copy_n(buffer_.begin(), announced_size_, answer.begin() + 4);
       return canopen::Abort::none;
     }
-    answer[0] = answers_upload | size_is_told;
-    canopen::store<4>(&answer[4], told_size_);
+    answer[0] = answers_upload | size_is_given;
+    canopen::store<4>(&answer[4], announced_size_);
     transfer_ = Transfer::upload;
     toggle_ = 0;
     at_ = 0;
@@ -169,10 +169,10 @@ class SdoServer {
 
   canopen::Abort continue_upload(const Bytes& request, Bytes& answer) {
     if ((request[0] & toggle_bit) != toggle_) return canopen::Abort::toggle_bit;
-    const std::size_t count = std::min<std::size_t>(segment, told_size_ - at_);
+    const std::size_t count = std::min<std::size_t>(segment, announced_size_ - at_);
     std::copy_n(buffer_.begin() + static_cast<std::ptrdiff_t>(at_), count, answer.begin() + 1);
     at_ += count;
-    const bool ends = at_ == told_size_;
+    const bool ends = at_ == announced_size_;
     answer[0] = static_cast<std::uint8_t>(toggle_ | (segment - count) << 1 | (ends ? last : 0U));
     toggle_ ^= toggle_bit;
     if (ends) transfer_ = Transfer::none;
@@ -187,7 +187,7 @@ class SdoServer {
   Object object_{};
   std::array<std::uint8_t, largest_object> buffer_{};
   std::size_t at_ = 0;
-  std::uint32_t told_size_ = 0, last_us_ = 0, aborts_ = 0;
+  std::uint32_t announced_size_ = 0, last_us_ = 0, aborts_ = 0;
 };
 
 }  // namespace fxdyn

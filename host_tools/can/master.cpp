@@ -9,7 +9,7 @@ namespace {
 // Command specifiers of SDO, CiA 301, 7.2.4.3: the client's, and the server's answers.
 constexpr std::uint8_t initiate_download = 0x20, initiate_upload = 0x40, upload_segment = 0x60, abort_transfer = 0x80;
 constexpr std::uint8_t downloaded = 0x60, segment_downloaded = 0x20;
-constexpr std::uint8_t toggle = 0x10, expedited = 0x02, size_told = 0x01, last_segment = 0x01;
+constexpr std::uint8_t toggle = 0x10, expedited = 0x02, size_is_given = 0x01, last_segment = 0x01;
 constexpr std::size_t segment_bytes = 7;
 
 std::string object_name(std::uint8_t node, std::uint16_t index, std::uint8_t sub_index) {
@@ -128,10 +128,10 @@ std::vector<std::uint8_t> Master::upload(std::uint8_t node, std::uint16_t index,
     protocol_error(node, index, sub_index);
   }
   if ((answer[0] & expedited) != 0) {
-    const std::size_t size = (answer[0] & size_told) != 0 ? 4U - (answer[0] >> 2 & 3U) : 4U;
+    const std::size_t size = (answer[0] & size_is_given) != 0 ? 4U - (answer[0] >> 2 & 3U) : 4U;
     return {answer.begin() + 4, answer.begin() + 4 + static_cast<std::ptrdiff_t>(size)};
   }
-  const bool told = (answer[0] & size_told) != 0;
+  const bool size_given = (answer[0] & size_is_given) != 0;
   const std::size_t expected = canopen::load<4>(&answer[4]);
   std::vector<std::uint8_t> bytes;
   std::uint8_t bit = 0;
@@ -142,13 +142,13 @@ std::vector<std::uint8_t> Master::upload(std::uint8_t node, std::uint16_t index,
     bytes.insert(bytes.end(), answer.begin() + 1, answer.begin() + 1 + static_cast<std::ptrdiff_t>(count));
     bit ^= toggle;
   } while ((answer[0] & last_segment) == 0);
-  if (told && bytes.size() != expected) protocol_error(node, index, sub_index);
+  if (size_given && bytes.size() != expected) protocol_error(node, index, sub_index);
   return bytes;
 }
 
 void Master::download(std::uint8_t node, std::uint16_t index, std::uint8_t sub_index,
                       std::span<const std::uint8_t> bytes) {
-  Bytes request{initiate_download | size_told, static_cast<std::uint8_t>(index & 255U),
+  Bytes request{initiate_download | size_is_given, static_cast<std::uint8_t>(index & 255U),
                 static_cast<std::uint8_t>(index >> 8), sub_index};
   const bool short_value = !bytes.empty() && bytes.size() <= 4;
   if (short_value) {

@@ -288,7 +288,7 @@ FlexibleJoint identify_joint(const JointData& data, const IdentifiedModel& model
                                 stiffness_unit, 1e3 * left, length_unit));
     } else if (rotor_in_load && whole.least_squares.power < 0.5 * all) {
       add(out.note,
-          "the gear bends, but its load can't be told from the rotor's inertia: move the joints behind it too, arm "
+          "the gear bends, but its load cannot be distinguished from the rotor's inertia: move the joints behind it too, arm "
           "stretched and folded, or carry a load");
     } else {
       add(out.note, fmt::format("the gear bends with its load, but that load is too small to be known: stiffer than "
@@ -316,7 +316,7 @@ FlexibleJoint identify_joint(const JointData& data, const IdentifiedModel& model
     out.effective_inertia = rotor->linear[0];
     out.inertia_std = rotor->linear_std.empty() ? 0 : rotor->linear_std[0];
   }
-  if (out.damping < 2 * out.damping_std) add(out.note, "damping can't be told from none: move faster");
+  if (out.damping < 2 * out.damping_std) add(out.note, "damping cannot be distinguished from none: move faster");
   if (out.explained < 0.5)
     add(out.note, "most of the deflection does not follow the load: mounting of the encoders, or error of the gear");
   return out;

@@ -21,7 +21,7 @@ struct FlexibleInput {
 };
 
 /// K, B and J_eff of every joint that has a link encoder, in chain order. J_eff is the model's `rotor_inertia` where it
-/// has one. On the first joints, where rotor inertia can't be told from link inertia by torque (it is in the base
+/// has one. On the first joints, where rotor inertia cannot be distinguished from link inertia by torque (it is in the base
 /// parameters), the deflection tells them apart: the rotor's share bends no gear. Standard deviations are those of a
 /// residual that is correlated over up to half a second, and of the load by those of the base parameters (taken as
 /// independent, which is mostly too much). Play and a once-a-turn error of the gear or the encoder are taken out where

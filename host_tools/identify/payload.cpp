@@ -25,8 +25,8 @@ using Eigen::VectorXd;
 
 constexpr auto ten = static_cast<Index>(parameters_per_link);
 constexpr Index nuisances = 2;  ///< Coulomb, offset of each joint
-/// Share of a column's square that the others must leave for it to count as told apart.
-constexpr double told_apart = 1e-6;
+/// Share of a column's square that the others must leave for it to count as identifiable.
+constexpr double least_share_left = 1e-6;
 /// A mass with a larger relative standard deviation is none.
 constexpr double largest_uncertainty = 0.3;
 
@@ -168,7 +168,7 @@ Fit solve(const Rows& rows) {
 }
 
 /// Which of the ten no sum of the others and of friction imitates.
-std::array<bool, 10> told(const Fit& fit) {
+std::array<bool, 10> identifiable(const Fit& fit) {
   VectorXd scale = fit.information.diagonal().head(ten).cwiseMax(0).cwiseSqrt();
   std::array<bool, 10> out{};
   for (Index k = 0; k < ten; ++k) {
@@ -178,7 +178,7 @@ std::array<bool, 10> told(const Fit& fit) {
   const MatrixXd scaled = scale.asDiagonal() * (fit.own + fit.own.transpose()) / 2 * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(scaled);
   for (Index i = 0; i < ten; ++i) {
-    if (solver.eigenvalues()[i] > told_apart) continue;
+    if (solver.eigenvalues()[i] > least_share_left) continue;
     for (Index k = 0; k < ten; ++k) {
       if (std::fabs(solver.eigenvectors()(k, i)) > 0.03) out[static_cast<std::size_t>(k)] = false;
     }
@@ -248,10 +248,10 @@ LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log) {
   const auto n = static_cast<Index>(model.robot.size());
   const Rows rows = build_rows(model, chain, log);
   const Fit fit = solve(rows);
-  const std::array<bool, 10> apart = told(fit);
+  const std::array<bool, 10> apart = identifiable(fit);
   const double mass = fit.solution[0], mass_std = std::sqrt(std::max(0.0, fit.covariance(0, 0)));
   if (!apart[0]) {
-    throw DataError(fmt::format("{}: the mass of the load can't be told from this motion: {}", log.name,
+    throw DataError(fmt::format("{}: the mass of the load cannot be identified from this motion: {}", log.name,
                                 what_to_move(model.robot, log, rows)));
   }
   if (!(mass > 0) || mass_std > largest_uncertainty * mass) {

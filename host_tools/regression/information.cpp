@@ -96,7 +96,7 @@ std::vector<WeakParameter> weak_parameters(const Eigen::MatrixXd& information, c
   const auto& size = parameters.size;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(size.asDiagonal() * information * size.asDiagonal());
   const Eigen::VectorXd& values = eigen.eigenvalues();
-  const double told = 1 / (unidentifiable_error * unidentifiable_error);
+  const double least_information = 1 / (unidentifiable_error * unidentifiable_error);
   const double rounding = 1e-14 * std::max(values[p - 1], 0.0);
   std::vector<WeakParameter> weak;
   for (Eigen::Index i = 0; i < p; ++i) {
@@ -108,7 +108,7 @@ std::vector<WeakParameter> weak_parameters(const Eigen::MatrixXd& information, c
       } else if (part > 1e-9) {
         variance = std::numeric_limits<double>::infinity();
       }
-      if (values[k] <= rounding || values[k] < told) lost += part;
+      if (values[k] <= rounding || values[k] < least_information) lost += part;
     }
     const auto index = static_cast<std::size_t>(i);
     WeakParameter parameter{parameters.names[index], std::sqrt(variance), lost < 0.1, parameters.joints[index]};

@@ -49,8 +49,8 @@ double log_determinant(const Eigen::MatrixXd& information);
 /// A parameter that the data tell too little of.
 struct WeakParameter {
   std::string name;
-  double error = 0;          ///< standard deviation as a share of `size`; infinite where it can't be told at all
-  bool identifiable = true;  ///< false: a direction that it has part in can't be told
+  double error = 0;          ///< standard deviation as a share of `size`; infinite where it cannot be identified at all
+  bool identifiable = true;  ///< false: a direction that it has part in cannot be identified
   Eigen::Index joint = 0;    ///< the joint to move more (from 0)
 };
 
@@ -63,11 +63,11 @@ struct ParameterSizes {
 };
 
 constexpr double weak_error = 0.002;           ///< of a parameter's size: above it the parameter is weak
-constexpr double unidentifiable_error = 0.01;  ///< of a unit direction's size: above it the direction can't be told
+constexpr double unidentifiable_error = 0.01;  ///< of a unit direction's size: above it the direction cannot be identified
 
-/// The parameters that can't be told, or are told poorly, from an information matrix (inverse covariance, p x p) of any
+/// The parameters that cannot be identified, or only poorly, from an information matrix (inverse covariance, p x p) of any
 /// regressor. Each column is measured in its size, S = diag(size): eigenvectors of S M S whose standard deviation
-/// 1 / sqrt(eigenvalue) is above unidentifiable_error (or whose eigenvalue is rounding) can't be told; a parameter
+/// 1 / sqrt(eigenvalue) is above unidentifiable_error (or whose eigenvalue is rounding) cannot be identified; a parameter
 /// with more than a tenth of its weight in them is not identifiable. `movement`: how much each joint moved, as a share
 /// of what would be full motion; the joint to move is, of those that move the parameter, the one that moved least.
 /// `above`: the error from which on a parameter is returned, 0 for all.

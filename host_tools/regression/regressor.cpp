@@ -17,17 +17,17 @@ Regressor::Regressor(const DhChain& chain)
 
 namespace {
 
-/// work(p, wrench of the unit parameter e_p) for all ten. The compiler sees the constants and drops what they make zero
-/// (this file is compiled without signed zeros and infinities).
-template <class Work, std::size_t... p>
-[[gnu::always_inline]] inline void for_unit_wrenches(const LinkMotion<Real>& motion, const Work& work,
+/// visit(p, wrench of the unit parameter e_p) for all ten. The compiler sees the constants and drops what they make
+/// zero (this file is compiled without signed zeros and infinities).
+template <class Visit, std::size_t... p>
+[[gnu::always_inline]] inline void for_unit_wrenches(const LinkMotion<Real>& motion, const Visit& visit,
                                                      std::index_sequence<p...>) {
   const auto unit = [](std::size_t k) {
     std::array<double, parameters_per_link> parameters{};
     parameters[k] = 1;
     return to_inertia(parameters);
   };
-  (work(p, link_wrench<Real>(AnyLink{}, unit(p), motion)), ...);
+  (visit(p, link_wrench<Real>(AnyLink{}, unit(p), motion)), ...);
 }
 
 }  // namespace

@@ -49,7 +49,7 @@ struct BaseSet {
 BaseSet find_base(const DhChain& chain);
 
 /// Whether rotor inertia of the joint (ddq in the joint's own row) lies in the span of the base columns, as on the
-/// first joints of most arms: then it can't be told from link inertia and has no column of its own.
+/// first joints of most arms: then it cannot be distinguished from link inertia and has no column of its own.
 bool rotor_inertia_is_absorbed(const DhChain& chain, const BaseSet& base, Eigen::Index joint);
 /// How it is: ddq = Y_b c, the base parameters of a rotor of 1 kg m^2 (kg). Empty: it is not absorbed.
 Eigen::VectorXd rotor_in_base(const DhChain& chain, const BaseSet& base, Eigen::Index joint);

@@ -18,10 +18,10 @@ constexpr Index lanes = DecimatingFilter::lanes;
 
 /// One direction, from wanted sample to wanted sample.
 struct Leaps {
-  const double* x;     ///< the first one
-  Index to_next;       ///< from sample to sample, negative backwards
-  Index step;          ///< samples to the next wanted one
-  Index silent, told;  ///< so many only lead there; the rest is added to `out`
+  const double* x;        ///< the first one
+  Index to_next;          ///< from sample to sample, negative backwards
+  Index step;             ///< samples to the next wanted one
+  Index silent, written;  ///< so many only lead there; the rest is added to `out`
   double* out;
   bool adds;  ///< to what is there; else writes, and middle times the sample itself
   double middle;
@@ -57,7 +57,7 @@ template <class V>
       }
       out += leaps.to_next > 0 ? lanes : -lanes;
     }
-    if (k + 1 == leaps.silent + leaps.told) break;
+    if (k + 1 == leaps.silent + leaps.written) break;
 #pragma GCC unroll 2
     for (int s = 0; s < 2; ++s) {
       const double a = leaps.leap[2 * s], b = leaps.leap[2 * s + 1];

@@ -22,10 +22,10 @@ inline std::size_t threads_allowed() {
 /// Long logs are worked on by one thread: each takes memory for its own columns.
 inline std::atomic<std::size_t> most_threads{threads_allowed()};
 
-/// work(i) for i = 0 .. count-1 on all cores. Each i writes its own result, so the outcome does not depend on the
+/// task(i) for i = 0 .. count-1 on all cores. Each i writes its own result, so the outcome does not depend on the
 /// number of threads. The first exception is thrown again here.
-template <class Work>
-void parallel_for(std::size_t count, Work&& work) {
+template <class Task>
+void parallel_for(std::size_t count, Task&& task) {
   const std::size_t threads =
       std::min<std::size_t>({count, std::max(1U, std::thread::hardware_concurrency()), most_threads.load()});
   std::atomic<std::size_t> next = 0;
@@ -34,7 +34,7 @@ void parallel_for(std::size_t count, Work&& work) {
   const auto run = [&] {
     for (std::size_t i; (i = next++) < count;) {
       try {
-        work(i);
+        task(i);
       } catch (...) {
         const std::lock_guard lock(mutex);
         if (!failure) failure = std::current_exception();

@@ -102,7 +102,7 @@ done
 
 echo '{"schema": "fxdyn.model/1"}' >"$work/model.json"
 expect 2 "model.json" predict --model "$work/model.json" --log "$work/good.csv" --out "$work/out"
-expect 1 "the mass of the load can't be told from this motion: no joint of this robot lifts" payload --model "$work/good/model.json" --log "$work/good.csv" --out "$work/out"
+expect 1 "the mass of the load cannot be identified from this motion: no joint of this robot lifts" payload --model "$work/good/model.json" --log "$work/good.csv" --out "$work/out"
 expect 2 "would be overwritten" payload --model "$work/good/model.json" --log "$work/good.csv" --out "$work/good"
 expect 2 "'diagnos' is no verb" diagnos "$work/good.toml" --out "$work/fresh"
 expect 2 "'--oout' is no option here" diagnose "$work/good.toml" --oout "$work/fresh"

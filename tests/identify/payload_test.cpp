@@ -163,7 +163,7 @@ TEST(Load, SaysWhatIsWrong) {
   table.inertia.resize(1);
   table.joints.resize(1);
   const std::string message = message_of<DataError>(table, record(with_load(table, load()), 0.001, 6));
-  EXPECT_NE(message.find("mass of the load can't be told"), std::string::npos) << message;
+  EXPECT_NE(message.find("mass of the load cannot be identified"), std::string::npos) << message;
   EXPECT_NE(message.find("no joint of this robot lifts the load"), std::string::npos) << message;
 
   // Standing still.
