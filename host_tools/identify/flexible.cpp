@@ -288,7 +288,8 @@ FlexibleJoint identify_joint(const JointData& data, const IdentifiedModel& model
                                 stiffness_unit, 1e3 * left, length_unit));
     } else if (rotor_in_load && whole.least_squares.power < 0.5 * all) {
       add(out.note,
-          "the gear bends, but its load cannot be distinguished from the rotor's inertia: move the joints behind it too, arm "
+          "the gear bends, but its load cannot be distinguished from the rotor's inertia: move the joints behind it "
+          "too, arm "
           "stretched and folded, or carry a load");
     } else {
       add(out.note, fmt::format("the gear bends with its load, but that load is too small to be known: stiffer than "

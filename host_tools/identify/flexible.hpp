@@ -21,9 +21,9 @@ struct FlexibleInput {
 };
 
 /// K, B and J_eff of every joint that has a link encoder, in chain order. J_eff is the model's `rotor_inertia` where it
-/// has one. On the first joints, where rotor inertia cannot be distinguished from link inertia by torque (it is in the base
-/// parameters), the deflection tells them apart: the rotor's share bends no gear. Standard deviations are those of a
-/// residual that is correlated over up to half a second, and of the load by those of the base parameters (taken as
+/// has one. On the first joints, where rotor inertia cannot be distinguished from link inertia by torque (it is in the
+/// base parameters), the deflection tells them apart: the rotor's share bends no gear. Standard deviations are those of
+/// a residual that is correlated over up to half a second, and of the load by those of the base parameters (taken as
 /// independent, which is mostly too much). Play and a once-a-turn error of the gear or the encoder are taken out where
 /// the data shows them, and noted. A joint that does not bend measurably, or whose load is not known well enough, comes
 /// back with found = false.

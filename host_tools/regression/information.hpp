@@ -62,15 +62,16 @@ struct ParameterSizes {
   Eigen::VectorXd size;              ///< a change of this size would matter
 };
 
-constexpr double weak_error = 0.002;           ///< of a parameter's size: above it the parameter is weak
-constexpr double unidentifiable_error = 0.01;  ///< of a unit direction's size: above it the direction cannot be identified
+constexpr double weak_error = 0.002;  ///< of a parameter's size: above it the parameter is weak
+constexpr double unidentifiable_error =
+    0.01;  ///< of a unit direction's size: above it the direction cannot be identified
 
-/// The parameters that cannot be identified, or only poorly, from an information matrix (inverse covariance, p x p) of any
-/// regressor. Each column is measured in its size, S = diag(size): eigenvectors of S M S whose standard deviation
-/// 1 / sqrt(eigenvalue) is above unidentifiable_error (or whose eigenvalue is rounding) cannot be identified; a parameter
-/// with more than a tenth of its weight in them is not identifiable. `movement`: how much each joint moved, as a share
-/// of what would be full motion; the joint to move is, of those that move the parameter, the one that moved least.
-/// `above`: the error from which on a parameter is returned, 0 for all.
+/// The parameters that cannot be identified, or only poorly, from an information matrix (inverse covariance, p x p) of
+/// any regressor. Each column is measured in its size, S = diag(size): eigenvectors of S M S whose standard deviation
+/// 1 / sqrt(eigenvalue) is above unidentifiable_error (or whose eigenvalue is rounding) cannot be identified; a
+/// parameter with more than a tenth of its weight in them is not identifiable. `movement`: how much each joint moved,
+/// as a share of what would be full motion; the joint to move is, of those that move the parameter, the one that moved
+/// least. `above`: the error from which on a parameter is returned, 0 for all.
 std::vector<WeakParameter> weak_parameters(const Eigen::MatrixXd& information, const ParameterSizes& parameters,
                                            const Eigen::VectorXd& movement, double above = weak_error);
 
