@@ -135,7 +135,8 @@ inline constexpr auto tanh_lines = [] {
     const double f0 = tanh_of(from), f1 = tanh_of(to), bow = (tanh_of(from + 1) - (f0 + f1) / 2) / 2;
     const double scale = activation_one * 65536.0;
     const double slope = (f1 - f0) * scale / (1 << tanh_table_step_bits);
-    const auto slope_raw = static_cast<std::int32_t>(slope + 0.5);  // never negative
+    // NOLINTNEXTLINE(bugprone-incorrect-roundings): a slope of tanh is never negative
+    const auto slope_raw = static_cast<std::int32_t>(slope + 0.5);
     const double value = (f0 + bow) * scale + 32768.0;
     // the nearest number whose lower half is the slope
     const double upper = (value - slope_raw) / 65536.0;

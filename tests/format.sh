@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# format.sh style | tidy BUILD_DIR [REF]: clang-format over all sources; clang-tidy over those that differ from REF (HEAD~1),
-# for 300 s at most. Says what to do: clang-format-14 -i FILE.
+# format.sh style | tidy BUILD_DIR [REF [SECONDS]]: clang-format over all sources; clang-tidy over those that differ from REF
+# (HEAD~1), no new file after SECONDS (120). Says what to do: clang-format-14 -i FILE.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
-longest_s=300
+longest_s=${4:-120}
 
 sources() { find model hal firmware host_tools tests -name '*.[ch]pp' | grep -v '^tests/golden/.*\(tables\|vectors\)\.hpp$' | sort; }
 
@@ -18,7 +18,8 @@ case ${1:-} in
     trap 'rm -r "$commands"' EXIT
     database=$commands/compile_commands.json
     sed 's/-Winvalid-pch -include [^ ]*cmake_pch.hxx//' "$2/compile_commands.json" >"$database"
-    mapfile -t files < <(git diff --name-only "${3:-HEAD~1}" -- '*.cpp' 2>/dev/null | sort)
+    # most changed first
+    mapfile -t files < <(git diff --numstat --no-renames --diff-filter=d "${3:-HEAD~1}" -- '*.cpp' 2>/dev/null | sort -rn | cut -f3)
     done=0 failed=0
     for file in "${files[@]}"; do
       [ "$SECONDS" -lt "$longest_s" ] || break
@@ -30,7 +31,7 @@ case ${1:-} in
     exit $failed
     ;;
   *)
-    echo "usage: format.sh style | tidy BUILD_DIR [REF]" >&2
+    echo "usage: format.sh style | tidy BUILD_DIR [REF [SECONDS]]" >&2
     exit 2
     ;;
 esac
