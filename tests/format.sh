@@ -19,7 +19,7 @@ case ${1:-} in
     database=$commands/compile_commands.json
     sed 's/-Winvalid-pch -include [^ ]*cmake_pch.hxx//' "$2/compile_commands.json" >"$database"
     # most changed first
-    mapfile -t files < <(git diff --numstat --no-renames --diff-filter=d "${3:-HEAD~1}" -- '*.cpp' 2>/dev/null | sort -rn | cut -f3)
+    mapfile -t files < <(git diff --numstat -M --diff-filter=AM "${3:-HEAD~1}" -- '*.cpp' 2>/dev/null | sort -rn | cut -f3)
     done=0 failed=0
     for file in "${files[@]}"; do
       [ "$SECONDS" -lt "$longest_s" ] || break
