@@ -4,6 +4,7 @@
 
 #include "host_tools/cli/verb.hpp"
 #include "host_tools/excite/excite.hpp"
+#include "host_tools/pipeline/forward_log.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/support/error.hpp"
@@ -57,6 +58,20 @@ Action add_predict(CLI::App& verb) {
     predict_log(options->model, options->log, options->numbers == "fixed", options->out);
     fmt::print("prediction in {}\n", options->out);
   };
+}
+
+Action add_forward(CLI::App& verb) {
+  struct Options {
+    std::string model, log, out;
+    int given = 20;
+  };
+  const auto options = std::make_shared<Options>();
+  verb.add_option("--model", options->model, "model.json")->required();
+  verb.add_option("--log", options->log, "log (CSV) with torque")->required();
+  verb.add_option("--given", options->given, "first samples of the log that are known: where the motion starts")
+      ->capture_default_str();
+  verb.add_option("--out", options->out, "directory for the simulated motion")->required();
+  return [options] { fmt::print("{}", forward_log(options->model, options->log, options->given, options->out)); };
 }
 
 Action add_payload(CLI::App& verb) {

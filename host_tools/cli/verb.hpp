@@ -38,6 +38,7 @@ Action add_replay(CLI::App& verb);
 Action add_excite(CLI::App& verb);
 Action add_simulate(CLI::App& verb);
 Action add_predict(CLI::App& verb);
+Action add_forward(CLI::App& verb);
 Action add_payload(CLI::App& verb);
 Action add_effects(CLI::App& verb);
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host_tools/effects/effects.hpp"
+#include "host_tools/forward/forward.hpp"
 #include "host_tools/simulate/closed_loop.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/parallel.hpp"
@@ -22,33 +22,6 @@ constexpr double longest_s = 20;
 /// The plant's friction states start at rest and its motion starts beside the recorded one.
 constexpr double settling_s = 1;
 
-/// Without the effects that run_closed_loop() leaves out.
-IdentifiedModel moving(IdentifiedModel model) {
-  for (JointFit& joint : model.joints) {
-    std::erase_if(joint.effects, [](const EffectFit& fit) {
-      const EffectInfo* info = find_effect(fit.effect);
-      return info != nullptr && (info->needs_total || info->acts_on == ActsOn::position);
-    });
-  }
-  return model;
-}
-
-std::size_t effects_of(const IdentifiedModel& model) {
-  std::size_t count = 0;
-  for (const JointFit& joint : model.joints) count += joint.effects.size();
-  return count;
-}
-
-/// The log's torque as far as it moves the plant, filtered, at the times of the motion.
-MatrixXd recorded_torque(const IdentifiedModel& model, const ProcessedLog& log) {
-  MatrixXd torque = log.tau;
-  const IdentifiedModel plant = moving(model);
-  if (effects_of(plant) != effects_of(model)) torque -= predict(model, log) - predict(plant, log);
-  // The torque column shows the torque of the motion torque_lead_s later.
-  const double lead = model.filter.torque_lead_s / log.step_s;
-  return log.filter_columns(lead == 0 ? torque : at_other_times(torque, -lead));
-}
-
 /// RMS per joint.
 struct Differences {
   VectorXd tracking;  ///< of the position [rad | m]
@@ -57,7 +30,7 @@ struct Differences {
 
 Differences play(const IdentifiedModel& model, const ProcessedLog& log, Index count) {
   const MotionRows motion = log.motion(log.first, count);
-  const MatrixXd feedforward = recorded_torque(model, log).middleRows(log.first, count);
+  const MatrixXd feedforward = log.filter_columns(driving_torque(model, log)).middleRows(log.first, count);
   ClosedLoopSettings settings;
   settings.age_s = age_of(model, log) + static_cast<double>(log.first) * log.step_s;  // as in predict()
   const ClosedLoopRun run =

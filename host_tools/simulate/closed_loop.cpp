@@ -16,17 +16,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// The model with the effects that shape the motion only.
-IdentifiedModel shaping(IdentifiedModel model) {
-  for (JointFit& joint : model.joints) {
-    std::erase_if(joint.effects, [](const EffectFit& fit) {
-      const EffectInfo* info = find_effect(fit.effect);
-      return info != nullptr && (info->needs_total || info->acts_on == ActsOn::position);
-    });
-  }
-  return unlimited(std::move(model));
-}
-
 bool couples(const IdentifiedModel& model) {
   for (const JointFit& joint : model.joints) {
     for (const EffectFit& fit : joint.effects) {
@@ -49,7 +38,7 @@ class Plant {
   Plant(const IdentifiedModel& model, const VectorXd& q, const VectorXd& dq, const VectorXd& ddq, double step_s,
         double age_s)
       : coupled_(couples(model)),
-        evaluator_(shaping(model), step_s),
+        evaluator_(unlimited(forward_plant(model)), step_s),
         h_(step_s),
         q_(q),
         v_(dq),
@@ -168,6 +157,16 @@ class Plant {
 
 }  // namespace
 
+IdentifiedModel forward_plant(IdentifiedModel model) {
+  for (JointFit& joint : model.joints) {
+    std::erase_if(joint.effects, [](const EffectFit& fit) {
+      const EffectInfo* info = find_effect(fit.effect);
+      return info != nullptr && (info->needs_total || info->acts_on == ActsOn::position);
+    });
+  }
+  return model;
+}
+
 void SeenMotion::look(const VectorXd& q, const VectorXd& dq) {
   if (encoder_ <= 0) {
     q_ = q;
@@ -208,6 +207,21 @@ ClosedLoopRun run_closed_loop(const IdentifiedModel& plant, const Reference& ref
     before = robot.a();
   }
   return run;
+}
+
+MatrixXd run_open_loop(const IdentifiedModel& plant, const OpenLoopStart& start, double step_s, const MatrixXd& tau,
+                       int substeps, double age_s) {
+  MatrixXd q(tau.rows(), tau.cols());
+  if (tau.rows() == 0) return q;
+  Plant robot(plant, start.q, start.dq, start.ddq, step_s / substeps, age_s);
+  for (Index k = 0;; ++k) {
+    q.row(k) = robot.q();
+    if (k + 1 == tau.rows()) return q;
+    for (int s = 0; s < substeps; ++s) {
+      const double share = (s + 0.5) / substeps;  // the mean over the substep
+      robot.step((1 - share) * tau.row(k).transpose() + share * tau.row(k + 1).transpose());
+    }
+  }
 }
 
 }  // namespace fxdyn

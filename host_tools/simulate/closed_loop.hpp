@@ -56,11 +56,26 @@ struct ClosedLoopRun {
   Eigen::MatrixXd q, dq, ddq, tau;
 };
 
-/// The model as a plant: M(q) ddq + h(q, dq) + effects(q, dq) = tau, from the reference's first state on. Effects that
-/// need the running total (delay, saturation, torque_gain) or act on the position (elasticity, backlash, eccentricity)
-/// do not shape the motion.
+/// The model as a plant, M(q) ddq + h(q, dq) + effects(q, dq) = tau: without the effects that need the running total
+/// (delay, saturation, torque_gain) or act on the position (elasticity, backlash, eccentricity). Those change what is
+/// measured rather than the motion.
+IdentifiedModel forward_plant(IdentifiedModel model);
+
+/// The plant in closed loop, from the reference's first state on.
 /// @throws DataError where the model's mass matrix is not positive definite, RunsAway.
 ClosedLoopRun run_closed_loop(const IdentifiedModel& plant, const Reference& reference,
                               const ClosedLoopSettings& settings);
+
+/// Of every joint [rad | m, and per s, s^2].
+struct OpenLoopStart {
+  Eigen::VectorXd q, dq, ddq;
+};
+
+/// The plant moved by a torque alone, which is linear between its samples.
+/// @param tau samples x joints, `step_s` apart; the first is that of `start` [N*m | N]
+/// @return q at the samples of tau [rad | m]
+/// @throws DataError where the model's mass matrix is not positive definite, RunsAway.
+Eigen::MatrixXd run_open_loop(const IdentifiedModel& plant, const OpenLoopStart& start, double step_s,
+                              const Eigen::MatrixXd& tau, int substeps, double age_s);
 
 }  // namespace fxdyn

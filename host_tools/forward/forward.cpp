@@ -1,0 +1,142 @@
+#include "host_tools/forward/forward.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "host_tools/simulate/closed_loop.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/parallel.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// A torque that does not change while its joint covers this share of its range is stuck. A current sensor's step is
+/// seen as often as the friction is even: over a few per cent of the range.
+constexpr double stuck_share = 0.3;
+/// A parabola has three coefficients.
+constexpr Index fewest_given = 3;
+
+std::size_t effects_of(const IdentifiedModel& model) {
+  std::size_t count = 0;
+  for (const JointFit& joint : model.joints) count += joint.effects.size();
+  return count;
+}
+
+void check_length(const Log& raw, Index given) {
+  if (given < fewest_given)
+    throw InputError(fmt::format("--given {}: at least {} samples say where the motion starts", given, fewest_given));
+  if (raw.samples() <= given) {
+    throw InputError(
+        fmt::format("{}: has {} samples, and the first {} are given (--given): nothing is left to simulate",
+                    raw.file.filename().string(), raw.samples(), given));
+  }
+}
+
+void check_torque(const IdentifiedModel& model, const Log& raw) {
+  for (Index j = 0; j < raw.joints(); ++j) {
+    const auto q = raw.q.col(j), tau = raw.tau.col(j);
+    const double range = q.maxCoeff() - q.minCoeff();
+    for (Index from = 0, to = 0; from < raw.samples(); from = to) {
+      for (to = from; to < raw.samples() && tau[to] == tau[from]; ++to) continue;
+      const auto stretch = q.segment(from, to - from);
+      if (to - from < 2 || !(stretch.maxCoeff() - stretch.minCoeff() > stuck_share * range)) continue;
+      throw InputError(
+          fmt::format("{}: tau{} ({}) stays at {:.6g} from {:.3f} s to {:.3f} s, in which the joint moves: record the "
+                      "torque again, or "
+                      "cut that part out",
+                      raw.file.filename().string(), j + 1, model.robot.joints[static_cast<std::size_t>(j)].name,
+                      tau[from], raw.t[from], raw.t[to - 1]));
+    }
+  }
+}
+
+/// The model of another robot, or another unit: at no joint less is left of the torque than there was.
+void check_robot(const IdentifiedModel& model, const ProcessedLog& log) {
+  const MatrixXd measured = log.filter_columns(log.tau);
+  const MatrixXd left = measured - log.filter_columns(predict(model, log));
+  const Index count = log.last - log.first;
+  for (Index j = 0; j < measured.cols(); ++j) {
+    if (left.col(j).segment(log.first, count).norm() < measured.col(j).segment(log.first, count).norm()) return;
+  }
+  throw DataError(
+      fmt::format("{}: the model explains the torque of no joint: is it this robot's, in the same units?", log.name));
+}
+
+/// Where the simulation starts: at sample given - 1.
+struct Start {
+  VectorXd q, dq, ddq;
+};
+
+Start start_of(const Log& raw, Index given) {
+  MatrixXd powers(given, 3);
+  for (Index k = 0; k < given; ++k) {
+    const double t = static_cast<double>(k - given + 1) * raw.step_s;
+    powers.row(k) << 1, t, 0.5 * t * t;
+  }
+  const MatrixXd fit = powers.householderQr().solve(raw.q.topRows(given));
+  return {fit.row(0), fit.row(1), fit.row(2)};
+}
+
+ForwardRun judged(const Log& raw, Index given, const MatrixXd& q_from_start) {
+  ForwardRun run;
+  run.q = raw.q;
+  const Index judged = raw.samples() - given;
+  run.q.bottomRows(judged) = q_from_start.bottomRows(judged);
+  run.rmse = (run.q - raw.q).bottomRows(judged).colwise().norm().transpose() / std::sqrt(static_cast<double>(judged));
+  return run;
+}
+
+template <class Simulate>
+ForwardRun attempt(const Log& raw, Index given, Simulate&& simulate) {
+  try {
+    return judged(raw, given, simulate());
+  } catch (const DataError& error) {  // not every model is a plant, and not every motion ends
+    return {{}, {}, error.what()};
+  }
+}
+
+}  // namespace
+
+MatrixXd driving_torque(const IdentifiedModel& model, const ProcessedLog& log) {
+  MatrixXd torque = log.tau;
+  const IdentifiedModel plant = forward_plant(model);
+  if (effects_of(plant) != effects_of(model)) torque -= predict(model, log) - predict(plant, log);
+  // The torque column shows the torque of the motion torque_lead_s later.
+  const double lead = model.filter.torque_lead_s / log.step_s;
+  return lead == 0 ? torque : at_other_times(torque, -lead);
+}
+
+Forward simulate_forward(const IdentifiedModel& model, const Log& raw, const ProcessedLog& log, Index given) {
+  check_length(raw, given);
+  check_torque(model, raw);
+  check_robot(model, log);
+  const IdentifiedModel plant = with_load_of(log, model);
+  const Index from = given - 1, count = raw.samples() - from;
+  const MatrixXd torque = driving_torque(model, log);
+  const Start start = start_of(raw, given);
+  ClosedLoopSettings settings;
+  settings.age_s = age_of(model, log) + static_cast<double>(from) * log.step_s;
+  Forward out;
+  parallel_for(2, [&](std::size_t i) {
+    if (i == 0) {
+      out.open = attempt(raw, given, [&] {
+        const OpenLoopStart state{start.q, start.dq, start.ddq};
+        return run_open_loop(plant, state, log.step_s, torque.bottomRows(count), settings.substeps, settings.age_s);
+      });
+    } else {
+      out.closed = attempt(raw, given, [&] {
+        const MotionRows motion = log.motion(from, count);
+        Reference reference{log.step_s, motion.q, motion.dq, motion.ddq, log.filter_columns(torque).bottomRows(count)};
+        return run_closed_loop(plant, reference, settings).q;
+      });
+    }
+  });
+  return out;
+}
+
+}  // namespace fxdyn
