@@ -58,6 +58,15 @@ TEST(CodecLimits, PerMilleAndMilliSaturateAtTheirWidth) {
   EXPECT_EQ(to_milli(least, 5), least);
 }
 
+// The product with a raw torque of 32 bits has to stay within 64: no shift above 62, however small the factor.
+TEST(CodecLimits, AScaleOfPerMilleShiftsBy62AtMost) {
+  const TorqueScale fine = TorqueScale::of(30, 0x7FFF'FFFF);
+  EXPECT_EQ(fine.shift, 62);
+  EXPECT_EQ(fine.factor, 2'000'000);  // 10^6 2^32 / 2^31
+  EXPECT_EQ(TorqueScale::of(20, 0x7FFF'FFFF).shift, 62);
+  EXPECT_EQ(TorqueScale::of(19, 0x7FFF'FFFF).shift, 19 + 42);
+}
+
 TEST(CodecLimits, TheTickIsTheLowestBitOfTheAcceleration) {
   WireSetpoint setpoint{.q = 1, .dq = 2, .ddq = -3};
   setpoint.of_tick(false);

@@ -195,5 +195,17 @@ TEST(Dictionary, MappingsAreComplete) {
   }
 }
 
+// What a tool may put into a PDO is what the node's PDOs hold: setpoints and torques, nothing else.
+TEST(Dictionary, OnlyWhatTravelsInPdosIsMappable) {
+  for (const auto& described : dictionary::described) {
+    bool travels = false;
+    for (const bool torque : {false, true}) {
+      for (std::size_t place = 1; place <= (torque ? 4U : 3U); ++place)
+        travels = travels || described.entry.index == dictionary::mapping(torque, place, 4) >> 16;
+    }
+    EXPECT_TRUE(travels || !described.mappable) << std::hex << described.entry.index;
+  }
+}
+
 }  // namespace
 }  // namespace fxdyn

@@ -6,6 +6,7 @@
 #include <ostream>
 #include <vector>
 
+#include "model/broad_learning.hpp"
 #include "model/catalogue.hpp"
 #include "model/joint_model.hpp"
 
@@ -131,6 +132,15 @@ TEST(ByHand, ADeflectionBeginsAnewWhereTooLittleOrTooOldIsKnown) {
   twice.skip(1);
   twice.skip(1);  // one gap, one call
   EXPECT_EQ(twice.step(6), (Step{6, 0, 0}));
+}
+
+TEST(ByHand, ARampIsAnEighthOfItsArgumentUpToEight) {
+  EXPECT_EQ(RampNodes::of(-0.5), 0);
+  EXPECT_EQ(RampNodes::of(0), 0);
+  EXPECT_EQ(RampNodes::of(0.5), 0.0625);
+  EXPECT_EQ(RampNodes::of(4), 0.5);
+  EXPECT_EQ(RampNodes::of(7), 0.875);
+  EXPECT_EQ(RampNodes::of(9), 1);
 }
 
 struct Formats {

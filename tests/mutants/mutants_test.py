@@ -47,6 +47,10 @@ class Mutate(unittest.TestCase):
                      'T&& t', 'const T& t', 'T* t'):
             self.assertEqual(changes(text), set(), text)
 
+    def test_nothing_added_or_shifted_by_nothing_is_no_change(self):
+        self.assertEqual([b for b in changes('x = 1U << 0, y = a + 0x00;') if '>>' in b or 'a -' in b], [])
+        self.assertIn('x = a - 0x10;', changes('x = a + 0x10;'))
+
     def test_a_template_bracket_hides_no_relation(self):
         self.assertIn('x = std::min<int>(a, b) >= c;', changes('x = std::min<int>(a, b) < c;'))
         self.assertEqual(changes('std::array<std::array<int, 3>, 4> x;'), set())

@@ -20,6 +20,7 @@ TOKEN = re.compile(r'''
 RELATIONS = {'<': ['<=', '>='], '<=': ['<', '>'], '>': ['>=', '<='], '>=': ['>', '<'], '==': ['!='], '!=': ['==']}
 BINARY = {'+': ['-'], '-': ['+'], '*': ['+'], '/': ['*'], '%': ['*'], '&': ['|'], '|': ['&'], '^': ['|'],
           '<<': ['>>'], '>>': ['<<'], '&&': ['||'], '||': ['&&']}
+ZERO = re.compile(r'(?:0[xXbB])?0+[uUlLzZ]*')
 ASSIGNMENTS = {'+=': ['-='], '-=': ['+='], '*=': ['+='], '&=': ['|='], '|=': ['&='], '^=': ['|='], '<<=': ['>>='],
                '>>=': ['<<=']}
 WORDS = {'true': ['false'], 'false': ['true'], 'min': ['max'], 'max': ['min'], 'break': [''], 'continue': ['']}
@@ -212,6 +213,8 @@ def _changes(source):
             continue  # a fold
         elif source.spaced(i) and (text in RELATIONS or text in BINARY or text in ASSIGNMENTS):
             kind = 'relation' if text in RELATIONS else 'arithmetic' if text in BINARY else 'assignment'
+            if text in ('+', '-', '<<', '>>') and ZERO.fullmatch(tokens[min(i + 1, len(tokens) - 1)].text):
+                continue  # x + 0 is x - 0
             for new in (RELATIONS.get(text) or BINARY.get(text) or ASSIGNMENTS[text]):
                 yield kind, token.start, token.end, new
         elif text in ('++', '--'):
