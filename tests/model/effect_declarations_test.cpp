@@ -35,10 +35,8 @@ TEST(EffectDeclarations, ListsAreThoseOfTheTraits) {
 
 TEST(EffectDeclarations, WhatIsNamedElsewhereIsInTheCatalogue) {
   for (const EffectInfo& info : effect_infos()) {
-    if (!info.replaces.empty()) EXPECT_NE(find_effect(info.replaces), nullptr) << info.name;
-    for (const std::string_view other : info.warms_into) {
-      if (!other.empty()) EXPECT_NE(find_effect(other), nullptr) << info.name;
-    }
+    for (const std::string_view other : {info.replaces, info.warms_into[0], info.warms_into[1]})
+      EXPECT_TRUE(other.empty() || find_effect(other) != nullptr) << info.name << ": " << other;
     if (info.acts_on == ActsOn::position) {
       for (const ParameterInfo& shape : info.shape) EXPECT_NE(shape.values.of_link, nullptr) << info.name;
     }
