@@ -29,10 +29,10 @@ struct MotionScales {
 };
 
 /// A few values of one parameter.
-class Values {
+class ValueList {
  public:
-  constexpr Values() = default;
-  constexpr Values(std::initializer_list<double> values) {
+  constexpr ValueList() = default;
+  constexpr ValueList(std::initializer_list<double> values) {
     for (const double value : values) add(value);
   }
   constexpr void add(double value) { values_[size_++] = value; }
@@ -47,12 +47,12 @@ class Values {
 };
 
 /// An interval of one parameter.
-struct Range {
+struct ShapeRange {
   double from = 0, to = 0;
 };
 
 /// How the best value of a shape parameter is found.
-enum class Search : std::uint8_t {
+enum class ShapeSearch : std::uint8_t {
   refine,    ///< from the best of the values tried, continuously
   list,      ///< one of the values tried
   spectrum,  ///< a wavenumber n whose phi are cos(n q) and sin(n q): from the residual's spectrum over the position
@@ -60,17 +60,17 @@ enum class Search : std::uint8_t {
 
 /// Which values of a shape parameter to try. model/shapes.hpp has the usual ones.
 struct ShapeValues {
-  using List = Values (*)(const MotionScales&);
-  List tried = nullptr;   ///< by `diagnose`; not for Search::spectrum
+  using List = ValueList (*)(const MotionScales&);
+  List tried = nullptr;   ///< by `diagnose`; not for ShapeSearch::spectrum
   List judged = nullptr;  ///< by `excite`, the typical one first
   /// Searched by `identify`; null: it can't fit the effect.
-  Range (*fitted)(const MotionScales&) = nullptr;
-  Search search = Search::refine;
+  ShapeRange (*fitted)(const MotionScales&) = nullptr;
+  ShapeSearch search = ShapeSearch::refine;
   bool seen_by_encoder = false;  ///< a path: what is shorter than the encoder's step does not show
   /// For deflections that a link encoder shows: where the fit begins, then what it tries.
   List of_link = nullptr;
 
-  constexpr bool declared() const { return judged != nullptr && (tried != nullptr || search == Search::spectrum); }
+  constexpr bool declared() const { return judged != nullptr && (tried != nullptr || search == ShapeSearch::spectrum); }
 };
 
 /// One parameter of an effect, as the user sees it (SI, joint side of the gearbox).
@@ -110,25 +110,25 @@ enum class TurnsWithSign : std::uint8_t {
 };
 
 /// A motion that shows effects and tells those apart that name it. Of several in common the one of lowest order counts.
-struct Experiment {
+struct NamedExperiment {
   unsigned order = 0;
   std::string_view text{};
 };
 
 namespace experiments {
-inline constexpr Experiment hopeless{1, "nothing: base parameters hold the rotor, and the torque is the same"};
-inline constexpr Experiment slow_reversals{2, "slow motion through zero velocity, both ways"};
-inline constexpr Experiment wide_range{3, "a wider range of positions"};
-inline constexpr Experiment wide_range_or_baseline{4, "a wider range of positions, or a baseline"};
-inline constexpr Experiment loaded_poses{
+inline constexpr NamedExperiment hopeless{1, "nothing: base parameters hold the rotor, and the torque is the same"};
+inline constexpr NamedExperiment slow_reversals{2, "slow motion through zero velocity, both ways"};
+inline constexpr NamedExperiment wide_range{3, "a wider range of positions"};
+inline constexpr NamedExperiment wide_range_or_baseline{4, "a wider range of positions, or a baseline"};
+inline constexpr NamedExperiment loaded_poses{
     5, "poses in which the joint carries load, moved slowly with and against gravity"};
-inline constexpr Experiment constant_speeds{6, "constant speeds from slow to the limit"};
-inline constexpr Experiment warm_robot{7, "the first motion once more at the end, after the robot warmed up"};
-inline constexpr Experiment load_reversals{8, "motion in which the load reverses; an encoder on the link"};
-inline constexpr Experiment small_reversals{9, "slow reversals of a few milliradians, and of a few degrees"};
-inline constexpr Experiment fast_motion{10, "faster motion beside the slow one; an encoder on the link"};
-inline constexpr Experiment one_at_a_time{11, "joints moved one at a time"};
-inline constexpr Experiment all_poses{12, "other positions, speeds and loads in other combinations"};
+inline constexpr NamedExperiment constant_speeds{6, "constant speeds from slow to the limit"};
+inline constexpr NamedExperiment warm_robot{7, "the first motion once more at the end, after the robot warmed up"};
+inline constexpr NamedExperiment load_reversals{8, "motion in which the load reverses; an encoder on the link"};
+inline constexpr NamedExperiment small_reversals{9, "slow reversals of a few milliradians, and of a few degrees"};
+inline constexpr NamedExperiment fast_motion{10, "faster motion beside the slow one; an encoder on the link"};
+inline constexpr NamedExperiment one_at_a_time{11, "joints moved one at a time"};
+inline constexpr NamedExperiment all_poses{12, "other positions, speeds and loads in other combinations"};
 }  // namespace experiments
 
 /// What every effect declares as `static constexpr EffectTraits traits`. `words` and `experiments` have to be there;
@@ -136,7 +136,7 @@ inline constexpr Experiment all_poses{12, "other positions, speeds and loads in 
 struct EffectTraits {
   std::string_view words;  ///< what it is, in a few plain words
   /// What shows it, the best first. Effects that name the same one are confused with each other until it is done.
-  std::array<Experiment, 6> experiments{};
+  std::array<NamedExperiment, 6> experiments{};
 
   bool nominal = false;         ///< every joint has it: diagnosis starts with it
   bool friction = false;        ///< differs from day to day as friction does
@@ -159,8 +159,8 @@ struct EffectTraits {
   std::array<std::string_view, 2> warms_into{};
 
   constexpr bool drifts() const { return !warms_into[0].empty(); }
-  constexpr bool named_experiment(const Experiment& experiment) const {
-    for (const Experiment& own : experiments) {
+  constexpr bool named_experiment(const NamedExperiment& experiment) const {
+    for (const NamedExperiment& own : experiments) {
       if (own.order == experiment.order && own.text == experiment.text) return !own.text.empty();
     }
     return false;

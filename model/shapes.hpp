@@ -12,14 +12,14 @@
 namespace fxdyn::shapes {
 
 /// `count` values with equal ratios, both ends included.
-inline Values geometric(double from, double to, int count) {
-  Values values;
+inline ValueList geometric(double from, double to, int count) {
+  ValueList values;
   for (int i = 0; i < count; ++i) values.add(from * std::pow(to / from, static_cast<double>(i) / (count - 1)));
   return values;
 }
 
-inline Values shares_of(double scale, std::initializer_list<double> shares) {
-  Values values;
+inline ValueList shares_of(double scale, std::initializer_list<double> shares) {
+  ValueList values;
   for (const double share : shares) values.add(share * scale);
   return values;
 }
@@ -36,7 +36,7 @@ inline constexpr ShapeValues velocity{.tried =
                                           },
                                       .fitted =
                                           [](const MotionScales& s) {
-                                            return Range{3e-3 * s.speed, 0.15 * s.speed};
+                                            return ShapeRange{3e-3 * s.speed, 0.15 * s.speed};
                                           }};
 
 /// A path over which a contact bends before it slides.
@@ -44,20 +44,21 @@ inline constexpr ShapeValues distance{
     .tried = [](const MotionScales& s) { return s.turns ? geometric(2e-4, 2e-2, 10) : geometric(1e-5, 1e-3, 10); },
     .judged =
         [](const MotionScales& s) {
-          return s.turns ? Values{3e-3, 1e-3, 9e-3} : Values{1e-4, 3e-5, 3e-4};
+          return s.turns ? ValueList{3e-3, 1e-3, 9e-3} : ValueList{1e-4, 3e-5, 3e-4};
         },
     .fitted =
         [](const MotionScales& s) {
-          return Range{1e-6 * s.range, 0.1 * s.range};
+          return ShapeRange{1e-6 * s.range, 0.1 * s.range};
         },
     .seen_by_encoder = true};
 
 /// What repeats with the position; 20 rad^-1 is a gear's tooth.
-inline constexpr ShapeValues wavenumber{.judged =
-                                            [](const MotionScales& s) {
-                                              return s.turns ? Values{20.0, 4.0, 100.0} : Values{600.0, 120.0, 3000.0};
-                                            },
-                                        .search = Search::spectrum};
+inline constexpr ShapeValues wavenumber{
+    .judged =
+        [](const MotionScales& s) {
+          return s.turns ? ValueList{20.0, 4.0, 100.0} : ValueList{600.0, 120.0, 3000.0};
+        },
+    .search = ShapeSearch::spectrum};
 
 /// Of warming up.
 inline constexpr ShapeValues time_constant{
@@ -82,20 +83,20 @@ inline constexpr ShapeValues torque_limit{
 inline constexpr ShapeValues delay{.tried = [](const MotionScales& s) { return geometric(5e-4, s.upper, 5); },
                                    .judged =
                                        [](const MotionScales&) {
-                                         return Values{2e-3, 1e-3, 4e-3};
+                                         return ValueList{2e-3, 1e-3, 4e-3};
                                        }};
 
 /// Damping over stiffness of a gear [s].
 inline constexpr ShapeValues relaxation{
     .tried =
         [](const MotionScales&) {
-          return Values{1e-3, 8e-3};
+          return ValueList{1e-3, 8e-3};
         },
     .judged =
         [](const MotionScales&) {
-          return Values{1e-3, 5e-3};
+          return ValueList{1e-3, 5e-3};
         },
-    .of_link = [](const MotionScales&) { return Values{1e-3, 0, 1e-3, 3e-3, 8e-3, 2e-2}; }};
+    .of_link = [](const MotionScales&) { return ValueList{1e-3, 0, 1e-3, 3e-3, 8e-3, 2e-2}; }};
 
 /// A small load that decides which flank of a gear is in touch.
 inline constexpr ShapeValues small_load{
@@ -112,13 +113,13 @@ inline constexpr ShapeValues small_load{
 /// A direction: same or opposite.
 inline constexpr ShapeValues direction{.tried =
                                            [](const MotionScales&) {
-                                             return Values{1, -1};
+                                             return ValueList{1, -1};
                                            },
                                        .judged =
                                            [](const MotionScales&) {
-                                             return Values{1, -1};
+                                             return ValueList{1, -1};
                                            },
-                                       .search = Search::list};
+                                       .search = ShapeSearch::list};
 
 /// Width of a sign of its own.
 inline constexpr ShapeValues width{.tried =
@@ -129,13 +130,13 @@ inline constexpr ShapeValues width{.tried =
                                    .judged = [](const MotionScales& s) { return shares_of(s.speed, {0.01}); },
                                    .fitted =
                                        [](const MotionScales& s) {
-                                         return Range{1e-4 * s.speed, 0.3 * s.speed};
+                                         return ShapeRange{1e-4 * s.speed, 0.3 * s.speed};
                                        }};
 
 /// Any other joint of the robot; its index from 1.
 inline constexpr ShapeValues other_joint{.tried =
                                              [](const MotionScales& s) {
-                                               Values others;
+                                               ValueList others;
                                                for (unsigned k = 0; k < s.joints; ++k) {
                                                  if (k != s.joint) others.add(k + 1);
                                                }
@@ -143,28 +144,28 @@ inline constexpr ShapeValues other_joint{.tried =
                                              },
                                          .judged =
                                              [](const MotionScales& s) {
-                                               Values others;
+                                               ValueList others;
                                                for (unsigned k = s.joint; k-- > 0;) others.add(k + 1);
                                                for (unsigned k = s.joint + 1; k < s.joints; ++k) others.add(k + 1);
                                                return others;
                                              },
-                                         .search = Search::list};
+                                         .search = ShapeSearch::list};
 
 /// The joint before or after; its index from 1. Motors that share a gear turn joints of one type.
 inline constexpr ShapeValues neighbour{.tried =
                                            [](const MotionScales& s) {
-                                             Values mates;
+                                             ValueList mates;
                                              if (s.like_previous) mates.add(s.joint);
                                              if (s.like_next) mates.add(s.joint + 2);
                                              return mates;
                                            },
                                        .judged =
                                            [](const MotionScales& s) {
-                                             Values mates;
+                                             ValueList mates;
                                              if (s.joint > 0) mates.add(s.joint);
                                              if (s.joint + 1 < s.joints) mates.add(s.joint + 2);
                                              return mates;
                                            },
-                                       .search = Search::list};
+                                       .search = ShapeSearch::list};
 
 }  // namespace fxdyn::shapes

@@ -253,7 +253,7 @@ void fit(const Rows& rows, const VectorXd& a, Set& set) {
 }
 
 /// The values of a shape parameter on a link encoder: where a fit begins, then what it tries.
-Values link_values(const ParameterInfo& shape, double largest_load) {
+ValueList link_values(const ParameterInfo& shape, double largest_load) {
   MotionScales scales;
   scales.structural = largest_load;
   return shape.values.of_link(scales);
@@ -280,7 +280,7 @@ void tune(const Rows& rows, const VectorXd& a, Set& set, bool from_grid) {
       std::vector<double> values{0.7 * now, 0.85 * now, 1.18 * now, 1.4 * now};
       const ParameterInfo& info = find_effect(set.parts[p].effect)->shape[0];
       if (round == 0) {
-        const Values grid = link_values(info, largest);
+        const ValueList grid = link_values(info, largest);
         values.assign(grid.begin() + 1, grid.end());
       }
       for (const double value : values) {

@@ -142,7 +142,7 @@ std::vector<std::string_view> joint_effect_names() {
 
 int EffectInfo::refined_shape() const {
   for (std::size_t i = 0; i < shape.size(); ++i) {
-    if (shape[i].values.search != Search::list) return static_cast<int>(i);
+    if (shape[i].values.search != ShapeSearch::list) return static_cast<int>(i);
   }
   return -1;
 }
@@ -171,8 +171,8 @@ std::vector<std::string_view> identified_effects() {
 }
 
 std::string_view telling_experiment(const EffectTraits& a, const EffectTraits& b) {
-  Experiment best;
-  for (const Experiment& own : a.experiments) {
+  NamedExperiment best;
+  for (const NamedExperiment& own : a.experiments) {
     if (b.named_experiment(own) && (best.text.empty() || own.order < best.order)) best = own;
   }
   return best.text;

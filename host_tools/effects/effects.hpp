@@ -24,7 +24,7 @@ struct EffectInfo : EffectTraits {
   /// Tells a rotor from the base parameters: it follows the load without the rotor's own inertia.
   bool separates_rotor() const { return needs_structural; }
   /// Its wavenumber comes from a spectrum.
-  bool of_spectrum() const { return !shape.empty() && shape[0].values.search == Search::spectrum; }
+  bool of_spectrum() const { return !shape.empty() && shape[0].values.search == ShapeSearch::spectrum; }
   /// The shape parameter that is refined continuously; -1: none.
   int refined_shape() const;
 };

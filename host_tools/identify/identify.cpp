@@ -80,7 +80,7 @@ MotionScales motion_scales(const Scales& scales) {
 std::vector<std::vector<double>> further_shapes(const EffectInfo& info, double sign_width) {
   std::vector<std::vector<double>> values;
   for (const ParameterInfo& shape : info.shape.subspan(1)) {
-    const Values listed = shape.values.search == Search::list ? shape.values.judged({}) : Values{sign_width};
+    const ValueList listed = shape.values.search == ShapeSearch::list ? shape.values.judged({}) : ValueList{sign_width};
     values.emplace_back(listed.begin(), listed.end());
   }
   return combinations(values);
@@ -110,7 +110,7 @@ Candidate search_coupling(const Fitter& fitter, std::size_t joint, std::string_v
   // only what comes near being kept is worth a search
   if (best.judgement.rmse > (1 - 0.5 * worth_keeping) * now) return best;
   const auto index = static_cast<std::size_t>(refined);
-  const Range range = info.shape[index].values.fitted(motion_scales(scales));
+  const ShapeRange range = info.shape[index].values.fitted(motion_scales(scales));
   Candidate better = search(fitter, joint, best.design, range.from, range.to,
                             [index](JointFit& d, double value) { d.effects.back().shape[index] = value; });
   return better.judgement.rmse < best.judgement.rmse ? better : best;
@@ -132,7 +132,7 @@ Candidate search_effect(const Fitter& fitter, std::size_t joint, std::string_vie
   design.effects.push_back(fit);
   if (info.shape.empty()) return {design, fitter.held_out_with(joint, design, {0.0})[0]};
   // One shape: why_not_identified() lets no other effects through.
-  const Range range = info.shape[0].values.fitted(motion_scales(scales));
+  const ShapeRange range = info.shape[0].values.fitted(motion_scales(scales));
   const double to = std::min(info.shape[0].upper, range.to);
   return search(fitter, joint, design, range.from, to,
                 [](JointFit& d, double value) { d.effects.back().shape[0] = value; });

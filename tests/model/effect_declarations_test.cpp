@@ -11,7 +11,7 @@
 namespace fxdyn {
 namespace {
 
-std::vector<double> list(const Values& values) { return {values.begin(), values.end()}; }
+std::vector<double> list(const ValueList& values) { return {values.begin(), values.end()}; }
 
 TEST(EffectDeclarations, ListsAreThoseOfTheTraits) {
   EXPECT_EQ(nominal_effects(), (std::vector<std::string>{"viscous", "coulomb", "offset", "rotor_inertia"}));
