@@ -25,25 +25,24 @@
 #include "model/effects/viscous_cubic.hpp"
 #include "model/effects/viscous_quadratic.hpp"
 
+// More effects without a change of this file: a header with `using UserEffects = EffectList<..>;` in namespace fxdyn,
+// named by -DFXDYN_EFFECTS=.. to CMake.
+#ifdef FXDYN_EFFECTS
+#include FXDYN_EFFECTS
+#endif
+
 namespace fxdyn {
 
-template <class... Effects>
-struct EffectList {
-  static constexpr std::size_t size = sizeof...(Effects);
-  /// Calls visit.operator()<E>() for each effect, in order.
-  template <class Visit>
-  static constexpr void for_each(Visit&& visit) {
-    (visit.template operator()<Effects>(), ...);
-  }
-  template <template <class...> class To>
-  using apply = To<Effects...>;
-};
+#ifndef FXDYN_EFFECTS
+using UserEffects = EffectList<>;
+#endif
 
 /// The one list of joint effects: simulator, identifier, exporter and diagnoser walk it.
-using Catalogue =
+using Catalogue = Joined<
     EffectList<Viscous, Coulomb, Offset, RotorInertia, Stribeck, Presliding, AsymmetricFriction, ViscousQuadratic,
                ViscousCubic, LoadFriction, TorqueGain, Ripple, Spring, GravityCompensator, FrictionDrift, Saturation,
-               JointCoupling, Delay, Elasticity, Backlash, Eccentricity, MotorCoupling>;
+               JointCoupling, Delay, Elasticity, Backlash, Eccentricity, MotorCoupling>,
+    UserEffects>;
 
 /// Effects on the rigid body itself: they change its parameters and have no basis.
 using BodyEffects = EffectList<Payload, GravityTilt>;
@@ -53,7 +52,12 @@ template <class... Effects>
 constexpr bool all_are_effects(EffectList<Effects...>) {
   return (Effect<Effects, Real> && ...);
 }
+template <class... Effects>
+constexpr bool all_are_declared(EffectList<Effects...>) {
+  return (Declared<Effects>::value && ...);
+}
 static_assert(all_are_effects(Catalogue{}));
+static_assert(all_are_declared(Catalogue{}) && all_are_declared(BodyEffects{}));
 }  // namespace detail
 
 }  // namespace fxdyn

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <type_traits>
 
+#include "model/effect_traits.hpp"
 #include "model/math.hpp"
 #include "model/numbers.hpp"
 
@@ -17,19 +18,6 @@
 // takes phi as columns.
 
 namespace fxdyn {
-
-/// One parameter of an effect, as the user sees it (SI, joint side of the gearbox).
-struct ParameterInfo {
-  std::string_view name;
-  std::string_view unit;            ///< revolute joint
-  std::string_view unit_prismatic;  ///< prismatic joint
-  double lower, upper;              ///< bounds that fits and scenarios keep
-  /// Linear parameter: the quantity of its phi. Shape: the quantity that the tables store (see stored_shape()).
-  Quantity quantity;
-  std::string_view source;
-};
-
-inline constexpr double unbounded = 1e30;
 
 /// What a joint's effects see in one tick.
 template <class N>
@@ -42,13 +30,6 @@ struct JointInput {
   Torque<N> total{};       ///< structural + the effects before this one; only for effects with `needs_total`
   /// All joints of the robot in chain order, for effects that couple joints (`needs_peers`); q, dq, ddq, sign are set.
   std::span<const JointInput> peers{};
-};
-
-/// What sum(theta phi) of an effect is.
-enum class ActsOn : std::uint8_t {
-  torque,    ///< added to the joint's torque
-  position,  ///< deflection delta between motor and link: the rigid body moves at q - delta
-  body,      ///< no sum: changes the parameters of the rigid body (BodyEffects in catalogue.hpp)
 };
 
 /// What an effect says of itself where it differs from the usual: a torque out of the joint's own motion.
@@ -115,6 +96,48 @@ concept Effect = requires(const JointInput<N>& u, Words<N> words, typename E::te
   { E::stored_shape(std::size_t{}, double{}, double{}) } -> std::same_as<double>;
   E::template basis<N>(u, words, state, saturations, detail::EmitNothing{});
 };
+
+/// What the host has to know of an effect beside its formula. Checked where the catalogue is made.
+template <class E>
+struct Declared {
+  static_assert(
+      requires { E::traits.words; }, "an effect declares `static constexpr EffectTraits traits`");
+  static_assert(!E::traits.words.empty() && !E::traits.experiments[0].text.empty(),
+                "an effect says in plain words what it is, and which experiment shows it");
+  static_assert(
+      [] {
+        for (const ParameterInfo& shape : E::shape) {
+          if (!shape.values.declared()) return false;
+        }
+        return true;
+      }(),
+      "an effect says which values of each shape parameter to try (model/shapes.hpp)");
+  static_assert(needs_total<E> == (E::traits.of_total != OfTotal::nothing),
+                "an effect that needs the total says what it does with it");
+  static_assert(!E::traits.nominal || E::shape.size() == 0, "a nominal effect has no shape");
+  static_assert(
+      !E::traits.drifts() || requires { E::warmth(0.0, 0.0); }, "an effect that drifts has a warmth()");
+  static constexpr bool value = true;
+};
+
+template <class... Effects>
+struct EffectList {
+  static constexpr std::size_t size = sizeof...(Effects);
+  /// Calls visit.operator()<E>() for each effect, in order.
+  template <class Visit>
+  static constexpr void for_each(Visit&& visit) {
+    (visit.template operator()<Effects>(), ...);
+  }
+  template <template <class...> class To>
+  using apply = To<Effects...>;
+};
+
+namespace detail {
+template <class... A, class... B>
+EffectList<A..., B...> join(EffectList<A...>, EffectList<B...>);
+}  // namespace detail
+template <class First, class Second>
+using Joined = decltype(detail::join(First{}, Second{}));
 
 /// Words of one effect in the tables.
 template <class E>

@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# build_image.sh TABLES.hpp OUT_DIR [PRESET]: builds the firmware image with these tables (preset: cortex-m4).
+# build_image.sh TABLES.hpp OUT_DIR [PRESET [EFFECTS.hpp]]: builds the firmware image with these tables (preset: cortex-m4).
+# EFFECTS.hpp as in FXDYN_EFFECTS; without it what build/host was configured with.
 # Leaves OUT_DIR/fxdyn-<board>.elf and OUT_DIR/size.json; the build tree stays in OUT_DIR/build-PRESET for the next time.
 set -euo pipefail
 if [ $# -lt 2 ]; then
-  echo "usage: build_image.sh TABLES.hpp OUT_DIR [cortex-m3|cortex-m4|cortex-m7|cortex-m33]" >&2
+  echo "usage: build_image.sh TABLES.hpp OUT_DIR [cortex-m3|cortex-m4|cortex-m7|cortex-m33 [EFFECTS.hpp]]" >&2
   exit 2
 fi
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -17,11 +18,13 @@ case $preset in cortex-m3 | cortex-m4 | cortex-m7 | cortex-m33) ;; *)
   echo "build_image: no image for '$preset': cortex-m3, cortex-m4, cortex-m7 or cortex-m33" >&2
   exit 2 ;;
 esac
+# those that fxdyn was built with
+effects=${4:-$(sed -n 's/^FXDYN_EFFECTS:FILEPATH=//p' "$root/build/host/CMakeCache.txt" 2>/dev/null || true)}
 rm -f "$out"/fxdyn-*.elf "$out/size.json"
 build=$out/build-$preset
 
 log=$out/build-$preset.log
-(cd "$root" && cmake --preset "$preset" -B "$build" -DFXDYN_TABLES="$tables" && cmake --build "$build" --target fxdyn_image) \
+(cd "$root" && cmake --preset "$preset" -B "$build" -DFXDYN_TABLES="$tables" -DFXDYN_EFFECTS="$effects" && cmake --build "$build" --target fxdyn_image) \
   >"$log" 2>&1 || { cat "$log" >&2; exit 1; }
 
 elf=$(echo "$build"/firmware/fxdyn-*.elf)

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# build_node.sh TABLES.hpp OUT_DIR [linux|cortex-m3|cortex-m4|cortex-m7|stm32g474|netduinoplus2|cortex-r5]: builds the drive node with
+# build_node.sh TABLES.hpp OUT_DIR [linux|cortex-m3|cortex-m4|cortex-m7|stm32g474|netduinoplus2|cortex-r5 [EFFECTS.hpp]]: builds the drive node with
 # these tables. Leaves it in OUT_DIR: fxdyn_node (linux, the default), else node-<board>.elf, .bin and .hex with their size.json.
 set -euo pipefail
 if [ $# -lt 2 ]; then
@@ -18,8 +18,10 @@ case $preset in linux | cortex-m3 | cortex-m4 | cortex-m7 | stm32g474 | netduino
 esac
 target=fxdyn_node configure=$preset
 [ "$preset" != linux ] || { target=fxdyn_linux_node configure=host; }
+# those that fxdyn was built with
+effects=${4:-$(sed -n 's/^FXDYN_EFFECTS:FILEPATH=//p' "$root/build/host/CMakeCache.txt" 2>/dev/null || true)}
 build=$out/build-$preset log=$out/build-$preset.log
-(cd "$root" && cmake --preset "$configure" -B "$build" -DFXDYN_TABLES="$tables" && cmake --build "$build" --target "$target") \
+(cd "$root" && cmake --preset "$configure" -B "$build" -DFXDYN_TABLES="$tables" -DFXDYN_EFFECTS="$effects" && cmake --build "$build" --target "$target") \
   >"$log" 2>&1 || { cat "$log" >&2; exit 1; }
 if [ "$preset" = linux ]; then
   cp "$build/fxdyn_linux_node" "$out/fxdyn_node"

@@ -20,6 +20,14 @@ std::string_view name_of(ActsOn acts_on) {
   return "";
 }
 
+std::vector<std::string_view> confused_with(const EffectInfo& effect) {
+  std::vector<std::string_view> names;
+  for (const EffectInfo& other : effect_infos()) {
+    if (other.name != effect.name && !telling_experiment(effect, other).empty()) names.push_back(other.name);
+  }
+  return names;
+}
+
 void print_effects(bool as_json) {
   nlohmann::json list = nlohmann::json::array();
   for (const EffectInfo& effect : effect_infos()) {
@@ -38,9 +46,14 @@ void print_effects(bool as_json) {
     add(effect.shape, "shape");
     add(effect.linear, "linear");
     list.push_back({{"effect", effect.name},
+                    {"words", effect.words},
                     {"equation", effect.equation},
                     {"acts_on", name_of(effect.acts_on)},
                     {"side", "joint"},
+                    {"nominal", effect.nominal},
+                    {"friction", effect.friction},
+                    {"experiment", effect.experiments[0].text},
+                    {"confused_with", confused_with(effect)},
                     {"parameters", parameters}});
   }
   if (as_json) {
@@ -50,6 +63,8 @@ void print_effects(bool as_json) {
   for (const auto& effect : list) {
     fmt::print("{:<20} {}{}\n", effect["effect"].get<std::string>(), effect["acts_on"] == "torque" ? "tau = " : "",
                effect["equation"].get<std::string>());
+    fmt::print("{:<20}   {}\n{:<20}   shown by: {}\n", "", effect["words"].get<std::string>(), "",
+               effect["experiment"].get<std::string>());
     for (const auto& p : effect["parameters"]) {
       fmt::print("{:<20}   {} [{}] ({})\n", "", p["name"].get<std::string>(), p["unit"].get<std::string>(),
                  p["source"].get<std::string>());

@@ -14,6 +14,7 @@
 #include "host_tools/compare/state_bls.hpp"
 #include "host_tools/effects/broad_learning_types.hpp"
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/identify/structure.hpp"
 #include "host_tools/pipeline/pipeline.hpp"

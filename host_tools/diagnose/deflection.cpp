@@ -9,6 +9,7 @@
 #include "host_tools/diagnose/autoregression.hpp"
 #include "host_tools/diagnose/linearised.hpp"
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/parallel.hpp"
@@ -121,7 +122,7 @@ struct Uncertain {
 
 /// Half of what a rotor can have at most, 0 where the base parameters have none.
 double hidden_rotor(const Rows& rows, const IdentifiedModel& model) {
-  if (model.joints[rows.joint].find(RotorInertia::name) != nullptr) return 0;
+  if (rotor_of(model.joints[rows.joint]) != nullptr) return 0;
   if (!rotor_inertia_is_absorbed(to_dh(model.robot), base_of(model), static_cast<Index>(rows.joint))) return 0;
   std::vector<const MatrixXd*> q;
   for (const ProcessedLog* log : rows.logs) q.push_back(&log->q);
@@ -243,17 +244,30 @@ void fit(const Rows& rows, const VectorXd& a, Set& set) {
                2 * std::log(part.shape.empty() ? 1.0 : 4.0);
     for (const ParameterInfo& p : info.linear) possible &= set.theta[at++] >= p.lower;
     // A gap whose flanks no load reaches is in proportion to it: an elasticity.
-    if (part.effect == Backlash::name) possible &= part.shape[0] <= largest_load(rows);
+    for (std::size_t i = 0; i < info.shape.size(); ++i) {
+      if (info.shape[i].quantity == Quantity::inverse_torque) possible &= part.shape[i] <= largest_load(rows);
+    }
   }
   set.likelihood = -n * std::log(std::max(set.square, 1e-300) / n) - penalty;
   set.score = possible ? set.likelihood : -1e300;
 }
 
-/// All three, with middling shapes.
+/// The values of a shape parameter on a link encoder: where a fit begins, then what it tries.
+ValueList link_values(const ParameterInfo& shape, double largest_load) {
+  MotionScales scales;
+  scales.structural = largest_load;
+  return shape.values.of_link(scales);
+}
+
+/// All effects on the position, with middling shapes.
 std::vector<Part> all_parts(double largest) {
-  return {{std::string(Elasticity::name), {1e-3}},
-          {std::string(Backlash::name), {0.03 * largest}},
-          {std::string(Eccentricity::name), {}}};
+  std::vector<Part> parts;
+  for (const EffectInfo& info : effect_infos()) {
+    if (info.acts_on != ActsOn::position) continue;
+    parts.push_back({std::string(info.name), {}});
+    for (const ParameterInfo& shape : info.shape) parts.back().shape.push_back(link_values(shape, largest)[0]);
+  }
+  return parts;
 }
 
 /// Shapes one after the other: over a grid, then around.
@@ -264,12 +278,13 @@ void tune(const Rows& rows, const VectorXd& a, Set& set, bool from_grid) {
       if (set.parts[p].shape.empty()) continue;
       const double now = set.parts[p].shape[0];
       std::vector<double> values{0.7 * now, 0.85 * now, 1.18 * now, 1.4 * now};
-      if (round == 0 && set.parts[p].effect == Backlash::name)
-        values = {0.01 * largest, 0.025 * largest, 0.06 * largest, 0.15 * largest};
-      if (round == 0 && set.parts[p].effect == Elasticity::name) values = {0, 1e-3, 3e-3, 8e-3, 2e-2};
+      const ParameterInfo& info = find_effect(set.parts[p].effect)->shape[0];
+      if (round == 0) {
+        const ValueList grid = link_values(info, largest);
+        values.assign(grid.begin() + 1, grid.end());
+      }
       for (const double value : values) {
         Set other = set;
-        const ParameterInfo& info = find_effect(set.parts[p].effect)->shape[0];
         other.parts[p].shape[0] = std::clamp(value, info.lower, info.upper);
         fit(rows, a, other);
         if (other.score > set.score) set = std::move(other);

@@ -4,7 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/forward.hpp"
+#include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/regression/dataset.hpp"
 
 namespace fxdyn::diagnosis {

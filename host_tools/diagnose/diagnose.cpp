@@ -13,9 +13,11 @@
 #include "host_tools/diagnose/sessions.hpp"
 #include "host_tools/diagnose/verdict.hpp"
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/error.hpp"
+#include "model/effects/payload.hpp"
 
 namespace fxdyn {
 namespace {
@@ -26,7 +28,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 IdentifiedModel nominal_model(Project project, GateData& data, bool healthy, Progress& progress) {
-  if (!project.identify.effects) project.identify.effects = {"viscous", "coulomb", "offset", "rotor_inertia"};
+  if (!project.identify.effects) project.identify.effects = nominal_effects();
   project.identify.physical = false;
   project.identify.essential = false;
   if (project.identify.method == "rls") project.identify.method = "wls";
@@ -40,7 +42,8 @@ IdentifiedModel nominal_model(Project project, GateData& data, bool healthy, Pro
   IdentifiedModel model = finish_model(*fitter, project, data).model;
   // What bends is found here, with its rivals.
   for (JointFit& joint : model.joints) {
-    std::erase_if(joint.effects, [](const EffectFit& fit) { return fit.effect == Elasticity::name; });
+    std::erase_if(joint.effects,
+                  [](const EffectFit& fit) { return find_effect(fit.effect)->acts_on == ActsOn::position; });
     joint.flexible.reset();
   }
   return model;
@@ -224,7 +227,7 @@ class Work {
   /// The rotor that a link encoder told from the link.
   static void add_rotor(Models& models, const DeflectionEffect& effect) {
     constexpr double share = 0.1;  // of it, standard deviation
-    if (effect.rotor <= 0 || models.current.joints[effect.joint].find(RotorInertia::name) != nullptr) return;
+    if (effect.rotor <= 0 || rotor_of(models.current.joints[effect.joint]) != nullptr) return;
     const IdentifiedModel& model = models.current;
     Rotor rotor{effect.joint, rotor_in_base(to_dh(model.robot), base_of(model), static_cast<Index>(effect.joint)),
                 effect.rotor, share * effect.rotor};
@@ -267,8 +270,9 @@ class Work {
       const bool encoded = std::all_of(data_.logs.begin(), data_.logs.end(),
                                        [&](const ProcessedLog& log) { return linked(log) && log.has_link[j]; });
       if (!encoded && !judged[j]) continue;
-      for (const std::string_view effect : {Elasticity::name, Backlash::name, Eccentricity::name})
-        never_.push_back({std::string(effect), j, {}});
+      for (const EffectInfo& info : effect_infos()) {
+        if (info.acts_on == ActsOn::position) never_.push_back({std::string(info.name), j, {}});
+      }
     }
   }
 

@@ -1,10 +1,7 @@
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <numbers>
-#include <stdexcept>
 
 #include "host_tools/diagnose/search.hpp"
 #include "host_tools/effects/effects.hpp"
@@ -18,22 +15,17 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// A session must last that long for drift to be looked for.
-constexpr double shortest_drift_s = 20;
-
-std::vector<double> geometric(double from, double to, int count) {
-  std::vector<double> values;
-  for (int i = 0; i < count; ++i) values.push_back(from * std::pow(to / from, static_cast<double>(i) / (count - 1)));
-  return values;
-}
-
 /// How a joint moves over the logs that fit.
-struct Scales {
-  double speed = 0, range = 0, torque = 0, structural = 0, seconds = 0;
-};
-
-Scales scales_of(const Linearised& at, std::size_t joint) {
-  Scales s;
+MotionScales scales_of(const Linearised& at, std::size_t joint) {
+  MotionScales s;
+  const std::vector<Joint>& joints = at.models().current.robot.joints;
+  const auto alike = [&](std::size_t other) { return joints[other].type == joints[joint].type; };
+  s.turns = joints[joint].type == JointType::revolute;
+  s.joint = static_cast<unsigned>(joint);
+  s.joints = static_cast<unsigned>(at.joints());
+  s.like_previous = joint > 0 && alike(joint - 1);
+  s.like_next = joint + 1 < joints.size() && alike(joint + 1);
+  s.sign_width = at.models().current.joints[joint].sign_width;
   const auto j = static_cast<Index>(joint);
   double lower = 1e300, upper = -1e300, last = 0;
   for (std::size_t l = 0; l < at.logs().size(); ++l) {
@@ -54,48 +46,13 @@ Scales scales_of(const Linearised& at, std::size_t joint) {
 }
 
 /// Shapes to try for an effect: one list a shape parameter.
-std::vector<std::vector<double>> grids(const EffectInfo& info, std::size_t joint, const Linearised& at,
-                                       const Scales& s) {
-  const bool turns = at.models().current.robot.joints[joint].type == JointType::revolute;
-  const std::size_t n = at.joints();
-  const double width = at.models().current.joints[joint].sign_width;
+std::vector<std::vector<double>> grids(const EffectInfo& info, const Linearised& at, MotionScales s) {
   std::vector<std::vector<double>> out;
   for (const ParameterInfo& shape : info.shape) {
-    std::vector<double> values;
-    const auto [least, most] = shape_limits(at.models(), joint, shape);
-    if (shape.name == "velocity") {
-      // Narrower than the sign itself is the sign; wider is viscous friction.
-      const double from = std::max(3e-3 * s.speed, 1.5 * width);
-      values = geometric(std::min(from, 0.1 * s.speed), 0.2 * s.speed, 9);
-    } else if (shape.name == "distance") {
-      values = turns ? geometric(2e-4, 2e-2, 10) : geometric(1e-5, 1e-3, 10);
-    } else if (shape.name == "time_constant") {
-      values = geometric(0.1 * s.seconds, 4 * s.seconds, 5);
-    } else if (shape.name == "limit") {
-      for (const double share : {0.45, 0.55, 0.63, 0.7, 0.76, 0.82, 0.87, 0.91, 0.95})
-        values.push_back(share * s.torque);
-    } else if (shape.name == "time") {
-      values = geometric(5e-4, std::min(0.03, most), 5);
-    } else if (shape.name == "relaxation") {
-      values = {1e-3, 8e-3};
-    } else if (shape.name == "torque_scale") {
-      values = geometric(0.015 * s.structural, 0.25 * s.structural, 4);
-    } else if (shape.name == "ratio") {
-      values = {1, -1};
-    } else if (shape.name == "width") {
-      values = geometric(std::max(0.3 * width, 1e-3 * s.speed), std::max(3 * width, 0.03 * s.speed), 3);
-    } else if (shape.name == "joint") {
-      for (std::size_t k = 0; k < n; ++k) {
-        // Motors that share a gear turn joints of one kind that follow one another.
-        const auto& joints = at.models().current.robot.joints;
-        const bool mates = (k + 1 == joint || k == joint + 1) && joints[k].type == joints[joint].type;
-        if (k != joint && (info.name != MotorCoupling::name || mates)) values.push_back(static_cast<double>(k + 1));
-      }
-    } else {
-      throw std::logic_error(fmt::format("no values to try for shape '{}' of effect '{}'", shape.name, info.name));
-    }
-    for (double& value : values) value = std::clamp(value, least, most);
-    out.push_back(std::move(values));
+    const auto [least, most] = shape_limits(at.models(), s.joint, info, shape);
+    s.upper = most;
+    out.emplace_back();
+    for (const double value : shape.values.tried(s)) out.back().push_back(std::clamp(value, least, most));
   }
   return out;
 }
@@ -103,24 +60,14 @@ std::vector<std::vector<double>> grids(const EffectInfo& info, std::size_t joint
 /// A rotor that an effect of the gear's load would tell from the base parameters, which have it; null: none.
 std::shared_ptr<const Rotor> hidden_rotor(const Linearised& at, const DhChain& chain, const BaseSet& base,
                                           std::size_t joint) {
-  if (at.models().current.joints[joint].find(RotorInertia::name) != nullptr) return nullptr;
+  if (rotor_of(at.models().current.joints[joint]) != nullptr) return nullptr;
   Rotor rotor{joint, rotor_in_base(chain, base, static_cast<Index>(joint))};
   return rotor.in_base.size() > 0 ? std::make_shared<const Rotor>(std::move(rotor)) : nullptr;
 }
 
-bool is_nominal(std::string_view effect) {
-  return effect == Viscous::name || effect == Coulomb::name || effect == Offset::name || effect == RotorInertia::name;
-}
-
 }  // namespace
 
-int searched_shape(const EffectCandidate& candidate) {
-  const EffectInfo& info = *find_effect(candidate.effect);
-  for (std::size_t i = 0; i < info.shape.size(); ++i) {
-    if (info.shape[i].name != "joint" && info.shape[i].name != "ratio") return static_cast<int>(i);
-  }
-  return -1;
-}
+int searched_shape(const EffectCandidate& candidate) { return find_effect(candidate.effect)->refined_shape(); }
 
 std::vector<Group> dictionary(const Linearised& at, const std::vector<EffectCandidate>& skip) {
   std::vector<Group> out;
@@ -137,44 +84,31 @@ std::vector<Group> dictionary(const Linearised& at, const std::vector<EffectCand
     if (rotors[j]) inertia[j] = least_inertia(at.models().current, j, positions);
   }
   for (const EffectInfo& info : effect_infos()) {
-    if (is_nominal(info.name) || info.name == Ripple::name) continue;
+    if (info.nominal || info.of_spectrum()) continue;
     if (info.needs_peers && n < 2) continue;
     for (std::size_t j = 0; j < (info.acts_on == ActsOn::body ? 1 : n); ++j) {
       const bool skipped = std::any_of(skip.begin(), skip.end(), [&](const EffectCandidate& c) {
         return c.effect == info.name && (info.acts_on == ActsOn::body || c.joint == j);
       });
       if (skipped) continue;
-      // A balancer's force, an encoder's once a turn: over the angle of a joint that turns.
-      const bool of_angle = info.name == GravityCompensator::name || info.name == Eccentricity::name;
-      if (of_angle && robot.joints[j].type != JointType::revolute) continue;
-      const Scales s = scales_of(at, j);
-      // Nothing warms up in a few seconds.
-      if (info.name == FrictionDrift::name && s.seconds < shortest_drift_s) continue;
-      std::vector<std::vector<double>> shapes{{}};
-      double continuous = 0;
-      for (const auto& values : grids(info, j, at, s)) {
-        std::vector<std::vector<double>> more;
-        for (const double value : values) {
-          for (std::vector<double> before : shapes) {
-            before.push_back(value);
-            more.push_back(std::move(before));
-          }
-        }
-        shapes = std::move(more);
-      }
-      const int searched = searched_shape({std::string(info.name), j, {}});
-      if (searched >= 0)
-        continuous = static_cast<double>(grids(info, j, at, s)[static_cast<std::size_t>(searched)].size());
+      const MotionScales s = scales_of(at, j);
+      if (info.needs_revolute && !s.turns) continue;
+      if (s.seconds < info.shortest_session_s) continue;
+      const auto values = grids(info, at, s);
+      const auto shapes = combinations(values);
+      const int searched = info.refined_shape();
+      const double continuous =
+          searched >= 0 ? static_cast<double>(values[static_cast<std::size_t>(searched)].size()) : 0;
       for (const auto& shape : shapes) {  // none where the joint has no mate
         Group group;
         group.candidate = {std::string(info.name), j, shape};
         group.on_body = info.acts_on == ActsOn::body;
         // A share that is 1 by definition is not free.
-        group.nonlinear = (searched >= 0) - (info.linear[0].name == "share");
+        group.nonlinear = (searched >= 0) - info.share;
         group.log_grid = std::log(std::max(
             1.0, static_cast<double>(shapes.size()) / std::max(1.0, continuous) * std::max(1.0, 0.5 * continuous)));
         for (const ParameterInfo& p : info.linear) group.lower.push_back(p.lower);
-        if (info.needs_structural) group.rotor = rotors[j];
+        if (info.separates_rotor()) group.rotor = rotors[j];
         out.push_back(group);
         if (!group.rotor || inertia[j] == 0) continue;
         // Refined once it is among the best; a column of an effect with two shapes costs more tries.
@@ -193,8 +127,10 @@ std::vector<Group> dictionary(const Linearised& at, const std::vector<EffectCand
 }
 
 std::vector<Group> ripples(const Linearised& at, std::size_t joint, const VectorXd& residual, std::size_t most) {
-  const Scales s = scales_of(at, joint);
-  if (!(s.range > 0)) return {};
+  const MotionScales s = scales_of(at, joint);
+  const auto& infos = effect_infos();
+  const auto info = std::find_if(infos.begin(), infos.end(), [](const EffectInfo& one) { return one.of_spectrum(); });
+  if (!(s.range > 0) || info == infos.end()) return {};
   const VectorXd& a = at.whitening()[joint];
   const auto j = static_cast<Index>(joint);
   const double fc = at.logs().front().log.filter.torque_cutoff_hz;
@@ -238,8 +174,7 @@ std::vector<Group> ripples(const Linearised& at, std::size_t joint, const Vector
     return 0.5 * sum / static_cast<double>(bins) * static_cast<double>(speed.size());
   };
   const double cell = 2 * std::numbers::pi / s.range, step = cell / 4;
-  const double lowest =
-      std::max(find_effect(Ripple::name)->shape[0].lower, std::max(0.6 * cell, 1.3 * std::min(1.0, 6.0 / s.range)));
+  const double lowest = std::max(info->shape[0].lower, std::max(0.6 * cell, 1.3 * std::min(1.0, 6.0 / s.range)));
   const double floor = 2e-3 * power(lowest);
   constexpr std::size_t most_wavenumbers = 2400;
   std::vector<double> n, p;
@@ -271,7 +206,7 @@ std::vector<Group> ripples(const Linearised& at, std::size_t joint, const Vector
   std::vector<Group> out;
   for (const std::size_t i : peaks) {
     Group group;
-    group.candidate = {std::string(Ripple::name), joint, {n[i]}};
+    group.candidate = {std::string(info->name), joint, {n[i]}};
     group.nonlinear = 1;
     group.log_grid = std::log(std::max(1.0, static_cast<double>(p.size()) / 4));
     group.lower = {-unbounded, -unbounded};

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "host_tools/diagnose/forward.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/regression/metrics.hpp"
 #include "host_tools/support/error.hpp"

@@ -99,7 +99,7 @@ Outcome explore(Models models, const std::vector<SessionLog>& logs, const Search
     Linearised at(models, logs, whitening);
     std::vector<EffectCandidate> skip = never;
     for (const std::size_t g : in_model(at)) skip.push_back(at.groups()[g].candidate);
-    std::erase_if(skip, [](const EffectCandidate& c) { return c.effect == JointCoupling::name; });
+    std::erase_if(skip, [](const EffectCandidate& c) { return find_effect(c.effect)->several; });
     at.add_all(dictionary(at, skip));
     progress.step();
     Search search(at, settings);
@@ -129,7 +129,7 @@ Outcome explore(Models models, const std::vector<SessionLog>& logs, const Search
     bool lost = false;
     for (std::size_t j = 0; j < models.current.joints.size(); ++j) {
       // A rotor that does not show is none.
-      const EffectFit* rotor = models.current.joints[j].find(RotorInertia::name);
+      const EffectFit* rotor = rotor_of(models.current.joints[j]);
       if (rotor != nullptr && rotor->linear[0] <= 0) lost |= forget_rotor(models, ids, j);
     }
     if (lost) refit(models, logs, at.whitening(), 2);

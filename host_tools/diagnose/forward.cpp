@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/forward/forward.hpp"
 #include "host_tools/simulate/closed_loop.hpp"
 #include "host_tools/support/error.hpp"

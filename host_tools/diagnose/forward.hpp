@@ -3,6 +3,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <vector>
 
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/regression/dataset.hpp"
 
 namespace fxdyn {

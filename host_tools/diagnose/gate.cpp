@@ -7,7 +7,9 @@
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/parallel.hpp"
+#include "model/effects/payload.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
@@ -153,7 +155,7 @@ void choose_time_constants(Outcome& outcome, const std::vector<SessionLog>& logs
   bool drifted = false;
   for (std::size_t j = 0; j < outcome.models.current.joints.size(); ++j) {
     for (EffectFit& fit : outcome.models.current.joints[j].effects) {
-      if (fit.effect != FrictionDrift::name || !fit.named) continue;
+      if (!drifts(fit.effect) || !fit.named) continue;
       const double found = fit.shape[0];
       double best = found, least = 1e300;
       for (const double factor : {1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 2.0}) {

@@ -10,6 +10,7 @@
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/random.hpp"
+#include "model/effects/presliding.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {

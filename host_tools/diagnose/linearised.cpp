@@ -8,9 +8,14 @@
 #include "host_tools/diagnose/lack_of_fit.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/parallel.hpp"
+#include "model/effects/coulomb.hpp"
+#include "model/effects/offset.hpp"
+#include "model/effects/payload.hpp"
+#include "model/effects/rotor_inertia.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
@@ -170,14 +175,14 @@ void Linearised::make_blocks() {
   }
 }
 
-std::pair<double, double> shape_limits(const Models& models, std::size_t joint, const ParameterInfo& shape) {
-  if (shape.name == "time") return {shape.lower, std::min(shape.upper, Delay::largest * models.smallest_step_s)};
+std::pair<double, double> shape_limits(const Models& models, std::size_t joint, const EffectInfo& info,
+                                       const ParameterInfo& shape) {
   const FilterFit& filter = models.current.filter;
-  if (shape.name == "distance" && joint < filter.position_noise.size()) {
+  if (shape.values.seen_by_encoder && joint < filter.position_noise.size()) {
     const double step = std::max(filter.encoder_step[joint], std::sqrt(12.0) * filter.position_noise[joint]);
     return {std::clamp(step, shape.lower, 0.1 * shape.upper), shape.upper};
   }
-  return {shape.lower, shape.upper};
+  return {shape.lower, upper_bound(info, shape, models.smallest_step_s)};
 }
 
 void Linearised::make_unknowns() {
@@ -222,9 +227,8 @@ void Linearised::make_unknowns() {
         u.change = false;
         u.prior_std = 0;
         u.value = common.joints[j].effects[before].linear[u.index];
-        const auto rotor = std::find_if(models_.rotors.begin(), models_.rotors.end(), [&](const Rotor& r) {
-          return r.joint == j && fit.effect == RotorInertia::name;
-        });
+        const auto rotor = std::find_if(models_.rotors.begin(), models_.rotors.end(),
+                                        [&](const Rotor& r) { return r.joint == j && in_base(fit.effect); });
         if (rotor != models_.rotors.end()) {
           // Where the load is inertia alone nothing tells them apart.
           u.kind = Unknown::Kind::rotor;
@@ -235,7 +239,7 @@ void Linearised::make_unknowns() {
         }
         unknowns_.push_back(u);
         u.prior_std = 0;
-        if (!two || fit.effect == RotorInertia::name) continue;
+        if (!two || in_base(fit.effect)) continue;
         u.change = true;
         // Of motions of unit size: a coefficient's own scale.
         double scale = friction_change * std::fabs(u.value);
@@ -250,7 +254,7 @@ void Linearised::make_unknowns() {
       u.value = 0;
       u.kind = Unknown::Kind::shape;
       for (u.index = 0; u.index < info.shape.size(); ++u.index) {
-        std::tie(u.lower, u.upper) = shape_limits(models_, j, info.shape[u.index]);
+        std::tie(u.lower, u.upper) = shape_limits(models_, j, info, info.shape[u.index]);
         if (is_shape_free(info, u.index)) unknowns_.push_back(u);
       }
     }
@@ -284,7 +288,7 @@ void Linearised::make_unknowns() {
     u.value = u.prior = u.prior_std = 0;
     for (u.index = 0; u.index < info.shape.size(); ++u.index) {
       if (!is_shape_free(info, u.index)) continue;
-      std::tie(u.lower, u.upper) = shape_limits(models_, j, info.shape[u.index]);
+      std::tie(u.lower, u.upper) = shape_limits(models_, j, info, info.shape[u.index]);
       unknowns_.push_back(u);
       ++group.nonlinear;
       group.lower.push_back(-1e300);
@@ -335,7 +339,7 @@ MatrixXd Linearised::follow(std::size_t log, std::size_t joint, MatrixXd columns
   const JointFit& fit = (entry.healthy ? models_.healthy : models_.current).joints[joint];
   for (const EffectFit* effect : in_order(fit, true)) {
     const double share = effect->linear[0];
-    if (effect->effect == Saturation::name) {
+    if (find_effect(effect->effect)->of_total == OfTotal::clips) {
       const auto torque = robot_[log]->torque().col(static_cast<Index>(joint)).array().abs();
       const Eigen::ArrayXd pass =
           (torque < effect->shape[0] * (1 - 1e-9)).select(Eigen::ArrayXd::Ones(torque.size()), 1 - share);
@@ -357,12 +361,12 @@ EffectColumns Linearised::full_rate(std::size_t log, const EffectCandidate& cand
   EffectColumns out;
   out.joints.resize(joints());
   out.joints[candidate.joint] = of.phi(candidate);
-  if (candidate.effect == FrictionDrift::name && (*logs_)[log].age_s > 0) {
+  if (info.drifts() && (*logs_)[log].age_s > 0) {
     // w(t + age) = w(t) + (1 - w(t)) w(age)
     const double w = -std::expm1(-(*logs_)[log].age_s / candidate.shape[0]);
     MatrixXd warm(out.joints[candidate.joint].rows(), 2);
-    warm << of.phi({std::string(Coulomb::name), candidate.joint, {}}),
-        of.phi({std::string(Viscous::name), candidate.joint, {}});
+    warm << of.phi({std::string(info.warms_into[0]), candidate.joint, {}}),
+        of.phi({std::string(info.warms_into[1]), candidate.joint, {}});
     out.joints[candidate.joint] = (1 - w) * out.joints[candidate.joint] + w * warm;
   }
   out.joints[candidate.joint] = follow(log, candidate.joint, std::move(out.joints[candidate.joint]));
@@ -413,8 +417,11 @@ VectorXd Linearised::doubt(std::size_t log, std::size_t joint, double sigma) con
   const double width = fit.sign_width, slow = cutoff * step;
   // All friction that turns with the sign, some of it in proportion to the load.
   double amplitude = std::fabs(coulomb->linear[0]), of_load = 0;
-  if (const EffectFit* stribeck = fit.find(Stribeck::name)) amplitude += std::fabs(stribeck->linear[0]);
-  if (const EffectFit* load = fit.find(LoadFriction::name)) of_load = std::fabs(load->linear[0]);
+  for (const EffectInfo& info : effect_infos()) {
+    const EffectFit* more = info.nominal ? nullptr : fit.find(info.name);
+    if (more == nullptr || info.turns_with_sign == TurnsWithSign::no) continue;
+    (info.turns_with_sign == TurnsWithSign::load ? of_load : amplitude) += std::fabs(more->linear[0]);
+  }
   VectorXd uncertain(l.samples());
   Index still = 0;  // samples so far
   const auto come_loose = [&](Index at) {
@@ -577,7 +584,7 @@ void Linearised::make_rows() {
           columns[u.joint] =
               (full_rate(l, more).joints[u.joint] - full_rate(l, less).joints[u.joint]) * theta / (2 * difference);
         }
-        if (fit.effect == FrictionDrift::name && u.kind == Unknown::Kind::linear) {
+        if (drifts(fit.effect) && u.kind == Unknown::Kind::linear) {
           // predict() starts cold
           const VectorXd cold = robot_[l]->phi({fit.effect, u.joint, fit.shape}).col(static_cast<Index>(u.index));
           predicted.col(static_cast<Index>(u.joint)) += u.value * (columns[u.joint] - cold);
@@ -1008,7 +1015,7 @@ BaseSet base_of(const IdentifiedModel& model) {
   return base;
 }
 
-bool tells_rotor(std::string_view effect) { return find_effect(effect)->needs_structural; }
+bool tells_rotor(std::string_view effect) { return find_effect(effect)->separates_rotor(); }
 
 void take_from_base(IdentifiedModel& model, const VectorXd& rotor_in_base, double inertia) {
   for (std::size_t k = 0; k < model.base.size(); ++k)

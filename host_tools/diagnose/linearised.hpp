@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/effects/robot_columns.hpp"
 #include "host_tools/regression/dataset.hpp"
 #include "host_tools/regression/regressor.hpp"
@@ -271,7 +273,8 @@ class Linearised {
 
 /// What a shape parameter may be at least and at most, as far as these logs can tell: a delay is so many steps of the
 /// finest log, and what happens within a step of the encoder does not show.
-std::pair<double, double> shape_limits(const Models& models, std::size_t joint, const ParameterInfo& shape);
+std::pair<double, double> shape_limits(const Models& models, std::size_t joint, const EffectInfo& info,
+                                       const ParameterInfo& shape);
 
 /// The base parameters of a model as a set of columns; its grouping is not there.
 BaseSet base_of(const IdentifiedModel& model);

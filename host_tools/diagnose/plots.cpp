@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/page/plot.hpp"
 #include "host_tools/report/diagnosis_section.hpp"
 #include "host_tools/signals/spectrum.hpp"

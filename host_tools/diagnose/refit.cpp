@@ -5,7 +5,10 @@
 #include <memory>
 
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/solver.hpp"
+#include "model/effects/payload.hpp"
+#include "model/effects/rotor_inertia.hpp"
 
 namespace fxdyn::diagnosis {
 
@@ -98,7 +101,7 @@ EffectId name(Models& models, const Group& group, const VectorXd& theta) {
     const ParameterInfo& p = info.linear[static_cast<std::size_t>(i)];
     fit.linear.push_back(fit.effect == Payload::name ? theta[i] : std::clamp(theta[i], p.lower, p.upper));
   }
-  if (info.linear[0].name == "share") fit.linear[0] = 1;
+  if (info.share) fit.linear[0] = 1;
   if (fit.effect == Payload::name) {
     fit.linear[0] = std::max(fit.linear[0], least_mass);
     for (std::size_t i = 1; i < fit.linear.size(); ++i)
@@ -109,7 +112,7 @@ EffectId name(Models& models, const Group& group, const VectorXd& theta) {
   effects.push_back(std::move(fit));
   const EffectId id{group.on_body, joint, effects.size() - 1};
   const JointFit& of = models.current.joints[joint];
-  if (group.rotor && of.find(RotorInertia::name) == nullptr) {
+  if (group.rotor && rotor_of(of) == nullptr) {
     bring_rotor(models, *group.rotor, group.rotor_inertia);
   }
   return id;
@@ -139,7 +142,7 @@ bool forget_rotor(Models& models, std::vector<EffectId>& ids, std::size_t joint)
   const auto it =
       std::find_if(models.rotors.begin(), models.rotors.end(), [&](const Rotor& r) { return r.joint == joint; });
   if (it == models.rotors.end()) return false;
-  const auto is_rotor = [](const EffectFit& fit) { return fit.effect == RotorInertia::name; };
+  const auto is_rotor = [](const EffectFit& fit) { return in_base(fit.effect); };
   const auto& effects = models.current.joints[joint].effects;
   const auto at = std::find_if(effects.begin(), effects.end(), is_rotor);
   // The base parameters have it back.

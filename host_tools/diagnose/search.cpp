@@ -86,7 +86,7 @@ bool is_share(const Group& group) {
   return !group.in_model && find_effect(group.candidate.effect)->linear[0].name == "share";
 }
 
-bool several_allowed(const std::string& effect) { return effect == Ripple::name || effect == JointCoupling::name; }
+bool of_spectrum(const Group& group) { return find_effect(group.candidate.effect)->of_spectrum(); }
 
 }  // namespace
 
@@ -141,19 +141,17 @@ bool Search::allowed(const Choice& state, std::size_t g) const {
     if (o.on_body) ++robot;
     if (!o.on_body && o.candidate.joint == group.candidate.joint) ++here;
     // Both have dq_k: together they are two large torques that cancel.
-    const auto couples = [](const Group& one) {
-      return one.candidate.effect == JointCoupling::name || one.candidate.effect == MotorCoupling::name;
-    };
+    const auto couples = [](const Group& one) { return find_effect(one.candidate.effect)->needs_peers; };
     if (couples(group) && couples(o) && o.candidate.joint == group.candidate.joint &&
         o.candidate.shape[0] == group.candidate.shape[0])
       return false;
     if (o.on_body != group.on_body || o.candidate.effect != group.candidate.effect) continue;
     if (!group.on_body && o.candidate.joint != group.candidate.joint) continue;
-    if (!several_allowed(group.candidate.effect)) return false;
+    if (!find_effect(group.candidate.effect)->several) return false;
     // The same ripple or coupling again.
     const double a = o.candidate.shape[0], b = group.candidate.shape[0];
-    if (std::fabs(a - b) < 0.1 * std::max(a, b) || o.candidate.effect != Ripple::name) {
-      if (o.candidate.effect == Ripple::name || a == b) return false;
+    if (std::fabs(a - b) < 0.1 * std::max(a, b) || !of_spectrum(o)) {
+      if (of_spectrum(o) || a == b) return false;
     }
   }
   return group.on_body ? robot < settings_.robot_effects : here < settings_.max_effects;
@@ -266,8 +264,7 @@ std::vector<Search::Scored> Search::score_all(const Choice& state, bool with_thr
       VectorXd most = VectorXd::Constant(shifts, -30.0);
       for (std::size_t g = 0; g < at_.groups().size(); ++g) {
         const Group& group = at_.groups()[g];
-        if (usable[g] == 0 || group.on_body || group.candidate.joint != j || group.candidate.effect == Ripple::name)
-          continue;
+        if (usable[g] == 0 || group.on_body || group.candidate.joint != j || of_spectrum(group)) continue;
         const Index local = rows.local[static_cast<std::size_t>(group.first)];
         if (local < 0) continue;
         const MatrixXd b = products.middleRows(local, group.count) -
@@ -359,9 +356,9 @@ std::size_t Search::refine(const Choice& state, std::size_t g) {
   if (searched >= 0) {
     const auto index = static_cast<std::size_t>(searched);
     const ParameterInfo& shape = info.shape[index];
-    const auto [least, most] = shape_limits(at_.models(), start.candidate.joint, shape);
+    const auto [least, most] = shape_limits(at_.models(), start.candidate.joint, info, shape);
     double ratio = 1.5;
-    if (start.candidate.effect == Ripple::name) {
+    if (of_spectrum(start)) {
       const auto j = static_cast<Index>(start.candidate.joint);
       double range = 1e-9;
       for (std::size_t l = 0; l < at_.logs().size(); ++l) range = std::max(range, at_.logs()[l].log.q_range[j]);

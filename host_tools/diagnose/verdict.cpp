@@ -10,8 +10,11 @@
 #include "host_tools/diagnose/where.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/excite/sight.hpp"
 #include "host_tools/support/parallel.hpp"
+#include "model/effects/gravity_compensator.hpp"
+#include "model/effects/gravity_tilt.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
@@ -416,12 +419,6 @@ std::string gate_of(const std::vector<ProcessedLog>& now) {
 
 namespace {
 
-bool is_friction(std::string_view effect) {
-  return effect == Viscous::name || effect == Coulomb::name || effect == Offset::name ||
-         effect.find("friction") != std::string_view::npos || effect == Stribeck::name || effect == Presliding::name ||
-         effect.starts_with("viscous");
-}
-
 bool is_changed(const Unknown& u) {
   constexpr double beyond = 2;  // times what sessions differ by
   return u.change && u.kind == Unknown::Kind::linear && std::fabs(u.value) >= beyond * u.prior_std;
@@ -435,9 +432,7 @@ std::vector<EffectCandidate> changed_effects(const Linearised& at) {
     if (!is_changed(u)) continue;
     const EffectFit& fit = at.models().current.joints[u.joint].effects[u.effect];
     // Of these, one that comes on top is the change: torques that add up, with shapes of their own.
-    const bool adds = fit.effect == Ripple::name || fit.effect == Spring::name ||
-                      fit.effect == GravityCompensator::name || fit.effect == JointCoupling::name;
-    if (adds) out.push_back({fit.effect, u.joint, fit.shape});
+    if (find_effect(fit.effect)->changes_by_one_more) out.push_back({fit.effect, u.joint, fit.shape});
   }
   return out;
 }
@@ -458,7 +453,7 @@ std::vector<std::string> changed_parameters(const Linearised& at) {
         "{}: {} ({}) is {:.4g}{}, {:.4g} in the baseline: more than {} differs from session to session, and part of "
         "the nominal model",
         joint.name, now.effect, p.name, today, unit == "-" ? "" : " " + std::string(unit), today - u.value,
-        is_friction(now.effect) ? "friction" : "a healthy robot"));
+        find_effect(now.effect)->friction ? "friction" : "a healthy robot"));
   }
   const auto& body = models.current.body;
   const bool load = std::any_of(body.begin(), body.end(), [](const EffectFit& fit) { return fit.named; });

@@ -7,6 +7,7 @@
 #include "host_tools/diagnose/deflection.hpp"
 #include "host_tools/diagnose/gate.hpp"
 #include "host_tools/diagnose/jolts.hpp"
+#include "host_tools/effects/identified_model.hpp"
 
 namespace fxdyn::diagnosis {
 

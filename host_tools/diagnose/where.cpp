@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/signals/spectrum.hpp"
 
 namespace fxdyn::diagnosis {

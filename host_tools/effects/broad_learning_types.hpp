@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/support/error.hpp"
 #include "model/broad_learning.hpp"
 

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 
+#include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/support/error.hpp"
+#include "model/catalogue.hpp"
 
 #include <fmt/format.h>
 
@@ -26,9 +28,10 @@ Eigen::MatrixXd columns_of(std::span<const double> shape, double sign_width, con
   check(*find_effect(E::name), series);
   std::vector<double> words;
   for (std::size_t i = 0; i < E::shape.size(); ++i) words.push_back(E::stored_shape(i, shape[i], series.step_s));
-  if constexpr (std::is_same_v<E, Delay>) {
-    if (words[0] > Delay::largest * (1 + 1e-9)) {  // a step from time stamps is off by rounding
-      throw InputError(fmt::format("delay of {} s: at most {} steps of {} s", shape[0], Delay::largest, series.step_s));
+  if constexpr (E::traits.most_ticks > 0) {
+    if (words[0] > E::traits.most_ticks * (1 + 1e-9)) {  // a step from time stamps is off by rounding
+      throw InputError(
+          fmt::format("{} of {} s: at most {} steps of {} s", E::name, shape[0], E::traits.most_ticks, series.step_s));
     }
   }
   typename E::template State<Real> state{};
@@ -59,26 +62,42 @@ Eigen::MatrixXd columns_of(std::span<const double> shape, double sign_width, con
 
 namespace {
 
+/// Every phi of three ticks from an input.
+template <class E>
+std::vector<double> three_ticks(JointInput<Real> u) {
+  std::vector<double> words, phis;
+  for (std::size_t i = 0; i < E::shape.size(); ++i)
+    words.push_back(E::stored_shape(i, std::clamp(1e-3, E::shape[i].lower, E::shape[i].upper), 0.002));
+  typename E::template State<Real> state{};
+  Saturations none;
+  const std::array<JointInput<Real>, 1> peers{u};
+  u.peers = peers;
+  for (int tick = 0; tick < 3; ++tick) {
+    u.q += 0.01;
+    E::template basis<Real>(u, Words<Real>{words.data()}, state, none,
+                            [&](auto, std::size_t, double phi) { phis.push_back(phi); });
+  }
+  return phis;
+}
+
 /// Whether another sign of the velocity changes any phi of the effect.
 template <class E>
 bool uses_sign() {
-  std::vector<double> words;
-  for (std::size_t i = 0; i < E::shape.size(); ++i)
-    words.push_back(E::stored_shape(i, std::clamp(1e-3, E::shape[i].lower, E::shape[i].upper), 0.002));
-  std::array<std::vector<double>, 2> phis;
-  for (std::size_t k = 0; k < 2; ++k) {
-    typename E::template State<Real> state{};
-    Saturations none;
-    JointInput<Real> u{0.3, 0.02, 0.5, k == 0 ? 0.2 : 0.9, 1.0, 2.0, {}};
-    const std::array<JointInput<Real>, 1> peers{u};
-    u.peers = peers;
-    for (int tick = 0; tick < 3; ++tick) {
-      u.q += 0.01;
-      E::template basis<Real>(u, Words<Real>{words.data()}, state, none,
-                              [&](auto, std::size_t, double phi) { phis[k].push_back(phi); });
-    }
+  return three_ticks<E>({0.3, 0.02, 0.5, 0.2, 1.0, 2.0, {}}) != three_ticks<E>({0.3, 0.02, 0.5, 0.9, 1.0, 2.0, {}});
+}
+
+/// Whether a phi of the effect is 1 whatever the input.
+template <class E>
+bool has_constant() {
+  const std::vector<double> phis = three_ticks<E>({0.3, 0.02, 0.5, 0.2, 1.5, 2.5, {}}),
+                            others = three_ticks<E>({-0.7, -0.3, 0.8, -0.6, -3.0, 4.0, {}});
+  const std::size_t count = E::linear.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    bool constant = true;
+    for (std::size_t k = i; k < phis.size(); k += count) constant &= phis[k] == 1 && others[k] == 1;
+    if (constant) return true;
   }
-  return phis[0] != phis[1];
+  return false;
 }
 
 }  // namespace
@@ -87,10 +106,13 @@ const std::vector<EffectInfo>& effect_infos() {
   static const std::vector<EffectInfo> list = [] {
     std::vector<EffectInfo> all;
     const auto add = [&]<class E>() {
-      bool sign = false;
-      if constexpr (acts_on<E> != ActsOn::body) sign = uses_sign<E>();
-      all.push_back({E::name, E::equation, E::shape, E::linear, acts_on<E>, needs_structural<E>, needs_total<E>,
-                     needs_peers<E>, sign});
+      bool sign = false, constant = false;
+      if constexpr (acts_on<E> != ActsOn::body) {
+        sign = uses_sign<E>();
+        constant = has_constant<E>();
+      }
+      all.push_back({E::traits, E::name, E::equation, E::shape, E::linear, acts_on<E>, needs_structural<E>,
+                     needs_total<E>, needs_peers<E>, sign, constant});
     };
     Catalogue::for_each(add);
     BodyEffects::for_each(add);
@@ -118,6 +140,73 @@ std::vector<std::string_view> joint_effect_names() {
   return names;
 }
 
+int EffectInfo::refined_shape() const {
+  for (std::size_t i = 0; i < shape.size(); ++i) {
+    if (shape[i].values.search != ShapeSearch::list) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+const std::vector<std::string>& nominal_effects() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> all;
+    for (const EffectInfo& info : effect_infos()) {
+      if (info.nominal) all.emplace_back(info.name);
+    }
+    return all;
+  }();
+  return names;
+}
+
+std::vector<std::string_view> identified_effects() {
+  std::vector<const EffectInfo*> found;
+  for (const EffectInfo& info : effect_infos()) {
+    if (info.identified > 0) found.push_back(&info);
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const EffectInfo* a, const EffectInfo* b) { return a->identified < b->identified; });
+  std::vector<std::string_view> names;
+  for (const EffectInfo* info : found) names.push_back(info->name);
+  return names;
+}
+
+std::string_view telling_experiment(const EffectTraits& a, const EffectTraits& b) {
+  NamedExperiment best;
+  for (const NamedExperiment& own : a.experiments) {
+    if (b.named_experiment(own) && (best.text.empty() || own.order < best.order)) best = own;
+  }
+  return best.text;
+}
+
+bool in_base(std::string_view effect) { return find_effect(effect)->in_base; }
+bool drifts(std::string_view effect) { return find_effect(effect)->drifts(); }
+
+const EffectFit* rotor_of(const JointFit& joint) {
+  for (const EffectFit& fit : joint.effects) {
+    if (in_base(fit.effect)) return &fit;
+  }
+  return nullptr;
+}
+
+double upper_bound(const EffectInfo& info, const ParameterInfo& shape, double step_s) {
+  return info.most_ticks > 0 ? std::min(shape.upper, info.most_ticks * step_s) : shape.upper;
+}
+
+std::vector<std::vector<double>> combinations(const std::vector<std::vector<double>>& values) {
+  std::vector<std::vector<double>> out{{}};
+  for (const std::vector<double>& of_one : values) {
+    std::vector<std::vector<double>> more;
+    for (const double value : of_one) {
+      for (std::vector<double> before : out) {
+        before.push_back(value);
+        more.push_back(std::move(before));
+      }
+    }
+    out = std::move(more);
+  }
+  return out;
+}
+
 std::string why_not_identified(const EffectInfo& info) {
   const auto reason = [&](std::string_view what) {
     return fmt::format("effect '{}' {}: identify can't fit such effects yet", info.name, what);
@@ -127,11 +216,11 @@ std::string why_not_identified(const EffectInfo& info) {
   if (info.needs_total) return reason("needs the torque of the effects before it");
   if (info.needs_structural) return reason("needs the rigid-body torque");
   if (info.needs_peers) return {};  // the neighbours are tried
-  // The search of shapes knows the scales of velocities and distances.
   for (const ParameterInfo& shape : info.shape) {
-    if (shape.quantity == Quantity::inverse_velocity || shape.quantity == Quantity::inverse_path) continue;
-    return fmt::format("effect '{}': the search of its {} is not built yet", info.name, shape.name);
+    if (shape.values.fitted == nullptr)
+      return fmt::format("effect '{}': the search of its {} is not built yet", info.name, shape.name);
   }
+  if (info.shape.size() > 1) return reason("has several shape parameters");
   return {};
 }
 

@@ -1,22 +1,32 @@
 #pragma once
 
+#include <Eigen/Dense>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "host_tools/signals/log.hpp"
-#include "model/catalogue.hpp"
+#include "host_tools/effects/forward.hpp"
+#include "model/effect_traits.hpp"
 
 namespace fxdyn {
 
-/// What the host knows of an effect without its type: its entry in the catalogue.
-struct EffectInfo {
+/// What the host knows of an effect without its type: its entry in the catalogue, and what it declares of itself.
+struct EffectInfo : EffectTraits {
   std::string_view name, equation;
   std::span<const ParameterInfo> shape, linear;
   ActsOn acts_on;
   bool needs_structural, needs_total, needs_peers;
-  bool uses_sign;  ///< its phi depends on the joint's sign width
+  bool uses_sign;     ///< its phi depends on the joint's sign width
+  bool has_constant;  ///< one of its phi is 1
+  /// Bends under the load: acts on the position and needs the rigid-body torque.
+  bool bends() const { return acts_on == ActsOn::position && needs_structural; }
+  /// Tells a rotor from the base parameters: it follows the load without the rotor's own inertia.
+  bool separates_rotor() const { return needs_structural; }
+  /// Its wavenumber comes from a spectrum.
+  bool of_spectrum() const { return !shape.empty() && shape[0].values.search == ShapeSearch::spectrum; }
+  /// The shape parameter that is refined continuously; -1: none.
+  int refined_shape() const;
 };
 
 /// All effects, those on the body last.
@@ -26,6 +36,26 @@ const EffectInfo* find_effect(std::string_view name);
 /// Names of all effects, and of those of the Catalogue only (all but those on the body).
 std::vector<std::string_view> effect_names();
 std::vector<std::string_view> joint_effect_names();
+
+/// Names of those that every joint has, and of those that `identify` adds by itself, in its order.
+const std::vector<std::string>& nominal_effects();
+std::vector<std::string_view> identified_effects();
+
+/// The motion that tells two effects apart: the first that both name, empty if there is none.
+std::string_view telling_experiment(const EffectTraits& a, const EffectTraits& b);
+
+/// Whether base parameters may hold this effect of the joint, or it drifts.
+bool in_base(std::string_view effect);
+bool drifts(std::string_view effect);
+
+/// The joint's rotor where the model has one beside the base parameters, else null.
+const EffectFit* rotor_of(const JointFit& joint);
+
+/// The largest value of a shape parameter where the effect steps every `step_s`.
+double upper_bound(const EffectInfo& info, const ParameterInfo& shape, double step_s);
+
+/// All combinations of the values of each shape parameter, the first parameter's changing fastest; {{}} without any.
+std::vector<std::vector<double>> combinations(const std::vector<std::vector<double>>& values);
 
 /// Why identify can't fit the effect yet; empty if it can.
 std::string why_not_identified(const EffectInfo& info);

@@ -2,7 +2,10 @@
 
 #include "host_tools/effects/broad_learning_types.hpp"
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/robot/robot.hpp"
 #include "host_tools/support/error.hpp"
+#include "model/catalogue.hpp"
 
 #include <fmt/format.h>
 
@@ -70,6 +73,63 @@ int node_bits(const IdentifiedModel& model, std::size_t joint) {
 }
 
 std::size_t stored_nodes(const BroadLearningFit& fit) { return static_cast<std::size_t>(fit.nodes() + 1) / 2 * 2; }
+
+template <class N>
+struct Evaluator<N>::Step {
+  virtual ~Step() = default;
+  /// theta^T phi where the effect acts on this, else zero; steps the effect's state.
+  virtual typename N::TorqueSum torque(JointInput<N>&, typename N::TorqueSum, Saturations&) { return N::no_torque(); }
+  virtual typename N::DeflectionSum deflection(const JointInput<N>&, Saturations&) { return N::no_deflection(); }
+  virtual void reset() = 0;
+  virtual void warm_up(double) {}
+  virtual void mark() {}
+  virtual void rewind() {}
+  std::vector<typename N::Word> words;
+};
+template <class N>
+template <class E>
+struct Evaluator<N>::EffectStep final : Step {
+  typename E::template State<N> state{}, kept{};
+  std::vector<double> shape;
+  typename N::TorqueSum torque(JointInput<N>& u, typename N::TorqueSum so_far, Saturations& saturations) override {
+    if constexpr (acts_on<E> == ActsOn::torque) {
+      if constexpr (needs_total<E>) u.total = running_total<N>(u.structural, so_far);
+      return contribution<E, N>(u, Words<N>{this->words.data()}, state, saturations);
+    }
+    return N::no_torque();
+  }
+  typename N::DeflectionSum deflection(const JointInput<N>& u, Saturations& saturations) override {
+    if constexpr (acts_on<E> == ActsOn::position)
+      return contribution<E, N>(u, Words<N>{this->words.data()}, state, saturations);
+    return N::no_deflection();
+  }
+  void reset() override { state = {}; }
+  void warm_up(double seconds) override {
+    if constexpr (E::traits.drifts()) state.w = from_si<N, Quantity::unit>(E::warmth(seconds, shape[0]));
+  }
+  void mark() override { kept = state; }
+  void rewind() override { state = kept; }
+};
+template <class N>
+template <class Inputs, class Activation>
+struct Evaluator<N>::BroadLearningStep final : Step {
+  std::size_t nodes = 0;
+  int bits = 0;
+  typename Inputs::template State<N> state{}, kept{};
+  std::vector<typename N::NodeArgument> scratch;
+  typename N::TorqueSum torque(JointInput<N>& u, typename N::TorqueSum, Saturations& saturations) override {
+    return broad_learning_sum<Inputs, Activation, N>(nodes, bits, u, Words<N>{this->words.data()}, state, saturations,
+                                                     scratch);
+  }
+  void reset() override { state = {}; }
+  void mark() override { kept = state; }
+  void rewind() override { state = kept; }
+};
+
+template <class N>
+Evaluator<N>::Evaluator(Evaluator&&) noexcept = default;
+template <class N>
+Evaluator<N>::~Evaluator() = default;
 
 template <class N>
 Evaluator<N>::Evaluator(const IdentifiedModel& model, double tick_s) {
@@ -163,10 +223,10 @@ void Evaluator<N>::add_effect(std::size_t joint, const EffectFit& fit, double ti
                                      fit.effect, other, joints_of_robot));
       }
     }
-    if constexpr (std::is_same_v<E, Delay>) {
-      if (fit.shape[0] > Delay::largest * tick_s * (1 + 1e-9)) {  // a step from time stamps is off by rounding
-        throw InputError(fmt::format("joint {}: delay of {} s: at most {} ticks of {} s", joint + 1, fit.shape[0],
-                                     Delay::largest, tick_s));
+    if constexpr (E::traits.most_ticks > 0) {
+      if (fit.shape[0] > E::traits.most_ticks * tick_s * (1 + 1e-9)) {  // a step from time stamps is off by rounding
+        throw InputError(fmt::format("joint {}: {} of {} s: at most {} ticks of {} s", joint + 1, E::name, fit.shape[0],
+                                     E::traits.most_ticks, tick_s));
       }
     }
     auto step = std::make_unique<EffectStep<E>>();

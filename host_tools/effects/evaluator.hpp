@@ -4,10 +4,10 @@
 #include <span>
 #include <vector>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/numbers/bounded.hpp"
 #include "host_tools/numbers/run_time_fixed.hpp"
-#include "model/joint_model.hpp"
+#include "model/joint_state.hpp"
 
 namespace fxdyn {
 
@@ -72,7 +72,8 @@ template <class N>
 class Evaluator {
  public:
   explicit Evaluator(const IdentifiedModel& model, double tick_s);
-  Evaluator(Evaluator&&) noexcept = default;
+  Evaluator(Evaluator&&) noexcept;
+  ~Evaluator();
 
   std::size_t joints() const { return geometry_.size(); }
   /// Puts out the torques of these joints only (bit i: joint i+1); the others' are zero.
@@ -105,55 +106,11 @@ class Evaluator {
   std::vector<typename N::Word> words() const;
 
  private:
-  struct Step {
-    virtual ~Step() = default;
-    /// theta^T phi where the effect acts on this, else zero; steps the effect's state.
-    virtual typename N::TorqueSum torque(JointInput<N>&, typename N::TorqueSum, Saturations&) { return N::no_torque(); }
-    virtual typename N::DeflectionSum deflection(const JointInput<N>&, Saturations&) { return N::no_deflection(); }
-    virtual void reset() = 0;
-    virtual void warm_up(double) {}
-    virtual void mark() {}
-    virtual void rewind() {}
-    std::vector<typename N::Word> words;
-  };
+  struct Step;
   template <class E>
-  struct EffectStep final : Step {
-    typename E::template State<N> state{}, kept{};
-    std::vector<double> shape;
-    typename N::TorqueSum torque(JointInput<N>& u, typename N::TorqueSum so_far, Saturations& saturations) override {
-      if constexpr (acts_on<E> == ActsOn::torque) {
-        if constexpr (needs_total<E>) u.total = running_total<N>(u.structural, so_far);
-        return contribution<E, N>(u, Words<N>{this->words.data()}, state, saturations);
-      }
-      return N::no_torque();
-    }
-    typename N::DeflectionSum deflection(const JointInput<N>& u, Saturations& saturations) override {
-      if constexpr (acts_on<E> == ActsOn::position)
-        return contribution<E, N>(u, Words<N>{this->words.data()}, state, saturations);
-      return N::no_deflection();
-    }
-    void reset() override { state = {}; }
-    void warm_up(double seconds) override {
-      if constexpr (std::is_same_v<E, FrictionDrift>)
-        state.w = from_si<N, Quantity::unit>(FrictionDrift::warmth(seconds, shape[0]));
-    }
-    void mark() override { kept = state; }
-    void rewind() override { state = kept; }
-  };
+  struct EffectStep;
   template <class Inputs, class Activation>
-  struct BroadLearningStep final : Step {
-    std::size_t nodes = 0;
-    int bits = 0;
-    typename Inputs::template State<N> state{}, kept{};
-    std::vector<typename N::NodeArgument> scratch;
-    typename N::TorqueSum torque(JointInput<N>& u, typename N::TorqueSum, Saturations& saturations) override {
-      return broad_learning_sum<Inputs, Activation, N>(nodes, bits, u, Words<N>{this->words.data()}, state, saturations,
-                                                       scratch);
-    }
-    void reset() override { state = {}; }
-    void mark() override { kept = state; }
-    void rewind() override { state = kept; }
-  };
+  struct BroadLearningStep;
 
   static typename N::Word word(Kind::Group group, Quantity quantity, double value) {
     return FromSi<N>::word({group, quantity}, value);

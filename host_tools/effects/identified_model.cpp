@@ -83,7 +83,7 @@ json effect_json(const EffectFit& fit, const JointFit& joint, bool prismatic) {
   json parameters = parameters_json(info->shape, fit.shape, fit.shape_std, prismatic);
   for (const json& entry : parameters_json(info->linear, fit.linear, fit.linear_std, prismatic))
     parameters.push_back(entry);
-  if (fit.effect == "coulomb") {
+  if (info->has_sign_width) {
     parameters.push_back({{"name", "width"}, {"value", joint.sign_width}, {"unit", prismatic ? "m/s" : "rad/s"}});
     if (joint.sign_width_std > 0) parameters.back()["std"] = joint.sign_width_std;
   }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <Eigen/Dense>
 #include <array>
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
@@ -8,56 +7,13 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/effects/filter_fit.hpp"
+#include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/numbers/formats.hpp"
 #include "host_tools/robot/robot.hpp"
 #include "host_tools/signals/log.hpp"
-#include "model/broad_learning_inputs.hpp"
 
 namespace fxdyn {
-
-/// One effect of one joint with its fitted parameters, in the order of the effect's ParameterInfo lists.
-struct EffectFit {
-  std::string effect;
-  std::vector<double> shape, linear;
-  std::vector<double> shape_std, linear_std;  ///< empty or 0: not estimated
-  bool named = false;                         ///< found by diagnosis; else nominal
-};
-
-/// The BLS of one joint (model/broad_learning.hpp).
-struct BroadLearningFit : BroadLearningScales {
-  std::string inputs = "physical";  ///< names of types there: physical, extended, state
-  std::string activation = "tanh";  ///< tanh, relu
-  Eigen::MatrixXd weights;          ///< nodes x (inputs + 1): input weights, bias [-]
-  Eigen::VectorXd coefficients;     ///< of inputs, then nodes [N*m | N]
-  double ridge = 0;
-  Eigen::Index nodes() const { return weights.rows(); }
-  Eigen::Index input_count() const { return weights.cols() - 1; }
-  Eigen::Index coefficient_count() const { return input_count() + nodes(); }
-};
-
-/// One joint's gear, by a second encoder on its link (host_tools/identify/flexible.hpp). Prismatic joints: N/m, N*s/m,
-/// kg.
-struct FlexibleJoint {
-  std::size_t joint = 0;                          ///< from 0
-  double stiffness = 0, stiffness_std = 0;        ///< K [N*m/rad]
-  double damping = 0, damping_std = 0;            ///< B [N*m*s/rad]
-  double effective_inertia = 0, inertia_std = 0;  ///< J_eff: rotor and gears [kg*m^2]; 0: not known
-  double deflection_rms = 0;                      ///< of q - qlink about its mean, filtered [rad | m]
-  double explained = 0;                           ///< share of its power that the fit explains
-  bool found = false;                             ///< else the figures are noise and `note` says why
-  std::string note;                               ///< what a reader should know, empty if nothing
-};
-
-struct JointFit {
-  double sign_width = 0.01;   ///< s = tanh(dq / width) [rad/s | m/s]
-  double sign_width_std = 0;  ///< 0: not estimated
-  std::vector<EffectFit> effects;
-  std::optional<BroadLearningFit> bls;
-  std::optional<FlexibleJoint> flexible;  ///< where the joint has a link encoder
-  double rated_torque = 0;                ///< [N*m | N]
-  double q_lower = 0, q_upper = 0, dq_limit = 0, ddq_limit = 0, tau_limit = 0;
-  const EffectFit* find(std::string_view effect) const;
-};
 
 /// A base parameter: the standard parameter that stands for its group.
 struct BaseParameter {
@@ -66,17 +22,6 @@ struct BaseParameter {
   double value = 0, std = 0;
   bool essential = true;   ///< the data would be explained worse without it
   std::string expression;  ///< the sum of standard parameters that it is, e.g. "Jzz1 + Jxx2 + 0.18 m3"
-};
-
-struct FilterFit {
-  double position_cutoff_hz = 0, torque_cutoff_hz = 0, edge_s = 0;
-  /// The logs' torque column is this far ahead of the motion: measured tau(t) = torque of the motion at t + lead. A
-  /// drive that answers a command a while later has it, or signals that were sampled at different moments.
-  double torque_lead_s = 0;
-  // Why: see choose_filter().
-  double excited_hz = 0;                             ///< holds 99.9 % of the velocities' energy, joints alike
-  double crossing_hz = 0;                            ///< where the last joint's motion sinks into its noise
-  std::vector<double> encoder_step, position_noise;  ///< per joint; no step found: 0; RMS of white noise [rad | m]
 };
 
 struct LogReference {

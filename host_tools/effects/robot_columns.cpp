@@ -6,7 +6,9 @@
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/error.hpp"
+#include "model/effects/payload.hpp"
 
 namespace fxdyn {
 namespace {
@@ -51,7 +53,9 @@ std::vector<ColumnName> column_names(std::string_view effect, JointType type) {
 }
 
 RobotColumns::RobotColumns(const IdentifiedModel& model, const Motion& motion)
-    : model_(model), motion_(&motion), torque_(motion.q.rows(), motion.q.cols()) {
+    : model_(std::make_shared<const IdentifiedModel>(model)),
+      motion_(&motion),
+      torque_(motion.q.rows(), motion.q.cols()) {
   Predictor(model, motion.step_s)(motion.q, motion.dq, motion.ddq, torque_, nullptr, &structural_);
   const bool plain = std::all_of(model.joints.begin(), model.joints.end(), [](const JointFit& joint) {
     return !joint.bls && std::all_of(joint.effects.begin(), joint.effects.end(), [](const EffectFit& fit) {
@@ -68,8 +72,8 @@ const RobotColumns::ByState& RobotColumns::by_state(std::size_t joint) const {
   ByState& out = *by_state_[joint];
   std::call_once(out.made, [&] {
     const Index samples = motion_->q.rows(), joints = motion_->q.cols();
-    Evaluator<Real> robot(unlimited(model_), motion_->step_s);
-    std::vector<JointState<Real>> state(model_.joints.size());
+    Evaluator<Real> robot(unlimited(*model_), motion_->step_s);
+    std::vector<JointState<Real>> state(model_->joints.size());
     for (MatrixXd* m : {&out.q, &out.dq, &out.ddq}) m->resize(samples, joints);
     for (Index k = 0; k < samples; ++k) {
       for (Index i = 0; i < joints; ++i)
@@ -113,11 +117,11 @@ MatrixXd RobotColumns::phi(const EffectCandidate& candidate) const {
     series.peers_ddq = motion_->ddq;
     series.peers_sign = motion_->dq;
     for (Index i = 0; i < series.peers_sign.cols(); ++i) {
-      const double width = model_.joints[static_cast<std::size_t>(i)].sign_width;
+      const double width = model_->joints[static_cast<std::size_t>(i)].sign_width;
       series.peers_sign.col(i) = series.peers_sign.col(i).unaryExpr([=](double dq) { return tanh_of(dq / width); });
     }
   }
-  return effect_columns(candidate.effect, candidate.shape, model_.joints[candidate.joint].sign_width, series);
+  return effect_columns(candidate.effect, candidate.shape, model_->joints[candidate.joint].sign_width, series);
 }
 
 MatrixXd RobotColumns::slope(const IdentifiedModel& changed, double theta) const {
@@ -134,17 +138,18 @@ Eigen::VectorXd RobotColumns::own_slope(const IdentifiedModel& changed, std::siz
 EffectColumns RobotColumns::operator()(const EffectCandidate& candidate) const {
   const EffectInfo& info = info_of(candidate.effect);
   const bool on_body = info.acts_on == ActsOn::body;
-  if (!on_body && candidate.joint >= model_.joints.size()) {
-    throw InputError(
-        fmt::format("effect '{}' at joint {}: the robot has {}", info.name, candidate.joint + 1, model_.joints.size()));
+  if (!on_body && candidate.joint >= model_->joints.size()) {
+    throw InputError(fmt::format("effect '{}' at joint {}: the robot has {}", info.name, candidate.joint + 1,
+                                 model_->joints.size()));
   }
   if (candidate.shape.size() != info.shape.size()) {
     throw InputError(fmt::format("effect '{}' has {} shape parameters, not {}", info.name, info.shape.size(),
                                  candidate.shape.size()));
   }
   EffectColumns out;
-  out.joints.resize(model_.joints.size());
-  const bool of_total_follow = !on_body && !info.needs_total && !in_order(model_.joints[candidate.joint], true).empty();
+  out.joints.resize(model_->joints.size());
+  const bool of_total_follow =
+      !on_body && !info.needs_total && !in_order(model_->joints[candidate.joint], true).empty();
   if (info.acts_on == ActsOn::torque && !of_total_follow) {
     out.joints[candidate.joint] = phi(candidate);
     return out;
@@ -152,7 +157,7 @@ EffectColumns RobotColumns::operator()(const EffectCandidate& candidate) const {
 
   std::vector<MatrixXd> slopes;  // one a column, samples x joints
   const auto with = [&](std::vector<double> linear) {
-    IdentifiedModel changed = model_;
+    IdentifiedModel changed = *model_;
     EffectFit fit;
     fit.effect = candidate.effect;
     fit.shape = candidate.shape;

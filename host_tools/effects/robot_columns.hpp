@@ -6,8 +6,9 @@
 #include <string_view>
 #include <vector>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/signals/motion.hpp"
+#include "model/rigid_body.hpp"
 
 namespace fxdyn {
 
@@ -71,7 +72,7 @@ class RobotColumns {
   /// Torques for a deflection [rad | m per unit] of a joint, by its state's slopes.
   Eigen::MatrixXd of_deflection(std::size_t joint, const Eigen::VectorXd& delta) const;
 
-  IdentifiedModel model_;
+  std::shared_ptr<const IdentifiedModel> model_;
   const Motion* motion_;
   Eigen::MatrixXd torque_, structural_;
   /// Empty where something else than the rigid body feels a deflection, or the motion is too long to keep them.

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/parallel.hpp"
 
@@ -15,10 +16,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-bool is_nominal(std::string_view effect) {
-  return std::find(nominal_effects.begin(), nominal_effects.end(), effect) != nominal_effects.end();
-}
 
 double largest_of(const std::vector<MatrixXd>& torque, std::size_t joint) {
   double most = 0;
@@ -67,11 +64,11 @@ void Information::add_blocks(const IdentifiedModel& nominal, const std::vector<M
     blocks.push_back(std::move(block));
   };
   for (std::size_t j = 0; j < n; ++j) {
-    for (const char* effect : nominal_effects) add(effect, j, {});
+    for (const std::string& effect : nominal_effects()) add(effect, j, {});
   }
   nominal_blocks = blocks.size();
   for (const EffectInfo& info : effect_infos()) {
-    if (is_nominal(info.name)) continue;
+    if (info.nominal) continue;
     for (std::size_t j = 0; j < (info.acts_on == ActsOn::body ? 1 : n); ++j) {
       for (const auto& shape : typical_shapes(info.name, j, nominal.robot, motions, torque, structural))
         add(info.name, j, shape);
@@ -173,57 +170,25 @@ std::vector<std::vector<double>> typical_shapes(std::string_view effect, std::si
   const EffectInfo* info = find_effect(effect);
   if (info == nullptr) throw InputError(fmt::format("unknown effect '{}': see `fxdyn effects`", effect));
   if (info->shape.empty()) return {{}};
-  const bool turns = robot.joints[joint].type == JointType::revolute;
+  MotionScales scales;
+  scales.turns = robot.joints[joint].type == JointType::revolute;
+  scales.joint = static_cast<unsigned>(joint);
+  scales.joints = static_cast<unsigned>(robot.size());
+  scales.torque = largest_of(torque, joint);
+  scales.structural = largest_of(structural, joint);
   const auto col = static_cast<Index>(joint);
-  double speed = 0, longest = 0;
   for (const Motion& motion : motions) {
-    speed = std::max(speed, motion.dq.col(col).cwiseAbs().maxCoeff());
-    longest = std::max(longest, motion.step_s * static_cast<double>(motion.q.rows()));
+    scales.speed = std::max(scales.speed, motion.dq.col(col).cwiseAbs().maxCoeff());
+    scales.seconds = std::max(scales.seconds, motion.step_s * static_cast<double>(motion.q.rows()));
   }
-  const auto values = [&](const ParameterInfo& shape) -> std::vector<double> {
-    const auto shares_of = [](double scale, std::vector<double> shares) {
-      for (double& share : shares) share *= scale;
-      return shares;
-    };
-    if (shape.name == "velocity") return shares_of(speed, {0.025, 0.01, 0.05});
-    if (shape.name == "distance") return turns ? std::vector{3e-3, 1e-3, 9e-3} : std::vector{1e-4, 3e-5, 3e-4};
-    if (shape.name == "wavenumber") return turns ? std::vector{20.0, 4.0, 100.0} : std::vector{600.0, 120.0, 3000.0};
-    if (shape.name == "time_constant") return shares_of(longest, {1, 0.3, 3});
-    if (shape.name == "limit") return shares_of(largest_of(torque, joint), {0.85, 0.7, 0.95});
-    if (shape.name == "time") {
-      std::vector<double> times{2e-3, 1e-3, 4e-3};
-      for (double& time : times) time = std::min(time, Delay::largest * motions.front().step_s);
-      return times;
-    }
-    if (shape.name == "relaxation") return {1e-3, 5e-3};
-    if (shape.name == "torque_scale") return shares_of(largest_of(structural, joint), {0.05, 0.02, 0.1});
-    if (shape.name == "ratio") return {1, -1};
-    if (shape.name == "width") return shares_of(speed, {0.01});
-    if (shape.name == "joint") {
-      std::vector<double> others;
-      if (effect == MotorCoupling::name) {  // gears are shared by neighbours
-        if (joint > 0) others.push_back(static_cast<double>(joint));
-        if (joint + 1 < robot.size()) others.push_back(static_cast<double>(joint + 2));
-        return others;
-      }
-      for (std::size_t k = joint; k-- > 0;) others.push_back(static_cast<double>(k + 1));
-      for (std::size_t k = joint + 1; k < robot.size(); ++k) others.push_back(static_cast<double>(k + 1));
-      return others;
-    }
-    throw InputError(fmt::format("effect '{}': no typical values of its {} are known", effect, shape.name));
-  };
-  std::vector<std::vector<double>> shapes{{}};
+  std::vector<std::vector<double>> values;
   for (const ParameterInfo& shape : info->shape) {
-    std::vector<std::vector<double>> more;
-    for (const double value : values(shape)) {
-      for (std::vector<double> before : shapes) {
-        before.push_back(std::clamp(value, shape.lower, shape.upper));
-        more.push_back(std::move(before));
-      }
-    }
-    shapes = std::move(more);
+    scales.upper = upper_bound(*info, shape, motions.front().step_s);
+    values.emplace_back();
+    for (const double value : shape.values.judged(scales))
+      values.back().push_back(std::clamp(value, shape.lower, scales.upper));
   }
-  return shapes;
+  return combinations(values);
 }
 
 }  // namespace fxdyn

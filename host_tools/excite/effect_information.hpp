@@ -1,10 +1,10 @@
 #pragma once
 
 #include <Eigen/Dense>
-#include <array>
 #include <optional>
 #include <vector>
 
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/effects/robot_columns.hpp"
 #include "host_tools/regression/dataset.hpp"
 #include "host_tools/regression/regressor.hpp"
@@ -12,9 +12,6 @@
 #include "host_tools/support/progress.hpp"
 
 namespace fxdyn {
-
-/// What the nominal model has on every joint beside the base parameters.
-inline constexpr std::array nominal_effects{"viscous", "coulomb", "offset", "rotor_inertia"};
 
 /// The columns [first, first + count) of one effect with one shape.
 struct Block {
@@ -24,14 +21,10 @@ struct Block {
   std::vector<Eigen::MatrixXd> raw{};  ///< per joint: mean of phi phi^T, unfiltered; 0 x 0 where it does not reach
 };
 
-/// Shapes for which an effect at a joint is judged, the typical one first:
-///   Stribeck velocity 2.5, 1, 5 % of the joint's largest velocity; presliding distance 3, 1, 9 mrad (1e-4, 3e-5, 3e-4
-///   m if prismatic); ripple 20, 4, 100 rad^-1 (600, 120, 3000 m^-1); time constant of drift 1, 0.3, 3 times the
-///   longest motion; saturation at 85, 70, 95 % of the largest torque; every other joint for couplings, the one before
-///   first; delay 2, 1, 4 ms; relaxation of elasticity 1, 5 ms; torque scale of backlash 5, 2, 10 % of the largest
-///   rigid torque.
+/// Shapes for which an effect at a joint is judged, the typical one first: what its parameters declare
+/// (ShapeValues::judged) for the joint's motions.
 /// @param torque, structural of RobotColumns, one a motion
-/// @throws InputError: a shape parameter for which no typical value is known
+/// @throws InputError: no such effect
 std::vector<std::vector<double>> typical_shapes(std::string_view effect, std::size_t joint, const Robot& robot,
                                                 const std::vector<Motion>& motions,
                                                 const std::vector<Eigen::MatrixXd>& torque,

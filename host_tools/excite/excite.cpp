@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/excite/nominal.hpp"
 #include "host_tools/excite/sight.hpp"
 #include "host_tools/page/plot.hpp"

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/random.hpp"
 

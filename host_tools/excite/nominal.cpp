@@ -6,7 +6,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/random.hpp"
 
@@ -22,6 +24,16 @@ void check(const std::vector<double>& values, std::size_t joints, std::string_vi
   for (const double value : values) {
     if (!(value > 0)) throw InputError(fmt::format("{}: {} is not positive", what, value));
   }
+}
+
+/// Effects that follow the load.
+std::vector<std::string_view> load_dependent_effects() {
+  std::vector<std::string_view> names;
+  for (const EffectInfo& info : effect_infos()) {
+    const bool follows = info.needs_structural || info.needs_total || info.acts_on == ActsOn::position;
+    if (follows) names.push_back(info.name);
+  }
+  return names;
 }
 
 /// A slender rod from the link's origin to the next joint's.
@@ -95,9 +107,9 @@ NominalModel nominal_from_urdf(const Robot& robot, const std::vector<double>& ra
   if (missing == n) {
     const double gravity = largest_gravity(model);
     if (gravity > 0) set_inertia(default_kg_per_m * gravity_share / gravity);
-    out.assumptions.emplace_back(
-        "the URDF has no inertias: generic ones stand in, so what depends on load (load_friction, torque_gain, "
-        "saturation, delay, elasticity, backlash, eccentricity) is an orientation only");
+    out.assumptions.emplace_back(fmt::format(
+        "the URDF has no inertias: generic ones stand in, so what depends on load ({}) is an orientation only",
+        fmt::join(load_dependent_effects(), ", ")));
   } else if (missing > 0) {
     out.assumptions.push_back(fmt::format("{} links of the URDF have no inertia and count as massless", missing));
   }

@@ -9,6 +9,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/excite/evolution.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/parallel.hpp"

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <set>
 
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/excite/effect_information.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/parallel.hpp"
@@ -117,36 +117,23 @@ double correlation(const MatrixXd& e, const MatrixXd& f, const MatrixXd& between
   return std::min(1.0, std::sqrt((e.transpose() * between * f).squaredNorm() / static_cast<double>(e.cols())));
 }
 
+/// Base parameters too are confused with effects.
+const EffectTraits& traits_of(std::string_view name) {
+  static constexpr EffectTraits of_base{.words = "inertia of the links",
+                                        .experiments = {experiments::hopeless, experiments::wide_range_or_baseline}};
+  return name == base_parameters ? of_base : *find_effect(name);
+}
+
 }  // namespace
 
 std::string cure(const std::string& e, const std::string& f) {
-  struct Cure {
-    std::set<std::string_view> effects;
-    std::string_view text;
-  };
-  static const std::vector<Cure> cures{
-      {{base_parameters, "rotor_inertia"}, "nothing: base parameters hold the rotor, and the torque is the same"},
-      {{"offset", "asymmetric_friction"}, "slow motion through zero velocity, both ways"},
-      {{"offset", "spring", "gravity_compensator", "ripple"}, "a wider range of positions"},
-      {{"offset", "spring", "ripple", base_parameters}, "a wider range of positions, or a baseline"},
-      {{"torque_gain", "load_friction", "coulomb", "viscous", "saturation"},
-       "poses in which the joint carries load, moved slowly with and against gravity"},
-      {{"viscous", "coulomb", "viscous_quadratic", "viscous_cubic", "saturation"},
-       "constant speeds from slow to the limit"},
-      {{"coulomb", "viscous", "torque_gain", "friction_drift"},
-       "the first motion once more at the end, after the robot warmed up"},
-      {{"backlash", "elasticity"}, "motion in which the load reverses; an encoder on the link"},
-      {{"coulomb", "stribeck", "presliding"}, "slow reversals of a few milliradians, and of a few degrees"},
-      {{"delay", "elasticity", "eccentricity", "backlash", "rotor_inertia"},
-       "faster motion beside the slow one; an encoder on the link"},
-  };
-  for (const Cure& c : cures) {
-    if (c.effects.contains(e) && c.effects.contains(f)) return std::string(c.text);
-  }
+  const EffectTraits &one = traits_of(e), &other = traits_of(f);
+  if (const std::string_view telling = telling_experiment(one, other); !telling.empty()) return std::string(telling);
   if (e == base_parameters || f == base_parameters)
     return "the same motions recorded without it (role = \"baseline\"), or inertias known beforehand";
-  if (e.ends_with("coupling") || f.ends_with("coupling")) return "joints moved one at a time";
-  return "other positions, speeds and loads in other combinations";
+  const bool couples =
+      one.named_experiment(experiments::one_at_a_time) || other.named_experiment(experiments::one_at_a_time);
+  return std::string((couples ? experiments::one_at_a_time : experiments::all_poses).text);
 }
 
 namespace {
@@ -319,7 +306,7 @@ Sight see(const IdentifiedModel& nominal, const std::vector<Motion>& motions, co
   const Information information(nominal, motions, settings.noise, settings.torque_cutoff_hz, progress);
   const double known = static_cast<double>(nominal.robot.size()) * information.independent_samples;
   const double asked =
-      static_cast<double>(information.base) + static_cast<double>(nominal_effects.size() * nominal.robot.size());
+      static_cast<double>(information.base) + static_cast<double>(nominal_effects().size() * nominal.robot.size());
   if (known < 2 * asked) {
     throw DataError(
         fmt::format("{:.2f} s of motion hold {:.0f} independent torques for {:.0f} nominal parameters: plan "

@@ -7,7 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/effects/robot_columns.hpp"
+#include "host_tools/robot/robot.hpp"
 #include "host_tools/signals/motion.hpp"
 #include "host_tools/support/progress.hpp"
 

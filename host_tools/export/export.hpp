@@ -1,10 +1,12 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <vector>
 
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/regression/dataset.hpp"
 
 namespace fxdyn {
@@ -53,7 +55,7 @@ class FixedModel {
 
  private:
   Formats formats_;
-  const IdentifiedModel model_;
+  std::shared_ptr<const IdentifiedModel> model_;
   std::uint32_t outputs_;
   std::vector<std::size_t> output_joints_;
   Evaluator<RunTimeNumbers> evaluator_;

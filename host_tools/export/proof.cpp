@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <queue>
 
+#include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/parallel.hpp"
 #include "host_tools/support/random.hpp"
@@ -38,14 +40,18 @@ IdentifiedModel uncut(const IdentifiedModel& model, bool effects) {
   return out;
 }
 
-/// Delay remembers what was so many ticks ago; a tick more for what its input remembers.
-constexpr int memory_ticks = static_cast<int>(Delay::capacity) + 4;
+/// Until the longest memory of the catalogue is full, and four more for what its input remembers.
+int memory_ticks() {
+  std::uint32_t most = 0;
+  for (const EffectInfo& info : effect_infos()) most = std::max(most, info.most_ticks + 1);
+  return static_cast<int>(most) + 4;
+}
 
 bool delays(const IdentifiedModel& model) {
-  for (const JointFit& joint : model.joints) {
-    if (joint.find(Delay::name) != nullptr) return true;
-  }
-  return false;
+  return std::any_of(model.joints.begin(), model.joints.end(), [](const JointFit& joint) {
+    return std::any_of(joint.effects.begin(), joint.effects.end(),
+                       [](const EffectFit& fit) { return find_effect(fit.effect)->of_total == OfTotal::delays; });
+  });
 }
 
 /// The error bound of one joint's torque. A state that moves fast rounds coarsely and forgets fast, one that creeps
@@ -89,7 +95,8 @@ Proof prove(const IdentifiedModel& identified, const Formats* formats) {
   Saturations none;
   const auto n = static_cast<Eigen::Index>(model.joints.size());
   proof.torque = proof.effects = proof.error = Eigen::VectorXd::Zero(n);
-  for (int tick = 0; tick < memory_ticks; ++tick) {
+  const int ticks = memory_ticks();
+  for (int tick = 0; tick < ticks; ++tick) {
     const auto torques = evaluator.tick(box, none);
     for (Eigen::Index j = 0; j < n; ++j) {
       const auto i = static_cast<std::size_t>(j);

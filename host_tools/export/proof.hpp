@@ -3,12 +3,11 @@
 #include <Eigen/Dense>
 #include <vector>
 
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/numbers/bounded.hpp"
 #include "host_tools/support/progress.hpp"
 
 namespace fxdyn {
-
-struct IdentifiedModel;
 
 /// What holds for every motion within the joint limits.
 struct Proof {

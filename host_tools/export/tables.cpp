@@ -6,9 +6,10 @@
 
 #include "host_tools/effects/broad_learning_types.hpp"
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/support/files.hpp"
-#include "model/catalogue.hpp"
+#include "model/broad_learning.hpp"
 #include "model/table_page.hpp"
 #include "model/version.hpp"
 
@@ -221,7 +222,10 @@ std::string parameters_text(const IdentifiedModel& model, const std::vector<std:
 }  // namespace
 
 FixedModel::FixedModel(const IdentifiedModel& model, const Formats& formats, std::uint32_t outputs)
-    : formats_(formats), model_(model), outputs_(outputs), evaluator_(make_evaluator(model, formats, outputs)) {
+    : formats_(formats),
+      model_(std::make_shared<const IdentifiedModel>(model)),
+      outputs_(outputs),
+      evaluator_(make_evaluator(model, formats, outputs)) {
   for (std::size_t i = 0; i < model.joints.size(); ++i) {
     if ((outputs >> i & 1U) != 0) output_joints_.push_back(i);
   }
@@ -258,13 +262,13 @@ std::uint32_t FixedModel::layout_hash() const {
   hash.add(formats_.force_sum);
   hash.add(formats_.torque_sum);
   hash.add(formats_.deflection_sum);
-  hash.add(static_cast<std::int32_t>(model_.joints.size()));
+  hash.add(static_cast<std::int32_t>(model_->joints.size()));
   hash.add(static_cast<std::int32_t>(outputs_));
-  const std::vector<LinkShape> shapes = link_shapes(model_, words());
-  for (std::size_t i = 0; i < model_.joints.size(); ++i) {
-    const JointFit& joint = model_.joints[i];
+  const std::vector<LinkShape> shapes = link_shapes(*model_, words());
+  for (std::size_t i = 0; i < model_->joints.size(); ++i) {
+    const JointFit& joint = model_->joints[i];
     hash.add(shapes[i].code());
-    if (!has_effects(model_, i, outputs_)) {
+    if (!has_effects(*model_, i, outputs_)) {
       hash.add(0);
       continue;
     }
@@ -276,7 +280,7 @@ std::uint32_t FixedModel::layout_hash() const {
     for (const EffectFit* fit : in_order(joint)) add(*fit);
     if (joint.bls) {
       with_bls_types(*joint.bls, [&]<class Inputs, class Activation>() {
-        BroadLearning<2, 0, Inputs, Activation>::hash_layout(hash, stored_nodes(*joint.bls), node_bits(model_, i));
+        BroadLearning<2, 0, Inputs, Activation>::hash_layout(hash, stored_nodes(*joint.bls), node_bits(*model_, i));
       });
     }
     for (const EffectFit* fit : in_order(joint, true)) add(*fit);

@@ -11,6 +11,7 @@
 
 #include "firmware/protocol/object_dictionary.hpp"
 #include "host_tools/can/guard.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/error.hpp"
 #include "model/table_page.hpp"
 

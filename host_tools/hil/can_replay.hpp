@@ -9,6 +9,7 @@
 
 #include "firmware/protocol/torque_output.hpp"
 #include "host_tools/can/lockstep.hpp"
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/export/export.hpp"
 
 namespace fxdyn {

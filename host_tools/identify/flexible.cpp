@@ -10,8 +10,12 @@
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/support/parallel.hpp"
+#include "model/effects/backlash.hpp"
+#include "model/effects/eccentricity.hpp"
+#include "model/effects/elasticity.hpp"
 
 namespace fxdyn {
 namespace {
@@ -313,7 +317,7 @@ FlexibleJoint identify_joint(const JointData& data, const IdentifiedModel& model
     gradient[0] = -fit.rotor / c;
     gradient[2] = -1 / c;
     out.inertia_std = spread(ls, gradient);
-  } else if (const EffectFit* rotor = model.joints[j].find(RotorInertia::name)) {
+  } else if (const EffectFit* rotor = rotor_of(model.joints[j])) {
     out.effective_inertia = rotor->linear[0];
     out.inertia_std = rotor->linear_std.empty() ? 0 : rotor->linear_std[0];
   }
@@ -351,7 +355,7 @@ std::vector<FlexibleJoint> identify_flexible(const FlexibleInput& input) {
     const JointData data(input, motions, loads, joint);
     if (data.empty()) return;
     const bool rotor_in_load =
-        input.model.joints[j].find(RotorInertia::name) == nullptr && rotor_inertia_is_absorbed(chain, base, joint);
+        rotor_of(input.model.joints[j]) == nullptr && rotor_inertia_is_absorbed(chain, base, joint);
     all[j] = identify_joint(data, input.model, Regressor(chain), j, rotor_in_load);
   });
   std::vector<FlexibleJoint> found;

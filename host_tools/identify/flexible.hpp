@@ -2,7 +2,8 @@
 
 #include <vector>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/forward.hpp"
+#include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/regression/dataset.hpp"
 
 // Flexible joints from a second encoder on the link, paper Eqs. 12 and 42 (whose sum misses J ddq):

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/identify/flexible.hpp"
 #include "host_tools/identify/plausible.hpp"
 #include "host_tools/regression/essential.hpp"
@@ -67,31 +69,51 @@ struct Scales {
   double velocity, range;
 };
 
+MotionScales motion_scales(const Scales& scales) {
+  MotionScales out;
+  out.speed = scales.velocity;
+  out.range = scales.range;
+  return out;
+}
+
+/// Of a coupling: the shape parameters after the other joint's index, a width as wide as the joint's sign.
+std::vector<std::vector<double>> further_shapes(const EffectInfo& info, double sign_width) {
+  std::vector<std::vector<double>> values;
+  for (const ParameterInfo& shape : info.shape.subspan(1)) {
+    const ValueList listed = shape.values.search == ShapeSearch::list ? shape.values.judged({}) : ValueList{sign_width};
+    values.emplace_back(listed.begin(), listed.end());
+  }
+  return combinations(values);
+}
+
 /// The joint's design with the motor that it shares with a neighbour, at the best of neighbours, directions and widths.
 Candidate search_coupling(const Fitter& fitter, std::size_t joint, std::string_view effect, const Scales& scales) {
   if (fitter.joints() < 2) throw InputError(fmt::format("effect '{}' needs a second joint", effect));
-  const bool motor = effect == MotorCoupling::name;
+  const EffectInfo& info = *find_effect(effect);
+  const int refined = info.refined_shape();
   const double now = fitter.held_out()[joint].rmse;
   Candidate best{fitter.design(joint), {}};
   for (const std::size_t k : {joint - 1, joint + 1}) {
     if (k >= fitter.joints()) continue;
-    for (const double ratio : motor ? std::vector<double>{1, -1} : std::vector<double>{1}) {
+    for (const std::vector<double>& more : further_shapes(info, fitter.design(joint).sign_width)) {
       JointFit design = fitter.design(joint);
       EffectFit fit;
       fit.effect = effect;
       fit.shape = {static_cast<double>(k + 1)};
-      if (motor) fit.shape.insert(fit.shape.end(), {ratio, design.sign_width});
+      fit.shape.insert(fit.shape.end(), more.begin(), more.end());
       design.effects.push_back(fit);
       const Judgement judgement = fitter.held_out_with(joint, design, {0.0})[0];
       if (judgement.rmse < best.judgement.rmse) best = {design, judgement};
     }
   }
-  if (!motor || best.design.effects.empty() || best.design.effects.back().effect != effect) return best;
+  if (refined < 0 || best.design.effects.empty() || best.design.effects.back().effect != effect) return best;
   // only what comes near being kept is worth a search
   if (best.judgement.rmse > (1 - 0.5 * worth_keeping) * now) return best;
-  Candidate refined = search(fitter, joint, best.design, 1e-4 * scales.velocity, 0.3 * scales.velocity,
-                             [](JointFit& d, double value) { d.effects.back().shape[2] = value; });
-  return refined.judgement.rmse < best.judgement.rmse ? refined : best;
+  const auto index = static_cast<std::size_t>(refined);
+  const ShapeRange range = info.shape[index].values.fitted(motion_scales(scales));
+  Candidate better = search(fitter, joint, best.design, range.from, range.to,
+                            [index](JointFit& d, double value) { d.effects.back().shape[index] = value; });
+  return better.judgement.rmse < best.judgement.rmse ? better : best;
 }
 
 Candidate search_width(const Fitter& fitter, std::size_t joint, const Scales& scales) {
@@ -109,12 +131,11 @@ Candidate search_effect(const Fitter& fitter, std::size_t joint, std::string_vie
   fit.shape.resize(info.shape.size());
   design.effects.push_back(fit);
   if (info.shape.empty()) return {design, fitter.held_out_with(joint, design, {0.0})[0]};
-  // One velocity or one distance: why_not_identified() lets no other shapes through. Stribeck's is low by nature: a
-  // wide one is only a second viscous term.
-  const bool velocity = info.shape[0].quantity == Quantity::inverse_velocity;
-  const double from = velocity ? 3e-3 * scales.velocity : 1e-6 * scales.range;
-  const double to = std::min(info.shape[0].upper, velocity ? 0.15 * scales.velocity : 0.1 * scales.range);
-  return search(fitter, joint, design, from, to, [](JointFit& d, double value) { d.effects.back().shape[0] = value; });
+  // One shape: why_not_identified() lets no other effects through.
+  const ShapeRange range = info.shape[0].values.fitted(motion_scales(scales));
+  const double to = std::min(info.shape[0].upper, range.to);
+  return search(fitter, joint, design, range.from, to,
+                [](JointFit& d, double value) { d.effects.back().shape[0] = value; });
 }
 
 /// Logarithm of each joint's held-out error.
@@ -303,12 +324,9 @@ void weigh(Fitter& fitter, const IdentifySettings& settings) {
 }
 
 std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progress& progress) {
-  const std::vector<std::string> nominal =
-      project.identify.effects.value_or(std::vector<std::string>{"viscous", "coulomb", "offset", "rotor_inertia"});
+  const std::vector<std::string> nominal = project.identify.effects.value_or(nominal_effects());
   const std::vector<std::string_view> optional =
-      project.identify.effects
-          ? std::vector<std::string_view>{}
-          : std::vector<std::string_view>{"motor_coupling", "asymmetric_friction", "presliding", "stribeck"};
+      project.identify.effects ? std::vector<std::string_view>{} : identified_effects();
 
   for (const std::string& effect : nominal) {
     if (const std::string reason = why_not_identified(*find_effect(effect)); !reason.empty())
@@ -325,7 +343,7 @@ std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progres
     scales.push_back({data.dq[k], data.q_upper[k] - data.q_lower[k]});
     if (data.logs.front().is_left_out(k)) continue;
     for (const std::string& effect : nominal) {
-      if (effect == "rotor_inertia" && rotor_inertia_is_absorbed(chain, base, k)) continue;
+      if (in_base(effect) && rotor_inertia_is_absorbed(chain, base, k)) continue;
       if (find_effect(effect)->shape.empty()) {
         EffectFit fit;
         fit.effect = effect;

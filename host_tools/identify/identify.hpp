@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/identify/excitation.hpp"
 #include "host_tools/project/project.hpp"
 #include "host_tools/regression/fitter.hpp"

@@ -6,7 +6,9 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/physical.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/error.hpp"

@@ -3,8 +3,10 @@
 #include <array>
 #include <nlohmann/json_fwd.hpp>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/forward.hpp"
+#include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/regression/dataset.hpp"
+#include "host_tools/robot/robot.hpp"
 
 namespace fxdyn {
 

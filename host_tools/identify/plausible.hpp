@@ -4,8 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/regression/dataset.hpp"
+#include "host_tools/robot/robot.hpp"
 
 namespace fxdyn {
 

@@ -1,6 +1,7 @@
 #include "host_tools/identify/structure.hpp"
 
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 
 namespace fxdyn {
 
@@ -27,7 +28,7 @@ IdentifiedModel identify_structure(const Project& project, GateData data, const 
 IdentifiedModel rigid_part(IdentifiedModel model) {
   for (JointFit& joint : model.joints) {
     joint.bls.reset();
-    std::erase_if(joint.effects, [](const EffectFit& fit) { return fit.effect != RotorInertia::name; });
+    std::erase_if(joint.effects, [](const EffectFit& fit) { return !in_base(fit.effect); });
   }
   return model;
 }

@@ -8,6 +8,7 @@
 #include "host_tools/diagnose/diagnose.hpp"
 #include "host_tools/diagnose/evidence.hpp"
 #include "host_tools/diagnose/plots.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/export/proof.hpp"
 #include "host_tools/identify/payload.hpp"

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/regression/dataset.hpp"
 
 namespace fxdyn {

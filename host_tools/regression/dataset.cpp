@@ -9,10 +9,11 @@
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/signals/spectrum.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/parallel.hpp"
-#include "model/catalogue.hpp"
+#include "model/effects/payload.hpp"
 
 namespace fxdyn {
 namespace {
@@ -318,7 +319,7 @@ double age_of(const IdentifiedModel& model, const ProcessedLog& log) {
   double longest = 0;
   for (const JointFit& joint : model.joints) {
     for (const EffectFit& fit : joint.effects) {
-      if (fit.effect == FrictionDrift::name) longest = std::max(longest, fit.shape[0]);
+      if (drifts(fit.effect)) longest = std::max(longest, fit.shape[0]);
     }
   }
   const double start = log.t[0];
@@ -345,10 +346,7 @@ double bending_hz(const ProcessedLog& log) {
   return log.filter.crossing_hz > 0 && cutoff < std::min(log.filter.position_cutoff_hz, 0.4 / log.step_s) ? cutoff : 0;
 }
 
-bool bends(std::string_view effect) {
-  const EffectInfo& info = *find_effect(effect);
-  return info.acts_on == ActsOn::position && info.needs_structural;
-}
+bool bends(std::string_view effect) { return find_effect(effect)->bends(); }
 
 std::optional<IdentifiedModel> stiffened(const IdentifiedModel& model) {
   IdentifiedModel out = model;

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <array>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/filter_fit.hpp"
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/signals/log.hpp"
 
 namespace fxdyn {

@@ -6,6 +6,8 @@
 #include <optional>
 
 #include "host_tools/effects/broad_learning_types.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/bls_rows.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/error.hpp"
@@ -435,10 +437,10 @@ bool last_is_physical(const JointFit& design, const Eigen::VectorXd& theta) {
     --at;
     if (theta[at] < parameters[i].lower || theta[at] > parameters[i].upper) return false;
   }
-  // Presliding takes the place of Coulomb's sign change (amplitude = Coulomb's): much less of it is something else.
-  if (design.effects.back().effect != Presliding::name) return true;
+  // It takes the place of another one (presliding that of Coulomb's sign): much less of it is something else.
+  const std::string_view replaced = find_effect(design.effects.back().effect)->replaces;
   for (std::size_t i = 0; i < design.effects.size(); ++i) {
-    if (design.effects[i].effect == Coulomb::name) return theta[at] > 0.5 * theta[static_cast<Eigen::Index>(i)];
+    if (design.effects[i].effect == replaced) return theta[at] > 0.5 * theta[static_cast<Eigen::Index>(i)];
   }
   return true;
 }

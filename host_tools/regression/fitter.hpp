@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/forward.hpp"
+#include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/regression/dataset.hpp"
 #include "host_tools/regression/products.hpp"
 #include "host_tools/regression/regressor.hpp"

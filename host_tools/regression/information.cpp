@@ -24,8 +24,8 @@ ParameterColumns::ParameterColumns(const Robot& robot, const Eigen::VectorXd& si
     inertial_.push_back(inertial);
   }
   for (Eigen::Index j = 0; j < n; ++j) {
-    std::vector<std::string> effects{"viscous", "coulomb", "offset"};
-    if (!rotor_inertia_is_absorbed(chain_, base_, j)) effects.push_back("rotor_inertia");
+    std::vector<std::string> effects = nominal_effects();
+    if (rotor_inertia_is_absorbed(chain_, base_, j)) std::erase_if(effects, in_base);
     own_.push_back(inertial_[static_cast<std::size_t>(j)]);
     for (const std::string& effect : effects) {
       own_.back().push_back(size());

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "host_tools/regression/dataset.hpp"
+#include "host_tools/robot/robot.hpp"
 
 namespace fxdyn {
 

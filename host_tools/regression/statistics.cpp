@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "host_tools/effects/effects.hpp"
 #include "host_tools/regression/fitter.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/parallel.hpp"

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/hil/qemu_target.hpp"
 #include "host_tools/support/error.hpp"

@@ -1,3 +1,4 @@
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/replay/replay.hpp"
 
 #include <fmt/format.h>

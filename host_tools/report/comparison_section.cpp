@@ -1,6 +1,7 @@
 #include "host_tools/report/comparison_section.hpp"
 
 #include <fmt/format.h>
+#include <map>
 
 #include <nlohmann/json.hpp>
 #include <numeric>

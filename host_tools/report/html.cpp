@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/page/page.hpp"
 #include "host_tools/page/plot.hpp"
 #include "host_tools/report/comparison_section.hpp"

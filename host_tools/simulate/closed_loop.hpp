@@ -3,7 +3,7 @@
 #include <Eigen/Dense>
 #include <functional>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/support/error.hpp"
 
 namespace fxdyn {

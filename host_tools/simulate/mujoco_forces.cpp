@@ -7,6 +7,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/simulate/mujoco_model.hpp"
 #include "host_tools/support/error.hpp"
 

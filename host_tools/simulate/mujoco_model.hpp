@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/forward.hpp"
 
 namespace fxdyn {
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/simulate/mujoco_forces.hpp"
 #include "host_tools/simulate/mujoco_model.hpp"
 #include "host_tools/support/error.hpp"

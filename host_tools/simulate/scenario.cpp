@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/simulate/mujoco_plant.hpp"
 #include "host_tools/support/files.hpp"
 #include "host_tools/support/toml.hpp"
@@ -82,11 +83,10 @@ void read_effect(Table table, Scenario& scenario) {
   } else {
     const Value value = table.need("joint", "1 for the first moving joint, a list, or \"all\"");
     joints = joints_of(value, scenario);
-    const bool several = fit.effect == Ripple::name || fit.effect == JointCoupling::name;
     for (std::size_t at = 0; at < joints.size(); ++at) {
       const bool twice = std::find(joints.begin(), joints.begin() + static_cast<std::ptrdiff_t>(at), joints[at]) !=
                          joints.begin() + static_cast<std::ptrdiff_t>(at);
-      if (twice || (!several && scenario.plant.joints[joints[at]].find(fit.effect) != nullptr))
+      if (twice || (!info.several && scenario.plant.joints[joints[at]].find(fit.effect) != nullptr))
         value.place().fail(fmt::format("joint {} has {} already", joints[at] + 1, fit.effect));
     }
   }
@@ -94,7 +94,7 @@ void read_effect(Table table, Scenario& scenario) {
   const auto need = [&](const ParameterInfo& parameter) {
     return parameters.need(std::string(parameter.name), fmt::format("in {}", parameter.unit));
   };
-  const auto width = fit.effect == Coulomb::name ? parameters.find("width") : std::nullopt;
+  const auto width = info.has_sign_width ? parameters.find("width") : std::nullopt;
   const std::size_t count = on_body ? 1 : joints.size();
   for (std::size_t at = 0; at < count; ++at) {
     EffectFit one = fit;
@@ -119,10 +119,12 @@ void read_effect(Table table, Scenario& scenario) {
   table.finish();
 }
 
+/// The longest time [s] that an effect remembers where it steps every `step_s`; 0: any, or none at all.
+double longest_memory(const EffectInfo& info, double step_s) { return info.most_ticks * step_s * (1 + 1e-9); }
+
 /// What the plant can't show with this kind of motion.
 void check_plant(const Value& effects, const Scenario& scenario) {
   const bool mujoco = scenario.plant_kind == Scenario::Plant::mujoco;
-  const double longest = Delay::largest * plant_step(scenario) * (1 + 1e-9);
   for (const Value& value : effects.items()) {
     Table table(value);
     const auto joint = table.find("joint");
@@ -130,11 +132,12 @@ void check_plant(const Value& effects, const Scenario& scenario) {
     for (const std::size_t j : joints_of(*joint, scenario)) {
       const JointFit& fit = scenario.plant.joints[j];
       const EffectFit& effect = *fit.find(table.need("name", "").string());
-      if (!mujoco && effect.effect == Delay::name && effect.shape[0] > longest) {
+      const double longest = longest_memory(*find_effect(effect.effect), plant_step(scenario));
+      if (!mujoco && longest > 0 && effect.shape[0] > longest) {
         value.place().fail(
-            fmt::format("this plant's step of {} s leaves room for a delay of {:.4g} s at most; plant = "
+            fmt::format("this plant's step of {} s leaves room for a {} of {:.4g} s at most; plant = "
                         "\"mujoco\" takes any",
-                        plant_step(scenario), longest));
+                        plant_step(scenario), effect.effect, longest));
       }
       if (!mujoco) continue;
       if (const auto why = mujoco_refuses(fit, effect, scenario.motion == Scenario::Motion::closed_loop))
@@ -239,13 +242,16 @@ void read_link_encoders(Table& sensors, Scenario& scenario) {
   for (const std::size_t joint : joints_of(*which, scenario)) scenario.link_encoder[joint] = true;
 }
 
-/// The largest delay that the plant has to remember [s].
-double longest_delay(const IdentifiedModel& plant) {
-  double longest = 0;
+/// The smallest step with which every effect of the plant remembers as long as it has to [s].
+double remembering_step(const IdentifiedModel& plant) {
+  double step = 0;
   for (const JointFit& joint : plant.joints) {
-    if (const EffectFit* delay = joint.find(Delay::name)) longest = std::max(longest, delay->shape[0]);
+    for (const EffectFit& fit : joint.effects) {
+      const std::uint32_t ticks = find_effect(fit.effect)->most_ticks;
+      if (ticks > 0) step = std::max(step, fit.shape[0] / (ticks * (1 + 1e-9)));
+    }
   }
-  return longest;
+  return step;
 }
 
 /// The plant is what identify or diagnose made of a robot.
@@ -302,7 +308,7 @@ double plant_step(const Scenario& scenario) {
     const double tick = scenario.control.tick_s;
     return tick / std::max(1.0, std::ceil(tick / std::min(step, longest_step) - 1e-9));
   }
-  const double remembered = longest_delay(scenario.plant) / (Delay::largest * (1 + 1e-9));
+  const double remembered = remembering_step(scenario.plant);
   // Stamps off the grid are interpolated, which wants a finer one.
   for (int finer = 0; finer < 2 && scenario.jitter > 0 && step / 2 >= remembered; ++finer) step /= 2;
   while (step < remembered && step < scenario.sample_s * 0.9) step *= 2;

@@ -1,9 +1,12 @@
 #include "host_tools/simulate/simulate.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/signals/fourier.hpp"
 #include "host_tools/simulate/closed_loop.hpp"
 #include "host_tools/simulate/mujoco_plant.hpp"
@@ -44,13 +47,15 @@ Reference play(const Scenario& scenario, const ScenarioLog& log, double step_s, 
 IdentifiedModel nominal(IdentifiedModel plant) {
   plant.body.clear();
   for (JointFit& joint : plant.joints)
-    std::erase_if(joint.effects, [](const EffectFit& fit) { return fit.effect != RotorInertia::name; });
+    std::erase_if(joint.effects, [](const EffectFit& fit) { return !in_base(fit.effect); });
   return plant;
 }
 
 bool bends(const IdentifiedModel& plant) {
   for (const JointFit& joint : plant.joints) {
-    if (joint.find(Elasticity::name) != nullptr || joint.find(Backlash::name) != nullptr) return true;
+    if (std::any_of(joint.effects.begin(), joint.effects.end(),
+                    [](const EffectFit& fit) { return find_effect(fit.effect)->bends(); }))
+      return true;
   }
   return false;
 }

@@ -5,6 +5,7 @@
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/support/parallel.hpp"
 
@@ -23,11 +24,19 @@ VectorXd before_total_effects(const JointFit& joint, VectorXd tau, double step_s
   const std::vector<const EffectFit*> effects = in_order(joint, true);
   for (auto it = effects.rbegin(); it != effects.rend(); ++it) {
     const EffectFit& fit = **it;
-    // Saturation: up to its limit the torque is the total; beyond it nothing is known, see mark_hidden().
-    if (fit.effect == TorqueGain::name) tau /= 1 + fit.linear[0];
-    // share total(t - time) + (1 - share) total(t): share is 1 but for a few permille, and then a delay by
-    // share * time to first order.
-    if (fit.effect == Delay::name) tau = at_other_times(tau, fit.linear[0] * fit.shape[0] / step_s);
+    switch (find_effect(fit.effect)->of_total) {
+      case OfTotal::nothing:
+      case OfTotal::clips:  // up to its limit the torque is the total; beyond it nothing is known, see mark_hidden()
+        break;
+      case OfTotal::scales:
+        tau /= 1 + fit.linear[0];
+        break;
+      case OfTotal::delays:
+        // share total(t - time) + (1 - share) total(t): share is 1 but for a few permille, and then a delay by
+        // share * time to first order.
+        tau = at_other_times(tau, fit.linear[0] * fit.shape[0] / step_s);
+        break;
+    }
   }
   return tau;
 }
@@ -52,7 +61,7 @@ KeptEffects::KeptEffects(IdentifiedModel diagnosed, const std::vector<ProcessedL
 
 bool KeptEffects::is_kept(std::size_t joint, const EffectFit& fit) const {
   const EffectInfo& info = *find_effect(fit.effect);
-  if (fit.effect == RotorInertia::name && rotor_is_absorbed_[joint]) return true;
+  if (info.in_base && rotor_is_absorbed_[joint]) return true;
   // What the healthy session had of an effect that grew: today's logs show the sum only.
   const auto& effects = diagnosed_.joints[joint].effects;
   const bool grew = !fit.named && std::any_of(effects.begin(), effects.end(), [&](const EffectFit& other) {
@@ -60,8 +69,7 @@ bool KeptEffects::is_kept(std::size_t joint, const EffectFit& fit) const {
   });
   if (grew) return true;
   // The Fitter's columns start cold with every log.
-  return info.acts_on != ActsOn::torque || info.needs_structural || info.needs_total ||
-         (warm_ && fit.effect == FrictionDrift::name);
+  return info.acts_on != ActsOn::torque || info.needs_structural || info.needs_total || (warm_ && info.drifts());
 }
 
 IdentifiedModel KeptEffects::restore(IdentifiedModel fitted) const {
@@ -129,8 +137,11 @@ std::vector<MatrixXd> KeptEffects::torque(const IdentifiedModel& model, const st
 void KeptEffects::mark_hidden(std::vector<ProcessedLog>& logs) const {
   constexpr double near = 0.98;  // of the limit: noise and the filter's overshoot
   for (std::size_t j = 0; j < diagnosed_.joints.size(); ++j) {
-    const EffectFit* fit = diagnosed_.joints[j].find(Saturation::name);
-    if (fit == nullptr) continue;
+    const auto& effects = diagnosed_.joints[j].effects;
+    const auto fit = std::find_if(effects.begin(), effects.end(), [](const EffectFit& one) {
+      return find_effect(one.effect)->of_total == OfTotal::clips;
+    });
+    if (fit == effects.end()) continue;
     for (ProcessedLog& log : logs) {
       const auto beyond = [&](Index k) { return std::fabs(log.tau(k, static_cast<Index>(j))) > near * fit->shape[0]; };
       for (Index k = 0; k < log.samples();) {

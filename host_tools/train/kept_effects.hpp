@@ -1,5 +1,6 @@
 #pragma once
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/dataset.hpp"
 
 namespace fxdyn {

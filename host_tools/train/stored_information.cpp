@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
 

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/regression/fitter.hpp"
 
 namespace fxdyn {

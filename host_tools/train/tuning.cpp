@@ -5,9 +5,10 @@
 #include <numbers>
 
 #include "host_tools/effects/broad_learning_types.hpp"
+#include "host_tools/effects/effects.hpp"
 #include "host_tools/support/random.hpp"
 #include "host_tools/train/sparse_features.hpp"
-#include "model/catalogue.hpp"
+#include "model/effects/offset.hpp"
 
 namespace fxdyn {
 namespace {
@@ -27,6 +28,8 @@ constexpr double node_rounding = 4e-6;
 constexpr double price_of_multiplication = 1e-7;
 /// Sums that fixed point could not hold count as so many times as bad as they are.
 constexpr double price_of_noise = 10;
+
+bool is_constant(const EffectFit& fit) { return find_effect(fit.effect)->has_constant; }
 
 }  // namespace
 
@@ -92,7 +95,7 @@ JointFit BlsDesigner::operator()(const BlsShape& shape) const {
   bls.weights = (bls.weights * weight_grid).array().round() / weight_grid;
   bls.activation = sigmoid ? "tanh" : shape.activation;
   // The constant half of every sigmoid.
-  if (sigmoid && design.find(Offset::name) == nullptr && design.find(Spring::name) == nullptr) {
+  if (sigmoid && std::none_of(design.effects.begin(), design.effects.end(), is_constant)) {
     EffectFit offset;
     offset.effect = Offset::name;
     design.effects.push_back(offset);

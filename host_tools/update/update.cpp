@@ -2,9 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/identify/plausible.hpp"
 #include "host_tools/project/provenance.hpp"
@@ -125,7 +128,10 @@ struct Refit {
 Refit refit(const Project& project, const IdentifiedModel& old, const StoredInformation& stored,
             std::vector<ProcessedLog>& logs, double forgetting) {
   const auto is_drift = [](const std::string& name) {
-    return name.find(fmt::format(": {},", FrictionDrift::name)) != std::string::npos;
+    const auto& infos = effect_infos();
+    return std::any_of(infos.begin(), infos.end(), [&](const EffectInfo& info) {
+      return info.drifts() && name.find(fmt::format(": {},", info.name)) != std::string::npos;
+    });
   };
   const bool fits_drift = std::any_of(stored.unknowns.begin(), stored.unknowns.end(), is_drift);
   const KeptEffects kept(old, logs, !fits_drift);

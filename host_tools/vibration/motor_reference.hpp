@@ -1,5 +1,6 @@
 #pragma once
 
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/simulate/closed_loop.hpp"
 
 namespace fxdyn {

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/random.hpp"
 
 namespace fxdyn {

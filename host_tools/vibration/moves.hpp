@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/simulate/closed_loop.hpp"
 
 namespace fxdyn {

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <utility>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/identify/structure.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
@@ -19,7 +20,7 @@
 #include "host_tools/support/random.hpp"
 #include "host_tools/vibration/motor_reference.hpp"
 #include "host_tools/vibration/moves.hpp"
-#include "model/catalogue.hpp"
+#include "model/effects/elasticity.hpp"
 
 namespace fxdyn {
 namespace {

@@ -9,6 +9,10 @@ namespace fxdyn {
 struct AsymmetricFriction {
   static constexpr std::string_view name = "asymmetric_friction";
   static constexpr std::string_view equation = "coulomb |s| + viscous |dq|";
+  static constexpr EffectTraits traits{.words = "friction that is not the same in both directions",
+                                       .experiments = {experiments::slow_reversals},
+                                       .friction = true,
+                                       .identified = 2};
   static constexpr std::array<ParameterInfo, 0> shape{};
   static constexpr std::array linear{
       ParameterInfo{"coulomb", "N*m", "N", -unbounded, unbounded, Quantity::unit,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "model/effect.hpp"
+#include "model/shapes.hpp"
 
 namespace fxdyn {
 
@@ -12,8 +13,10 @@ struct Backlash {
   static constexpr std::string_view equation = "delta = half_gap tanh(structural / torque_scale)";
   static constexpr ActsOn acts_on = ActsOn::position;
   static constexpr bool needs_structural = true;
+  static constexpr EffectTraits traits{.words = "play of the gear: the link is free over a small gap",
+                                       .experiments = {experiments::load_reversals, experiments::fast_motion}};
   static constexpr std::array shape{ParameterInfo{"torque_scale", "N*m", "N", 1e-3, 1e5, Quantity::inverse_torque,
-                                                  "Nordin, Gutman 2002 (backlash, smoothed)"}};
+                                                  "Nordin, Gutman 2002 (backlash, smoothed)", shapes::small_load}};
   static constexpr std::array linear{
       ParameterInfo{"half_gap", "rad", "m", 0, 0.1, Quantity::unit, "Nordin, Gutman 2002 (backlash, smoothed)"}};
   template <class N>

@@ -9,6 +9,13 @@ namespace fxdyn {
 struct Coulomb {
   static constexpr std::string_view name = "coulomb";
   static constexpr std::string_view equation = "amplitude s, s = tanh(dq / width)";
+  static constexpr EffectTraits traits{.words = "dry friction: the same at every speed, against the motion",
+                                       .experiments = {experiments::small_reversals, experiments::loaded_poses,
+                                                       experiments::constant_speeds, experiments::warm_robot},
+                                       .nominal = true,
+                                       .friction = true,
+                                       .has_sign_width = true,
+                                       .turns_with_sign = TurnsWithSign::amplitude};
   static constexpr std::array<ParameterInfo, 0> shape{};
   static constexpr std::array linear{ParameterInfo{"amplitude", "N*m", "N", 0, unbounded, Quantity::unit,
                                                    "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Eq. 1"}};

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "model/effect.hpp"
+#include "model/shapes.hpp"
 
 namespace fxdyn {
 
@@ -13,8 +14,14 @@ struct Delay {
   static constexpr bool needs_total = true;
   static constexpr std::uint32_t capacity = 16;           ///< ticks, a power of two
   static constexpr std::uint32_t largest = capacity - 1;  ///< delay [ticks]
+  static constexpr EffectTraits traits{.words = "the torque comes late: bus and current loop",
+                                       .experiments = {experiments::fast_motion},
+                                       .share = true,
+                                       .most_ticks = largest,
+                                       .of_total = OfTotal::delays};
   static constexpr std::array shape{ParameterInfo{"time", "s", "s", 0, 0.03, Quantity::count,
-                                                  "bus and current loop; at most 15 ticks, 0.03 s at 2 ms"}};
+                                                  "bus and current loop; at most 15 ticks, 0.03 s at 2 ms",
+                                                  shapes::delay}};
   static constexpr std::array linear{ParameterInfo{"share", "-", "-", 0, 2, Quantity::torque, "1 by definition"}};
   template <class N>
   struct State {

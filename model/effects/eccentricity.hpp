@@ -10,6 +10,10 @@ struct Eccentricity {
   static constexpr std::string_view name = "eccentricity";
   static constexpr std::string_view equation = "delta = sin sin(q) + cos cos(q)";
   static constexpr ActsOn acts_on = ActsOn::position;
+  static constexpr EffectTraits traits{
+      .words = "an eccentric gear or encoder disc: an error of position that repeats once a turn",
+      .experiments = {experiments::fast_motion},
+      .needs_revolute = true};
   static constexpr std::array<ParameterInfo, 0> shape{};
   static constexpr std::array linear{
       ParameterInfo{"sin", "rad", "m", -0.1, 0.1, Quantity::unit, "Tuttle, Seering 1996 (kinematic error)"},

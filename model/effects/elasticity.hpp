@@ -1,6 +1,7 @@
 #pragma once
 
 #include "model/effect.hpp"
+#include "model/shapes.hpp"
 
 namespace fxdyn {
 
@@ -14,8 +15,10 @@ struct Elasticity {
   static constexpr std::string_view equation = "delta = compliance load, load + relaxation d(load)/dt = structural";
   static constexpr ActsOn acts_on = ActsOn::position;
   static constexpr bool needs_structural = true;
-  static constexpr std::array shape{
-      ParameterInfo{"relaxation", "s", "s", 0, 1, Quantity::unit, "Han, Wu, Hui 2025, Eq. 12: B / K"}};
+  static constexpr EffectTraits traits{.words = "the gear bends under its load",
+                                       .experiments = {experiments::load_reversals, experiments::fast_motion}};
+  static constexpr std::array shape{ParameterInfo{"relaxation", "s", "s", 0, 1, Quantity::unit,
+                                                  "Han, Wu, Hui 2025, Eq. 12: B / K", shapes::relaxation}};
   static constexpr std::array linear{ParameterInfo{"compliance", "rad/(N*m)", "m/N", 0, unbounded, Quantity::torque,
                                                    "Han, Wu, Hui 2025, Eq. 12: 1 / K"}};
   template <class N>

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "model/effect.hpp"
+#include "model/shapes.hpp"
 
 namespace fxdyn {
 
@@ -13,8 +14,14 @@ namespace fxdyn {
 struct FrictionDrift {
   static constexpr std::string_view name = "friction_drift";
   static constexpr std::string_view equation = "w (coulomb s + viscous dq), w = 1 - exp(-t / time_constant)";
+  static constexpr EffectTraits traits{.words = "friction changes as the robot warms up",
+                                       .experiments = {experiments::warm_robot},
+                                       .friction = true,
+                                       .shortest_session_s = 20,
+                                       .warms_into = {"coulomb", "viscous"}};
   static constexpr std::array shape{ParameterInfo{"time_constant", "s", "s", 0.1, 1e4, Quantity::unit,
-                                                  "Bittencourt, Gunnarsson 2012 (friction and temperature)"}};
+                                                  "Bittencourt, Gunnarsson 2012 (friction and temperature)",
+                                                  shapes::time_constant}};
   static constexpr std::array linear{
       ParameterInfo{"coulomb", "N*m", "N", -unbounded, unbounded, Quantity::unit, "Bittencourt, Gunnarsson 2012"},
       ParameterInfo{"viscous", "N*m*s/rad", "N*s/m", -unbounded, unbounded, Quantity::velocity,

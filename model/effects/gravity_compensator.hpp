@@ -9,6 +9,10 @@ namespace fxdyn {
 struct GravityCompensator {
   static constexpr std::string_view name = "gravity_compensator";
   static constexpr std::string_view equation = "cos cos(q) + sin sin(q)";
+  static constexpr EffectTraits traits{.words = "a balancer, or a mass on the joint that the model does not have",
+                                       .experiments = {experiments::wide_range},
+                                       .needs_revolute = true,
+                                       .changes_by_one_more = true};
   static constexpr std::array<ParameterInfo, 0> shape{};
   static constexpr std::array linear{ParameterInfo{"cos", "N*m", "N", -unbounded, unbounded, Quantity::unit,
                                                    "Klimchik, Wu, Dumas, Caro, Furet, Pashkevich 2013"},

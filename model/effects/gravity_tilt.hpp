@@ -12,6 +12,8 @@ struct GravityTilt {
   static constexpr std::string_view name = "gravity_tilt";
   static constexpr std::string_view equation = "up <- Ry(tilt_y) Rx(tilt_x) up";
   static constexpr ActsOn acts_on = ActsOn::body;
+  static constexpr EffectTraits traits{.words = "the base does not stand upright",
+                                       .experiments = {experiments::all_poses}};
   static constexpr std::array<ParameterInfo, 0> shape{};
   // The quantities are not used: nothing of it is stored in tables.
   static constexpr std::array linear{

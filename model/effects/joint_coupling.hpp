@@ -1,6 +1,7 @@
 #pragma once
 
 #include "model/effect.hpp"
+#include "model/shapes.hpp"
 
 namespace fxdyn {
 
@@ -11,8 +12,12 @@ struct JointCoupling {
   static constexpr std::string_view name = "joint_coupling";
   static constexpr std::string_view equation = "coulomb s_k + viscous dq_k, k = joint";
   static constexpr bool needs_peers = true;
+  static constexpr EffectTraits traits{.words = "the friction of another joint is felt here",
+                                       .experiments = {experiments::one_at_a_time},
+                                       .several = true,
+                                       .changes_by_one_more = true};
   static constexpr std::array shape{
-      ParameterInfo{"joint", "-", "-", 1, 32, Quantity::count, "index of the other joint"}};
+      ParameterInfo{"joint", "-", "-", 1, 32, Quantity::count, "index of the other joint", shapes::other_joint}};
   static constexpr std::array linear{
       ParameterInfo{"coulomb", "N*m", "N", -unbounded, unbounded, Quantity::unit,
                     "Gautier, Janot, Vandanjon 2013 (Staubli TX40, axes 5 and 6)"},

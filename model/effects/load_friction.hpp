@@ -10,6 +10,10 @@ struct LoadFriction {
   static constexpr std::string_view name = "load_friction";
   static constexpr std::string_view equation = "coefficient |structural| s";
   static constexpr bool needs_structural = true;
+  static constexpr EffectTraits traits{.words = "friction that grows with the load",
+                                       .experiments = {experiments::loaded_poses},
+                                       .friction = true,
+                                       .turns_with_sign = TurnsWithSign::load};
   static constexpr std::array<ParameterInfo, 0> shape{};
   static constexpr std::array linear{
       ParameterInfo{"coefficient", "-", "-", 0, 1, Quantity::torque, "Hamon, Gautier, Garrec, Janot 2010"}};

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "model/effect.hpp"
+#include "model/shapes.hpp"
 
 namespace fxdyn {
 
@@ -17,10 +18,13 @@ struct MotorCoupling {
       "coulomb tanh((dq + ratio dq_k) / width) + viscous ratio dq_k + inertia ratio ddq_k, k = joint";
   static constexpr bool needs_peers = true;
   static constexpr std::string_view source = "Gautier, Janot, Vandanjon 2013 (Staubli TX40, axes 5 and 6)";
+  static constexpr EffectTraits traits{.words = "two motors drive this joint through a shared gear",
+                                       .experiments = {experiments::one_at_a_time},
+                                       .identified = 1};
   static constexpr std::array shape{
-      ParameterInfo{"joint", "-", "-", 1, 32, Quantity::count, "index of the other joint"},
-      ParameterInfo{"ratio", "-", "-", -100, 100, Quantity::ratio, source},
-      ParameterInfo{"width", "rad/s", "m/s", 1e-5, 1e3, Quantity::inverse_velocity, source}};
+      ParameterInfo{"joint", "-", "-", 1, 32, Quantity::count, "index of the other joint", shapes::neighbour},
+      ParameterInfo{"ratio", "-", "-", -100, 100, Quantity::ratio, source, shapes::direction},
+      ParameterInfo{"width", "rad/s", "m/s", 1e-5, 1e3, Quantity::inverse_velocity, source, shapes::width}};
   static constexpr std::array linear{
       ParameterInfo{"coulomb", "N*m", "N", 0, unbounded, Quantity::unit, source},
       ParameterInfo{"viscous", "N*m*s/rad", "N*s/m", 0, unbounded, Quantity::velocity, source},

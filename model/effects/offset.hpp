@@ -8,6 +8,11 @@ namespace fxdyn {
 struct Offset {
   static constexpr std::string_view name = "offset";
   static constexpr std::string_view equation = "torque";
+  static constexpr EffectTraits traits{
+      .words = "a constant torque: offset of the amplifier, or a load that never changes",
+      .experiments = {experiments::wide_range, experiments::slow_reversals, experiments::wide_range_or_baseline},
+      .nominal = true,
+      .friction = true};
   static constexpr std::array<ParameterInfo, 0> shape{};
   static constexpr std::array linear{ParameterInfo{"torque", "N*m", "N", -unbounded, unbounded, Quantity::unit,
                                                    "Janot, Gautier, Brunot 2019 (EMPS), Eq. 1"}};

@@ -12,6 +12,7 @@ struct Payload {
   static constexpr std::string_view name = "payload";
   static constexpr std::string_view equation = "last link: m += mass, h += mass com, J += mass com com^T";
   static constexpr ActsOn acts_on = ActsOn::body;
+  static constexpr EffectTraits traits{.words = "a load in the gripper", .experiments = {experiments::all_poses}};
   static constexpr std::array<ParameterInfo, 0> shape{};
   // The quantities are not used: nothing of it is stored in tables.
   static constexpr std::array linear{

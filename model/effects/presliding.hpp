@@ -1,6 +1,7 @@
 #pragma once
 
 #include "model/effects/dahl.hpp"
+#include "model/shapes.hpp"
 
 namespace fxdyn {
 
@@ -10,8 +11,14 @@ namespace fxdyn {
 struct Presliding {
   static constexpr std::string_view name = "presliding";
   static constexpr std::string_view equation = "amplitude (z - s), dz/dt = dq / distance (1 - sign(dq) z)";
+  static constexpr EffectTraits traits{
+      .words = "friction builds up over a short path after a reversal, as contacts bend before they slide",
+      .experiments = {experiments::small_reversals},
+      .friction = true,
+      .identified = 3,
+      .replaces = "coulomb"};
   static constexpr std::array shape{ParameterInfo{"distance", "rad", "m", 1e-7, 0.03, Quantity::inverse_path,
-                                                  "Dahl 1968; Han, Wu, Hui 2025, Eq. 20"}};
+                                                  "Dahl 1968; Han, Wu, Hui 2025, Eq. 20", shapes::distance}};
   static constexpr std::array linear{
       ParameterInfo{"amplitude", "N*m", "N", 0, unbounded, Quantity::unit, "Han, Wu, Hui 2025, Eq. 20"}};
   template <class N>

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "model/effect.hpp"
+#include "model/shapes.hpp"
 
 namespace fxdyn {
 
@@ -10,8 +11,12 @@ namespace fxdyn {
 struct Ripple {
   static constexpr std::string_view name = "ripple";
   static constexpr std::string_view equation = "cos cos(wavenumber q) + sin sin(wavenumber q)";
-  static constexpr std::array shape{
-      ParameterInfo{"wavenumber", "rad^-1", "m^-1", 0.5, 1e5, Quantity::inverse_position, "Holtz, Springob 1996"}};
+  static constexpr EffectTraits traits{.words = "torque that repeats with the position: cogging, teeth of a gear",
+                                       .experiments = {experiments::wide_range, experiments::wide_range_or_baseline},
+                                       .several = true,
+                                       .changes_by_one_more = true};
+  static constexpr std::array shape{ParameterInfo{"wavenumber", "rad^-1", "m^-1", 0.5, 1e5, Quantity::inverse_position,
+                                                  "Holtz, Springob 1996", shapes::wavenumber}};
   static constexpr std::array linear{
       ParameterInfo{"cos", "N*m", "N", -unbounded, unbounded, Quantity::unit, "Holtz, Springob 1996"},
       ParameterInfo{"sin", "N*m", "N", -unbounded, unbounded, Quantity::unit, "Holtz, Springob 1996"}};

@@ -9,6 +9,10 @@ namespace fxdyn {
 struct RotorInertia {
   static constexpr std::string_view name = "rotor_inertia";
   static constexpr std::string_view equation = "inertia ddq";
+  static constexpr EffectTraits traits{.words = "inertia of rotor and gear in front of the load",
+                                       .experiments = {experiments::fast_motion, experiments::hopeless},
+                                       .nominal = true,
+                                       .in_base = true};
   static constexpr std::array<ParameterInfo, 0> shape{};
   static constexpr std::array linear{ParameterInfo{"inertia", "kg*m^2", "kg", 0, unbounded, Quantity::acceleration,
                                                    "Siciliano, Sciavicco, Villani, Oriolo, Robotics, sec. 7.2"}};

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "model/effect.hpp"
+#include "model/shapes.hpp"
 
 namespace fxdyn {
 
@@ -11,8 +12,12 @@ struct Saturation {
   static constexpr std::string_view name = "saturation";
   static constexpr std::string_view equation = "share (clip(total, +-limit) - total)";
   static constexpr bool needs_total = true;
-  static constexpr std::array shape{
-      ParameterInfo{"limit", "N*m", "N", 0, unbounded, Quantity::torque, "current limit of a drive"}};
+  static constexpr EffectTraits traits{.words = "the drive is at its current limit",
+                                       .experiments = {experiments::loaded_poses, experiments::constant_speeds},
+                                       .share = true,
+                                       .of_total = OfTotal::clips};
+  static constexpr std::array shape{ParameterInfo{"limit", "N*m", "N", 0, unbounded, Quantity::torque,
+                                                  "current limit of a drive", shapes::torque_limit}};
   static constexpr std::array linear{ParameterInfo{"share", "-", "-", 0, 2, Quantity::torque, "1 by definition"}};
   template <class N>
   using State = NoState;

@@ -9,6 +9,9 @@ namespace fxdyn {
 struct Spring {
   static constexpr std::string_view name = "spring";
   static constexpr std::string_view equation = "stiffness q + offset";
+  static constexpr EffectTraits traits{.words = "a spring along the joint: a cable harness, a balancing spring",
+                                       .experiments = {experiments::wide_range, experiments::wide_range_or_baseline},
+                                       .changes_by_one_more = true};
   static constexpr std::array<ParameterInfo, 0> shape{};
   static constexpr std::array linear{
       ParameterInfo{"stiffness", "N*m/rad", "N/m", -unbounded, unbounded, Quantity::position, "Hooke's law"},

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "model/effect.hpp"
+#include "model/shapes.hpp"
 
 namespace fxdyn {
 
@@ -9,8 +10,13 @@ namespace fxdyn {
 struct Stribeck {
   static constexpr std::string_view name = "stribeck";
   static constexpr std::string_view equation = "amplitude s exp(-(dq / velocity)^2)";
-  static constexpr std::array shape{
-      ParameterInfo{"velocity", "rad/s", "m/s", 1e-5, 1e3, Quantity::inverse_velocity, "Han, Wu, Hui 2025, Eq. 21"}};
+  static constexpr EffectTraits traits{.words = "friction that is higher at very low speed",
+                                       .experiments = {experiments::small_reversals},
+                                       .friction = true,
+                                       .identified = 4,
+                                       .turns_with_sign = TurnsWithSign::amplitude};
+  static constexpr std::array shape{ParameterInfo{"velocity", "rad/s", "m/s", 1e-5, 1e3, Quantity::inverse_velocity,
+                                                  "Han, Wu, Hui 2025, Eq. 21", shapes::velocity}};
   static constexpr std::array linear{
       ParameterInfo{"amplitude", "N*m", "N", 0, unbounded, Quantity::unit, "Han, Wu, Hui 2025, Eq. 21"}};
   template <class N>

@@ -10,6 +10,9 @@ struct TorqueGain {
   static constexpr std::string_view name = "torque_gain";
   static constexpr std::string_view equation = "gain total";
   static constexpr bool needs_total = true;
+  static constexpr EffectTraits traits{.words = "the drive's torque is not what it says by a factor",
+                                       .experiments = {experiments::loaded_poses, experiments::warm_robot},
+                                       .of_total = OfTotal::scales};
   static constexpr std::array<ParameterInfo, 0> shape{};
   static constexpr std::array linear{ParameterInfo{"gain", "-", "-", -0.9, 10, Quantity::torque,
                                                    "Gautier, Briot 2014 (global identification of joint drive gains)"}};

@@ -8,6 +8,11 @@ namespace fxdyn {
 struct Viscous {
   static constexpr std::string_view name = "viscous";
   static constexpr std::string_view equation = "coefficient dq";
+  static constexpr EffectTraits traits{
+      .words = "friction in proportion to the speed",
+      .experiments = {experiments::constant_speeds, experiments::loaded_poses, experiments::warm_robot},
+      .nominal = true,
+      .friction = true};
   static constexpr std::array<ParameterInfo, 0> shape{};
   static constexpr std::array linear{ParameterInfo{"coefficient", "N*m*s/rad", "N*s/m", 0, unbounded,
                                                    Quantity::velocity,

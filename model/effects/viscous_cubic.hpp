@@ -9,6 +9,9 @@ namespace fxdyn {
 struct ViscousCubic {
   static constexpr std::string_view name = "viscous_cubic";
   static constexpr std::string_view equation = "coefficient dq^3";
+  static constexpr EffectTraits traits{.words = "viscous friction that flattens out, or grows steeply, at high speed",
+                                       .experiments = {experiments::constant_speeds},
+                                       .friction = true};
   static constexpr std::array<ParameterInfo, 0> shape{};
   static constexpr std::array linear{ParameterInfo{"coefficient", "N*m*s^3/rad^3", "N*s^3/m^3", -unbounded, unbounded,
                                                    Quantity::velocity_cubed,

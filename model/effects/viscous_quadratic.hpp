@@ -9,6 +9,10 @@ namespace fxdyn {
 struct ViscousQuadratic {
   static constexpr std::string_view name = "viscous_quadratic";
   static constexpr std::string_view equation = "coefficient dq |dq|";
+  static constexpr EffectTraits traits{
+      .words = "friction that grows with the square of the speed: churned grease, fans",
+      .experiments = {experiments::constant_speeds},
+      .friction = true};
   static constexpr std::array<ParameterInfo, 0> shape{};
   static constexpr std::array linear{
       ParameterInfo{"coefficient", "N*m*s^2/rad^2", "N*s^2/m^2", -unbounded, unbounded, Quantity::velocity_squared,

@@ -5,6 +5,7 @@
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/files.hpp"
 #include "tests/campaign/generate.hpp"
 #include "tests/campaign/score.hpp"

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "tests/campaign/score.hpp"
 #include "tests/campaign/truth.hpp"
 

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/error.hpp"
 
 namespace fxdyn::campaign {

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/effects/robot_columns.hpp"
 #include "host_tools/excite/effect_information.hpp"
 #include "host_tools/regression/regressor.hpp"
@@ -55,7 +56,7 @@ std::vector<std::pair<EffectCandidate, std::string>> rivals(const Plan& plan, co
   std::vector<std::pair<EffectCandidate, std::string>> list;
   for (const EffectInfo& info : effect_infos()) {
     const std::string name(info.name);
-    const bool nominal = std::find(nominal_effects.begin(), nominal_effects.end(), name) != nominal_effects.end();
+    const bool nominal = find_effect(name)->nominal;
     if (nominal || std::find(names.begin(), names.end(), name) != names.end()) continue;
     // A sine of one chosen wavenumber explains no other effect; free ones would have to be searched.
     if (name == "ripple") continue;

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/signals/log.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/support/files.hpp"

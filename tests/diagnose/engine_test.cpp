@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "tests/diagnose/arm_sessions.hpp"
 #include "tests/support/sanitizers.hpp"
 

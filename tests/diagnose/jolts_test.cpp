@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "tests/diagnose/small_log.hpp"
 
 namespace fxdyn::diagnosis {

@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "tests/diagnose/small_log.hpp"
 
 namespace fxdyn::diagnosis {

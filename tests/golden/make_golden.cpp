@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <exception>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/support/files.hpp"
 #include "host_tools/support/random.hpp"

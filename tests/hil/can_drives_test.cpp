@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "firmware/protocol/object_dictionary.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/hil/can_replay.hpp"
 #include "host_tools/robot/robot.hpp"
 #include "host_tools/support/error.hpp"

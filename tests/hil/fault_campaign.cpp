@@ -4,6 +4,8 @@
 #include <bit>
 #include <cstdio>
 
+#include "model/effects/delay.hpp"
+
 namespace fxdyn::hil {
 namespace {
 

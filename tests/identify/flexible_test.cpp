@@ -1,4 +1,6 @@
 #include "host_tools/identify/flexible.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

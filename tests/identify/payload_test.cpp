@@ -1,4 +1,5 @@
 #include "host_tools/identify/payload.hpp"
+#include "host_tools/effects/identified_model.hpp"
 
 #include <gtest/gtest.h>
 

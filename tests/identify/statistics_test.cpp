@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/identify/identify.hpp"
 #include "host_tools/regression/essential.hpp"
 #include "host_tools/regression/solver.hpp"

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Folders of host_tools and who may see whom.
 
-  layers.py [ROOT]           checks: no cycle among the folders, every include along a link, the drawing in the docs
+  layers.py [ROOT]           checks: no cycle among the folders, every include along a link, the drawing in the docs, and that
+                             only sources of effects/ include the catalogue: a new effect compiles nothing else again
   layers.py --draw [ROOT]    the folders from the ground up, each with what its CMakeLists.txt links
 
 An arrow is an #include of another folder's header. Links are those of CMake: fxdyn_layer(NAME .. LINKS ..) and
@@ -14,6 +15,7 @@ import sys
 
 INCLUDE = re.compile(r'^\s*#include "host_tools/(\w+)/[^"]*"', re.M)
 LAYER = re.compile(r'fxdyn_layer\(\s*(\w+)([^)]*)\)')
+TYPES = re.compile(r'^#include "(model/(?:catalogue|joint_model)\.hpp)"', re.M)
 DOCUMENT = 'docs/decisions/0007-layers.md'
 TARGETS = {'dictionary_files': 'dictionary'}  # where a target has another name than its folder
 
@@ -29,6 +31,16 @@ def includes_of(root):
             for match in INCLUDE.finditer(path.read_text()):
                 if match.group(1) != path.parent.name:
                     yield path.relative_to(root), path.parent.name, match.group(1)
+
+
+def catalogue_includes_of(root):
+    """Lines, one for each file that must not know the types of the catalogue"""
+    for path in sorted((root / 'host_tools').glob('*/*.?pp')):
+        if path.parent.name == 'effects' and path.suffix == '.cpp':
+            continue
+        text = re.sub(r'R"\((.*?)\)"', '', path.read_text(), flags=re.S)  # what is written into generated files
+        for match in TYPES.finditer(text):
+            yield f'{path.relative_to(root)}: includes {match.group(1)}, which only sources of effects/ may'
 
 
 def links_of(root):
@@ -97,7 +109,7 @@ def main():
     if options.draw:
         print(drawing(links))
         return 0
-    found = complaints(list(includes_of(options.root)), links)
+    found = complaints(list(includes_of(options.root)), links) + list(catalogue_includes_of(options.root))
     if drawing(links) not in (options.root / DOCUMENT).read_text():
         found.append(f'{DOCUMENT}: the drawing is not that of the links; copy what layers.py --draw prints')
     print('\n'.join(found) or f'{len(links)} folders, no cycle, every include along a link')

@@ -50,6 +50,14 @@ class Layers(unittest.TestCase):
                        'middle/b.cpp': '#include "host_tools/ground/a.hpp"\n'})
         self.assertEqual(lines, ['include cycle among: ground middle', 'link cycle among: ground middle'])
 
+    def test_only_sources_of_effects_know_the_catalogue(self):
+        include = '#include "model/catalogue.hpp"\n'
+        with tempfile.TemporaryDirectory() as directory:
+            root = tree(directory, {'effects/a.cpp': include, 'effects/a.hpp': include, 'ground/b.cpp': include,
+                                    'ground/c.cpp': f'auto text = R"({include})";'})
+            self.assertEqual([line.split(':')[0] for line in layers.catalogue_includes_of(root)],
+                             ['host_tools/effects/a.hpp', 'host_tools/ground/b.cpp'])
+
     def test_what_is_drawn_stands_on_what_it_links(self):
         self.assertEqual(layers.drawing({'a': set(), 'b': {'a'}, 'c': {'a', 'b'}}),
                          '2  c           <- b\n1  b           <- a\n0  a')

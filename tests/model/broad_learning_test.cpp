@@ -1,6 +1,7 @@
 // The BLS's sets of inputs and its activations: fixed point against double, and what the tables say of them.
 
 #include "model/broad_learning.hpp"
+#include "host_tools/effects/identified_model.hpp"
 
 #include <gtest/gtest.h>
 

@@ -9,6 +9,7 @@
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/numbers/run_time_fixed.hpp"
+#include "model/catalogue.hpp"
 
 // Every effect in the firmware's fixed point against double, both fed with the same quantised inputs and parameters, so
 // that the difference is the arithmetic's alone: over random inputs and at the corners of the limits. The same code

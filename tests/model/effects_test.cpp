@@ -6,9 +6,14 @@
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/random.hpp"
+#include "model/effects/delay.hpp"
+#include "model/effects/gravity_tilt.hpp"
+#include "model/effects/joint_coupling.hpp"
+#include "model/effects/payload.hpp"
 
 namespace fxdyn {
 namespace {

@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/export/proof.hpp"
 #include "host_tools/support/random.hpp"
+#include "model/effects/delay.hpp"
+#include "model/effects/saturation.hpp"
 #include "tests/support/broad_learning.hpp"
 
 namespace fxdyn {

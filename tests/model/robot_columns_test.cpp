@@ -1,4 +1,5 @@
 #include "host_tools/effects/robot_columns.hpp"
+#include "host_tools/effects/identified_model.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,6 +9,7 @@
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/excite/nominal.hpp"
 #include "host_tools/support/error.hpp"
+#include "model/effects/payload.hpp"
 
 namespace fxdyn {
 namespace {

@@ -1,4 +1,5 @@
 #include "host_tools/regression/physical.hpp"
+#include "host_tools/effects/identified_model.hpp"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/project/project.hpp"
 #include "host_tools/signals/fourier.hpp"
 #include "host_tools/simulate/scenario.hpp"

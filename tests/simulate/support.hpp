@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <string>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/signals/fourier.hpp"
 #include "host_tools/simulate/closed_loop.hpp"
 #include "tests/support/chains.hpp"

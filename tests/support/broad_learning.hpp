@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "host_tools/effects/broad_learning_types.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/random.hpp"
 
 namespace fxdyn::test {

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/export/proof.hpp"
 #include "host_tools/hil/qemu_target.hpp"

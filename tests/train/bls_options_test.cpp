@@ -8,6 +8,7 @@
 #include <set>
 
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/export/proof.hpp"
 #include "host_tools/pipeline/pipeline.hpp"

@@ -1,4 +1,5 @@
 #include "host_tools/vibration/motor_reference.hpp"
+#include "host_tools/effects/identified_model.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,170 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <initializer_list>
+#include <string_view>
+
+#include "model/quantity.hpp"
+
+// What an effect declares of itself beside its formula. Only the host reads it: no image of a firmware holds any of it.
+
+namespace fxdyn {
+
+/// How a joint moves: what decides which shapes are worth a try. SI, [rad | m] by the joint's type.
+struct MotionScales {
+  double speed = 0;            ///< largest |dq| [rad/s | m/s]
+  double range = 0;            ///< of q [rad | m]
+  double torque = 0;           ///< largest of the model [N*m | N]
+  double structural = 0;       ///< largest rigid-body torque [N*m | N]
+  double seconds = 0;          ///< the session's length [s]
+  double sign_width = 0;       ///< of s = tanh(dq / width) [rad/s | m/s]
+  bool turns = true;           ///< revolute, else prismatic
+  unsigned joint = 0;          ///< index from 0
+  unsigned joints = 1;         ///< of the robot
+  bool like_previous = false;  ///< the joint before is of the same type: the two may share a gear
+  bool like_next = false;      ///< likewise the joint after
+  double upper = 0;            ///< largest value that the parameter may have here
+};
+
+/// A few values of one parameter.
+class ValueList {
+ public:
+  constexpr ValueList() = default;
+  constexpr ValueList(std::initializer_list<double> values) {
+    for (const double value : values) add(value);
+  }
+  constexpr void add(double value) { values_[size_++] = value; }
+  constexpr const double* begin() const { return values_.data(); }
+  constexpr const double* end() const { return values_.data() + size_; }
+  constexpr std::size_t size() const { return size_; }
+  constexpr double operator[](std::size_t i) const { return values_[i]; }
+
+ private:
+  std::array<double, 32> values_{};  // as many as a robot may have joints
+  std::size_t size_ = 0;
+};
+
+/// An interval of one parameter.
+struct ShapeRange {
+  double from = 0, to = 0;
+};
+
+/// How the best value of a shape parameter is found.
+enum class ShapeSearch : std::uint8_t {
+  refine,    ///< from the best of the values tried, continuously
+  list,      ///< one of the values tried
+  spectrum,  ///< a wavenumber n whose phi are cos(n q) and sin(n q): from the residual's spectrum over the position
+};
+
+/// Which values of a shape parameter to try. model/shapes.hpp has the usual ones.
+struct ShapeValues {
+  using List = ValueList (*)(const MotionScales&);
+  List tried = nullptr;   ///< by `diagnose`; not for ShapeSearch::spectrum
+  List judged = nullptr;  ///< by `excite`, the typical one first
+  /// Searched by `identify`; null: it can't fit the effect.
+  ShapeRange (*fitted)(const MotionScales&) = nullptr;
+  ShapeSearch search = ShapeSearch::refine;
+  bool seen_by_encoder = false;  ///< a path: what is shorter than the encoder's step does not show
+  /// For deflections that a link encoder shows: where the fit begins, then what it tries.
+  List of_link = nullptr;
+
+  constexpr bool declared() const { return judged != nullptr && (tried != nullptr || search == ShapeSearch::spectrum); }
+};
+
+/// One parameter of an effect, as the user sees it (SI, joint side of the gearbox).
+struct ParameterInfo {
+  std::string_view name;
+  std::string_view unit;            ///< revolute joint
+  std::string_view unit_prismatic;  ///< prismatic joint
+  double lower, upper;              ///< bounds that fits and scenarios keep
+  /// Linear parameter: the quantity of its phi. Shape: the quantity that the tables store (see stored_shape()).
+  Quantity quantity;
+  std::string_view source;
+  ShapeValues values{};  ///< of a shape parameter; has to be declared
+};
+
+inline constexpr double unbounded = 1e30;
+
+/// What sum(theta phi) of an effect is.
+enum class ActsOn : std::uint8_t {
+  torque,    ///< added to the joint's torque
+  position,  ///< deflection delta between motor and link: the rigid body moves at q - delta
+  body,      ///< no sum: changes the parameters of the rigid body (BodyEffects in catalogue.hpp)
+};
+
+/// What an effect with `needs_total` does with the total, so that it can be taken back.
+enum class OfTotal : std::uint8_t {
+  nothing,
+  scales,  ///< total * (1 + theta)
+  delays,  ///< total(t - shape): at most `most_ticks` ticks
+  clips,   ///< total within +-shape
+};
+
+/// How friction turns with the velocity's sign: what an uncertain velocity near standstill makes of it.
+enum class TurnsWithSign : std::uint8_t {
+  no,
+  amplitude,  ///< theta s: by 2 theta
+  load,       ///< theta |load| s: by 2 theta |load|
+};
+
+/// A motion that shows effects and tells those apart that name it. Of several in common the one of lowest order counts.
+struct NamedExperiment {
+  unsigned order = 0;
+  std::string_view text{};
+};
+
+namespace experiments {
+inline constexpr NamedExperiment hopeless{1, "nothing: base parameters hold the rotor, and the torque is the same"};
+inline constexpr NamedExperiment slow_reversals{2, "slow motion through zero velocity, both ways"};
+inline constexpr NamedExperiment wide_range{3, "a wider range of positions"};
+inline constexpr NamedExperiment wide_range_or_baseline{4, "a wider range of positions, or a baseline"};
+inline constexpr NamedExperiment loaded_poses{
+    5, "poses in which the joint carries load, moved slowly with and against gravity"};
+inline constexpr NamedExperiment constant_speeds{6, "constant speeds from slow to the limit"};
+inline constexpr NamedExperiment warm_robot{7, "the first motion once more at the end, after the robot warmed up"};
+inline constexpr NamedExperiment load_reversals{8, "motion in which the load reverses; an encoder on the link"};
+inline constexpr NamedExperiment small_reversals{9, "slow reversals of a few milliradians, and of a few degrees"};
+inline constexpr NamedExperiment fast_motion{10, "faster motion beside the slow one; an encoder on the link"};
+inline constexpr NamedExperiment one_at_a_time{11, "joints moved one at a time"};
+inline constexpr NamedExperiment all_poses{12, "other positions, speeds and loads in other combinations"};
+}  // namespace experiments
+
+/// What every effect declares as `static constexpr EffectTraits traits`. `words` and `experiments` have to be there;
+/// the rest where it differs from the usual: a torque that diagnosis may find once at a joint.
+struct EffectTraits {
+  std::string_view words;  ///< what it is, in a few plain words
+  /// What shows it, the best first. Effects that name the same one are confused with each other until it is done.
+  std::array<NamedExperiment, 6> experiments{};
+
+  bool nominal = false;         ///< every joint has it: diagnosis starts with it
+  bool friction = false;        ///< differs from day to day as friction does
+  bool several = false;         ///< a joint may have more than one
+  bool needs_revolute = false;  ///< a function of an angle
+  /// A change since the baseline is one more of it, with a shape of its own.
+  bool changes_by_one_more = false;
+  /// Of inertia that base parameters may hold: then it can't be told from them.
+  bool in_base = false;
+  bool has_sign_width = false;  ///< the joint's sign width is reported with it
+  bool share = false;           ///< its only coefficient is 1 by definition
+  unsigned identified = 0;      ///< place among the effects that `identify` adds by itself; 0: it does not
+  double shortest_session_s = 0;
+  std::uint32_t most_ticks = 0;  ///< a time shape is at most so many ticks; 0: any
+  OfTotal of_total = OfTotal::nothing;
+  TurnsWithSign turns_with_sign = TurnsWithSign::no;
+  /// Takes the place of this effect: its first coefficient is about as large.
+  std::string_view replaces{};
+  /// It grows with time alone, from nothing to these effects together, by the share warmth(seconds, shape).
+  std::array<std::string_view, 2> warms_into{};
+
+  constexpr bool drifts() const { return !warms_into[0].empty(); }
+  constexpr bool named_experiment(const NamedExperiment& experiment) const {
+    for (const NamedExperiment& own : experiments) {
+      if (own.order == experiment.order && own.text == experiment.text) return !own.text.empty();
+    }
+    return false;
+  }
+};
+
+}  // namespace fxdyn
