@@ -39,6 +39,13 @@ std::string to_string(Role role) {
   return "";
 }
 
+Role role_of(std::string_view name) {
+  for (const Role role : {Role::baseline, Role::train, Role::validate, Role::test}) {
+    if (to_string(role) == name) return role;
+  }
+  throw InputError(fmt::format("'{}' is no role of a log; use baseline, train, validate or test", name));
+}
+
 Log read_log(const std::filesystem::path& file, std::size_t joints, const std::vector<bool>& revolute,
              const LogFormat& format, std::optional<double> from_s, std::optional<double> to_s, bool torque_required) {
   const std::string where = file.string();
@@ -49,10 +56,11 @@ Log read_log(const std::filesystem::path& file, std::size_t joints, const std::v
   LogRequest request{.file = file, .joints = joints, .columns = format, .torque_required = torque_required};
   if (from_s) request.from = *from_s;
   if (to_s) request.to = *to_s;
-  auto [log, first_t, last_t] = reader_of(file).read(request);
+  RecordedLog recorded = reader_of(file).read(request);
+  Log log = std::move(recorded.log);
   if (log.samples() < 2) {
     throw InputError(fmt::format("{}: the window [{:.9g}, {:.9g}) s holds {} rows; the file has {:.9g} to {:.9g} s",
-                                 where, request.from, request.to, log.samples(), first_t, last_t));
+                                 where, request.from, request.to, log.samples(), recorded.first_t, recorded.last_t));
   }
   if (log.tau.size() > 0) {
     for (std::size_t joint = 0; joint < format.torque_gain.size(); ++joint)
