@@ -9,7 +9,7 @@
 #include <numeric>
 
 #include "host_tools/page/plot.hpp"
-#include "host_tools/report/diagnosis_section.hpp"
+#include "host_tools/report/diagnosis_plot.hpp"
 #include "host_tools/signals/spectrum.hpp"
 #include "host_tools/support/files.hpp"
 
