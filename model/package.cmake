@@ -15,6 +15,7 @@ write_basic_package_version_file(fxdynConfigVersion.cmake COMPATIBILITY SameMino
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/fxdynConfig.cmake ${CMAKE_CURRENT_BINARY_DIR}/fxdynConfigVersion.cmake
   DESTINATION ${package_directory})
 
-file(GLOB toolchain_files CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/toolchains/*.cmake)
+file(GLOB toolchain_files CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/toolchains/*.cmake
+  ${PROJECT_SOURCE_DIR}/toolchains/boards.txt)
 install(FILES ${toolchain_files} DESTINATION share/fxdyn/toolchains)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/toolchains/linker DESTINATION share/fxdyn/toolchains)

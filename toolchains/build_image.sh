@@ -4,7 +4,7 @@
 # Leaves OUT_DIR/fxdyn-<board>.elf and OUT_DIR/size.json; the build tree stays in OUT_DIR/build-PRESET for the next time.
 set -euo pipefail
 if [ $# -lt 2 ]; then
-  echo "usage: build_image.sh TABLES.hpp OUT_DIR [cortex-m3|cortex-m4|cortex-m7|cortex-m33 [EFFECTS.hpp]]" >&2
+  echo "usage: build_image.sh TABLES.hpp OUT_DIR [PRESET [EFFECTS.hpp]]" >&2
   exit 2
 fi
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -14,10 +14,8 @@ tables=$(realpath "$1")
 mkdir -p "$2"
 out=$(realpath "$2")
 preset=${3:-cortex-m4}
-case $preset in cortex-m3 | cortex-m4 | cortex-m7 | cortex-m33) ;; *)
-  echo "build_image: no image for '$preset': cortex-m3, cortex-m4, cortex-m7 or cortex-m33" >&2
-  exit 2 ;;
-esac
+known=$(awk '/^[a-z]/ && / fxdyn=/ { printf " %s", $2 }' "$root/toolchains/boards.txt")
+[[ "$known " == *" $preset "* ]] || { echo "build_image: no image for '$preset', known:$known" >&2; exit 2; }
 # those that fxdyn was built with
 effects=${4:-$(sed -n 's/^FXDYN_EFFECTS:FILEPATH=//p' "$root/build/host/CMakeCache.txt" 2>/dev/null || true)}
 rm -f "$out"/fxdyn-*.elf "$out/size.json"

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# build_node.sh TABLES.hpp OUT_DIR [linux|cortex-m3|cortex-m4|cortex-m7|stm32g474|netduinoplus2|cortex-r5 [EFFECTS.hpp]]: builds the drive node with
-# these tables. Leaves it in OUT_DIR: fxdyn_node (linux, the default), else node-<board>.elf, .bin and .hex with their size.json.
+# build_node.sh TABLES.hpp OUT_DIR [linux|PRESET [EFFECTS.hpp]]: builds the drive node with these tables; PRESET: one of boards.txt with an image
+# "node". Leaves it in OUT_DIR: fxdyn_node (linux, the default), else node-<board>.elf, .bin and .hex with their size.json.
 set -euo pipefail
 if [ $# -lt 2 ]; then
   sed -n '2,3s/^# //p' "$0" >&2
@@ -12,10 +12,8 @@ tables=$(realpath "$1")
 mkdir -p "$2"
 out=$(realpath "$2")
 preset=${3:-linux}
-case $preset in linux | cortex-m3 | cortex-m4 | cortex-m7 | stm32g474 | netduinoplus2 | cortex-r5) ;; *)
-  echo "build_node: no node for '$preset': linux, cortex-m3, cortex-m4, cortex-m7, stm32g474, netduinoplus2 or cortex-r5" >&2
-  exit 2 ;;
-esac
+known=$(awk '/^[a-z]/ && / node=/ { printf " %s", $2 }' "$root/toolchains/boards.txt")
+[[ " linux$known " == *" $preset "* ]] || { echo "build_node: no node for '$preset', known: linux$known" >&2; exit 2; }
 target=fxdyn_node configure=$preset
 [ "$preset" != linux ] || { target=fxdyn_linux_node configure=host; }
 # those that fxdyn was built with

@@ -5,7 +5,7 @@
 #include "host_tools/cli/verb.hpp"
 #include "host_tools/excite/excite.hpp"
 #include "host_tools/pipeline/forward_log.hpp"
-#include "host_tools/pipeline/pipeline.hpp"
+#include "host_tools/pipeline/one_log.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/support/error.hpp"
 

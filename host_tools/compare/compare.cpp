@@ -102,7 +102,7 @@ class Comparison {
     }
   }
 
-  json run(const std::vector<std::string>& methods) {
+  ComparisonResult run(const std::vector<std::string>& methods) {
     const auto wanted = [&](const char* name) {
       return std::find(methods.begin(), methods.end(), name) != methods.end();
     };
@@ -119,12 +119,8 @@ class Comparison {
     if (against_truth_ && wanted("oracle")) oracle();
     if (against_truth_ && wanted("noise_floor")) noise_floor();
     progress_.done();
-    return {{"schema", "fxdyn.compare/1"},
-            {"against", against_truth_ ? "truth" : "measurement"},
-            {"project_hash", project_hash(project_)},
-            {"made_from", made_from(project_, directory_, true)},
-            {"paper", project_.compare.paper},
-            {"methods", methods_}};
+    return {against_truth_, project_hash(project_), made_from(project_, directory_, true), project_.compare.paper,
+            methods_};
   }
 
   /// The outcome is written down.
@@ -171,14 +167,14 @@ class Comparison {
   }
 
   /// Wall time of a search; that of the last of its runs says nothing.
-  static json seconds_of(std::chrono::steady_clock::time_point start, bool went_on) {
-    return went_on ? json(nullptr) : json(seconds_since(start));
+  static std::optional<double> seconds_of(std::chrono::steady_clock::time_point start, bool went_on) {
+    return went_on ? std::nullopt : std::optional(seconds_since(start));
   }
 
   void stage(const std::string& name) { progress_.stage("compare: " + name, 1); }
 
   /// Judges a method. @param model where it is one that firmware could have
-  void add(const std::string& name, const Torque& torque, double multiplications, const json& train_s,
+  void add(const std::string& name, const Torque& torque, double multiplications, std::optional<double> train_s,
            const IdentifiedModel* model) {
     const auto n = static_cast<Index>(project_.robot.size());
     VectorXd square = VectorXd::Zero(n), peak = VectorXd::Zero(n), rough = VectorXd::Zero(n), rough_ref = rough;
@@ -199,30 +195,25 @@ class Comparison {
       rough_ref += (theirs.bottomRows(inside - 1) - theirs.topRows(inside - 1)).colwise().squaredNorm().transpose();
       count += static_cast<double>(inside);
     }
-    json rmse = json::array(), percent = json::array(), peaks = json::array();
-    double mean = 0, smoothness = 0;
+    MethodResult result;
+    result.name = name;
     for (Index j = 0; j < n; ++j) {
       const double value = std::sqrt(square[j] / count), share = 100 * value / rated_[static_cast<std::size_t>(j)];
-      rmse.push_back(value);
-      percent.push_back(share);
-      peaks.push_back(peak[j]);
-      mean += share / static_cast<double>(n);
-      smoothness += std::sqrt(rough[j] / std::max(rough_ref[j], 1e-300)) / static_cast<double>(n);
+      result.rmse.push_back(value);
+      result.percent_rated.push_back(share);
+      result.peak.push_back(peak[j]);
+      result.mean_percent_rated += share / static_cast<double>(n);
+      result.smoothness += std::sqrt(rough[j] / std::max(rough_ref[j], 1e-300)) / static_cast<double>(n);
     }
-    methods_.push_back({{"name", name},
-                        {"rmse", rmse},
-                        {"percent_rated", percent},
-                        {"mean_percent_rated", mean},
-                        {"peak", peaks},
-                        {"smoothness", smoothness},
-                        {"macs_per_tick", multiplications},
-                        {"train_s", train_s},
-                        {"predict_us", 1e6 * predict_s / std::max(samples, 1.0)},
-                        {"fixed_error", model != nullptr ? fixed_error(*model) : json(nullptr)}});
+    result.macs_per_tick = multiplications;
+    result.train_s = train_s;
+    result.predict_us = 1e6 * predict_s / std::max(samples, 1.0);
+    if (model != nullptr) result.fixed_error = fixed_error(*model);
+    methods_.push_back(std::move(result));
     progress_.step();
   }
 
-  json fixed_error(const IdentifiedModel& model) const {
+  std::optional<double> fixed_error(const IdentifiedModel& model) const {
     try {
       const Formats formats = choose_formats(model);
       std::vector<TickStates> states;
@@ -233,7 +224,7 @@ class Comparison {
         worst = std::max(worst, error.largest[static_cast<Index>(j)] / rated_[j]);
       return worst;
     } catch (const DataError&) {
-      return nullptr;  // a model that fixed point can't hold is still a method
+      return {};  // a model that fixed point can't hold is still a method
     }
   }
 
@@ -246,7 +237,7 @@ class Comparison {
     return sum;
   }
 
-  void add_model(const std::string& name, const json& train_s) {
+  void add_model(const std::string& name, std::optional<double> train_s) {
     add(
         name, [&](const ProcessedLog& log) { return predict(*last_, log); }, multiplications(*last_), train_s, &*last_);
   }
@@ -390,7 +381,7 @@ class Comparison {
     stage(name);
     std::vector<StateFit> fits(n);
     parallel_for(n, [&](std::size_t j) { fits[j] = fit_state(shapes[j], j, x[j], y[j]); });
-    const json spent = seconds_of(start, went_on);
+    const std::optional<double> spent = seconds_of(start, went_on);
     double macs = multiplications(structure);
     for (const StateFit& fit : fits) macs += static_cast<double>(fit.net->multiplications());
     last_ = structure;
@@ -418,7 +409,7 @@ class Comparison {
     const bool went_on = resume && fs::exists(resume->path);
     train(*fitter, settings, progress_, resume);
     last_ = learned_ = finish_model(*fitter, project, data).model;
-    const json spent = seconds_of(start, went_on);
+    const std::optional<double> spent = seconds_of(start, went_on);
     stage(name);
     add_model(name, spent);
   }
@@ -455,49 +446,24 @@ class Comparison {
   std::optional<IdentifiedModel> last_, learned_;
   std::map<std::string, MatrixXd> torque_;  ///< of the first test log, filtered
   Progress progress_;
-  json methods_ = json::array();
+  std::vector<MethodResult> methods_;
 };
 
 }  // namespace
 
-json compare_methods(const Project& project, const fs::path& directory, const std::vector<std::string>& methods) {
+ComparisonResult compare_methods(const Project& project, const fs::path& directory,
+                                 const std::vector<std::string>& methods) {
   return Comparison(project, directory, false).run(methods);
 }
 
-json compare(const fs::path& project, const fs::path& directory) {
+ComparisonResult compare(const fs::path& project, const fs::path& directory) {
   Comparison comparison(read_project(project), directory, true);
-  const json result = comparison.run({"rigid_ls", "friction_ls", "rls", "mlp", "bls_default", "bls_pso",
-                                      "bls_pso_physical", "lugre", "named_bls", "oracle", "noise_floor"});
+  const ComparisonResult result = comparison.run({"rigid_ls", "friction_ls", "rls", "mlp", "bls_default", "bls_pso",
+                                                  "bls_pso_physical", "lugre", "named_bls", "oracle", "noise_floor"});
   write_comparison_plots(comparison.shown(), directory);
-  write_file(directory / "compare.json", result.dump(1) + "\n");
+  write_file(directory / "compare.json", to_json(result).dump(1) + "\n");
   comparison.drop_searches();
   return result;
-}
-
-std::string compare_table(const json& comparison) {
-  std::string out = fmt::format("errors against the {}, test logs, % of rated torque per joint\n",
-                                comparison.at("against").get<std::string>());
-  out += fmt::format("{:<17} {:>7}  {:<48} {:>6} {:>7} {:>8} {:>8} {:>9}\n", "method", "mean %", "joints %", "smooth",
-                     "MAC", "train s", "us", "fixed");
-  for (const json& method : comparison.at("methods")) {
-    std::string joints;
-    for (const json& share : method.at("percent_rated")) joints += fmt::format("{:.3g} ", share.get<double>());
-    const json& fixed = method.at("fixed_error");
-    out += fmt::format("{:<17} {:>7.3f}  {:<48} {:>6.3f} {:>7.0f} {:>8.2f} {:>8.2f} {:>9}\n",
-                       method.at("name").get<std::string>(), method.at("mean_percent_rated").get<double>(), joints,
-                       method.at("smoothness").get<double>(), method.at("macs_per_tick").get<double>(),
-                       method.at("train_s").is_null() ? NAN : method.at("train_s").get<double>(),
-                       method.at("predict_us").get<double>(),
-                       fixed.is_null() ? "-" : fmt::format("{:.2g}", fixed.get<double>()));
-  }
-  out += fmt::format("\n{:<17} RMSE, peak of every joint [N*m | N]\n", "method");
-  for (const json& method : comparison.at("methods")) {
-    out += fmt::format("{:<17}", method.at("name").get<std::string>());
-    for (std::size_t j = 0; j < method.at("rmse").size(); ++j)
-      out += fmt::format(" {:.3g}, {:.3g}{}", method["rmse"][j].get<double>(), method["peak"][j].get<double>(),
-                         j + 1 < method.at("rmse").size() ? ";" : "\n");
-  }
-  return out;
 }
 
 }  // namespace fxdyn

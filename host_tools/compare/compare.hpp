@@ -1,15 +1,15 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
+#include "host_tools/compare/comparison_result.hpp"
 #include "host_tools/project/project.hpp"
 
 namespace fxdyn {
 
-/// `fxdyn compare`: every method on the same train and validate logs, judged on the test logs; returns compare.json.
+/// `fxdyn compare`: every method on the same train and validate logs, judged on the test logs; writes compare.json.
 ///
 /// Errors are against the noise-free torque where the logs come from a scenario (<log>.truth.csv beside them), else
 /// against the measurement; both filtered as the model's rows are. Per method:
@@ -26,14 +26,11 @@ namespace fxdyn {
 /// The swarms keep their last generation in DIR/compare.bls_pso.pso.json and compare.bls_pso_physical.pso.json: a
 /// killed run goes on from there.
 /// @throws DataError: no test log, no validate log, generations of another project or other logs
-nlohmann::json compare(const std::filesystem::path& project, const std::filesystem::path& directory);
+ComparisonResult compare(const std::filesystem::path& project, const std::filesystem::path& directory);
 
 /// Some of these methods, and bls_physical: bls_pso_physical with a small grid in place of the swarm. Writes nothing.
 /// @param from of which project file the logs are (named_bls continues from DIR/model.json)
-nlohmann::json compare_methods(const Project& project, const std::filesystem::path& directory,
-                               const std::vector<std::string>& methods);
-
-/// For the terminal.
-std::string compare_table(const nlohmann::json& comparison);
+ComparisonResult compare_methods(const Project& project, const std::filesystem::path& directory,
+                                 const std::vector<std::string>& methods);
 
 }  // namespace fxdyn

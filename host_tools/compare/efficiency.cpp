@@ -76,8 +76,7 @@ class Efficiency {
     std::string why;
     for (const std::string& name : names) {
       try {
-        const json result = compare_methods(part, directory_, {name});
-        errors[name] = result.at("methods").at(0).at("mean_percent_rated");
+        errors[name] = compare_methods(part, directory_, {name}).methods.front().mean_percent_rated;
       } catch (const DataError& error) {
         errors[name] = nullptr;
         why = error.what();

@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "host_tools/page/plot.hpp"
-#include "host_tools/report/comparison_section.hpp"
+#include "host_tools/report/comparison_plots.hpp"
 #include "host_tools/support/files.hpp"
 
 namespace fxdyn {

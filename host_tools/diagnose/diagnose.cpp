@@ -35,9 +35,9 @@ IdentifiedModel nominal_model(Project project, GateData& data, bool healthy, Pro
   const auto fitter = identify(project, data, progress);
   if (fitter->torque_lead_s() < 0 && !project.signals.torque_lead_s && !healthy) {
     // Torque that comes late is an effect with a name; but for a healthy robot it is how its signals are sampled.
+    std::erase(data.notes, torque_lead_note(fitter->torque_lead_s()));
     fitter->set_torque_lead(0);
     weigh(*fitter, project.identify);
-    std::erase_if(data.notes, [](const std::string& note) { return note.starts_with("the torque column is"); });
   }
   IdentifiedModel model = finish_model(*fitter, project, data).model;
   // What bends is found here, with its rivals.

@@ -10,7 +10,7 @@
 
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/page/plot.hpp"
-#include "host_tools/report/diagnosis_section.hpp"
+#include "host_tools/report/diagnosis_plot.hpp"
 #include "host_tools/signals/spectrum.hpp"
 #include "host_tools/support/files.hpp"
 

@@ -6,11 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <numeric>
 
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/excite/evolution.hpp"
+#include "host_tools/excite/pose_walk.hpp"
+#include "host_tools/excite/series_coordinates.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/parallel.hpp"
 #include "host_tools/support/random.hpp"
@@ -24,19 +25,11 @@ using Eigen::VectorXd;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-/// What a kind of trajectory does with the limits.
-struct Kind {
-  const char* name;
-  double velocity, acceleration;  ///< share of the limits that it may use
-  int periods;                    ///< periods of the series within period_s
-};
 /// Fast: inertia. Slow: gravity and friction. Reversals: three times as many passes through zero velocity.
-constexpr std::array kinds{Kind{"fast", 1, 1, 1}, Kind{"slow", 0.2, 1, 1}, Kind{"reversals", 0.5, 1, 3}};
+constexpr std::array kinds{SeriesKind{"fast", 1, 1, 1}, SeriesKind{"slow", 0.2, 1, 1},
+                           SeriesKind{"reversals", 0.5, 1, 3}};
 constexpr std::size_t static_at = 3;  ///< the fourth trajectory is the static one
 
-constexpr int samples_per_harmonic = 16;  ///< while optimising
-/// Kept while optimising, beside the margin: what falls between those samples.
-constexpr double between_samples = 0.02;
 constexpr int population = 16;
 /// Generations grow with the number of coordinates (48 with six joints and order 5): of the search for each trajectory
 /// and start, of the polish for each trajectory and round.
@@ -45,133 +38,22 @@ int polish_generations(Index coordinates) { return 60 + 6 * static_cast<int>(coo
 constexpr int polish_rounds = 2;
 constexpr int pool_size = 150;  ///< feasible poses, to start from and to dwell at
 constexpr Index static_poses = 10;
-constexpr double dwell_s = 1, static_speed = 0.5;
 /// Objective: log(condition of the base) + all_weight log(condition of all) - weight log det / parameters. The
 /// determinant is the smoother guide, the condition numbers are the aim.
 constexpr double search_weight = 0.5, polish_weight = 1.0, all_weight = 0.25;
 /// Of a violation, see LimitCheck: large enough that no optimum lies beyond a limit.
 constexpr double penalty = 50;
 
-Motion one_pose(const VectorXd& q) {
-  return {"", 1, VectorXd::Zero(1), q.transpose(), MatrixXd::Zero(1, q.size()), MatrixXd::Zero(1, q.size())};
+/// Kept while optimising, beside the margin: what falls between the samples of the search.
+constexpr double between_samples = 0.02;
+
+/// Indices in ascending order of the values.
+std::vector<std::size_t> ascending(const std::vector<double>& values) {
+  std::vector<std::size_t> order(values.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return values[a] < values[b]; });
+  return order;
 }
-
-/// Series of one kind in coordinates of the null space: per joint z (null_a.cols() + null_b.cols()) and the centre as a
-/// share of the half range. Whatever the coordinates, the series keeps the limits of position, velocity and
-/// acceleration: it is scaled down where it would not, and its centre moved.
-class Coordinates {
- public:
-  Coordinates(const LimitCheck& check, const Kind& kind, const ExciteSettings& settings)
-      : check_(check),
-        kind_(kind),
-        period_s_(settings.period_s / kind.periods),
-        null_(boundary_null_space(settings.order)),
-        step_s_(period_s_ / (samples_per_harmonic * settings.order)) {
-    const Index samples = samples_per_harmonic * settings.order;
-    q_.resize(samples, null_.size());
-    dq_.resize(samples, null_.size());
-    ddq_.resize(samples, null_.size());
-    for (Index i = 0; i < null_.size(); ++i) {
-      const FourierJoint direction = series_of(VectorXd::Unit(null_.size(), i), 0);
-      for (Index k = 0; k < samples; ++k) {
-        const FourierState state = evaluate(direction, period_s_, step_s_ * static_cast<double>(k));
-        q_(k, i) = state.q;
-        dq_(k, i) = state.dq;
-        ddq_(k, i) = state.ddq;
-      }
-    }
-    Random random(settings.seed);
-    unit_ = VectorXd::Zero(joints());
-    constexpr int draws = 20;
-    for (Index j = 0; j < joints(); ++j) {
-      for (int i = 0; i < draws; ++i) unit_[j] += largest_scale(j, normal(random).normalized()) / draws;
-    }
-  }
-
-  Index joints() const { return check_.lower().size(); }
-  Index per_joint() const { return null_.size() + 1; }
-  Index size() const { return joints() * per_joint(); }
-  double period_s() const { return period_s_; }
-  const Kind& kind() const { return kind_; }
-
-  struct Decoded {
-    std::vector<FourierJoint> series;
-    Motion motion;        ///< one period, coarse
-    double overflow = 0;  ///< sum of squared logarithms of how far the coordinates asked beyond the limits
-  };
-  Decoded decode(const VectorXd& x) const {
-    const Index samples = q_.rows();
-    Decoded out{{}, {"", step_s_, VectorXd(samples), MatrixXd(samples, joints()), {}, {}}, 0};
-    out.motion.dq = out.motion.ddq = out.motion.q;
-    for (Index k = 0; k < samples; ++k) out.motion.t[k] = step_s_ * static_cast<double>(k);
-    for (Index j = 0; j < joints(); ++j) {
-      VectorXd z = unit_[j] * x.segment(j * per_joint(), null_.size());
-      const double scale = largest_scale(j, z);
-      if (scale < 1) {
-        z *= scale;
-        out.overflow += std::log(scale) * std::log(scale);
-      }
-      const double middle = 0.5 * (check_.lower()[j] + check_.upper()[j]);
-      const double half = 0.5 * (check_.upper()[j] - check_.lower()[j]);
-      const VectorXd moved = q_ * z;
-      const double peak = between_samples_share() * half;
-      const double first = check_.lower()[j] + peak - std::min(0.0, moved.minCoeff());
-      const double last = check_.upper()[j] - peak - std::max(0.0, moved.maxCoeff());
-      const double centre = std::max(first, std::min(last, middle + half * x[j * per_joint() + null_.size()]));
-      out.series.push_back(series_of(z, centre));
-      out.motion.q.col(j) = moved.array() + centre;
-      out.motion.dq.col(j) = dq_ * z;
-      out.motion.ddq.col(j) = ddq_ * z;
-    }
-    return out;
-  }
-
-  /// A random series that reaches the tightest limit of each joint, about the given centre where the limits let it.
-  VectorXd random(std::uint64_t seed, const VectorXd& centre) const {
-    Random random(seed);
-    VectorXd x(size());
-    for (Index j = 0; j < joints(); ++j) {
-      const VectorXd z = normal(random);
-      x.segment(j * per_joint(), null_.size()) = z * (largest_scale(j, z) / unit_[j]);
-      x[j * per_joint() + null_.size()] =
-          (2 * centre[j] - check_.lower()[j] - check_.upper()[j]) / (check_.upper()[j] - check_.lower()[j]);
-    }
-    return x;
-  }
-  void shrink(VectorXd& x, double factor) const {
-    for (Index j = 0; j < joints(); ++j) x.segment(j * per_joint(), null_.size()) *= factor;
-  }
-
- private:
-  VectorXd normal(Random& random) const {
-    VectorXd z(null_.size());
-    for (double& value : z) value = random.normal();
-    return z;
-  }
-  FourierJoint series_of(const VectorXd& z, double centre) const {
-    return {centre, null_.a * z.head(null_.a.cols()), null_.b * z.tail(null_.b.cols())};
-  }
-  /// The peaks between the samples are higher than those at the samples by at most this share (highest harmonic).
-  static double between_samples_share() { return 0.5 * std::pow(std::numbers::pi / samples_per_harmonic, 2); }
-  /// The factor at which z meets the tightest of the joint's limits.
-  double largest_scale(Index j, const VectorXd& z) const {
-    const VectorXd moved = q_ * z;
-    const double range = std::max(0.0, moved.maxCoeff()) - std::min(0.0, moved.minCoeff());
-    const double sampled = 1 - between_samples_share(), kept = sampled * (1 - check_.margin());
-    const MotionLimits& limits = check_.limits();
-    return std::min({sampled * (check_.upper()[j] - check_.lower()[j]) / range,
-                     kept * kind_.velocity * limits.velocity[j] / (dq_ * z).cwiseAbs().maxCoeff(),
-                     kept * kind_.acceleration * limits.acceleration[j] / (ddq_ * z).cwiseAbs().maxCoeff()});
-  }
-
-  const LimitCheck& check_;
-  Kind kind_;
-  double period_s_;
-  FourierNullSpace null_;
-  double step_s_;
-  MatrixXd q_, dq_, ddq_;  ///< samples x directions
-  VectorXd unit_;          ///< largest_scale() of a usual direction of length 1
-};
 
 class Planner {
  public:
@@ -224,18 +106,12 @@ class Planner {
     VectorXd x;
     MatrixXd information;
   };
-  /// Poses of a static trajectory and the durations of its moves.
-  struct Walk {
-    std::vector<VectorXd> poses;
-    std::vector<double> moves_s;
-  };
-
   Index joints() const { return check_.lower().size(); }
   bool has_static() const { return static_cast<std::size_t>(settings_.trajectories) > static_at; }
 
   /// Kinds of the Fourier trajectories in the order of the plan.
-  std::vector<const Kind*> fourier_kinds() const {
-    std::vector<const Kind*> list;
+  std::vector<const SeriesKind*> fourier_kinds() const {
+    std::vector<const SeriesKind*> list;
     for (std::size_t i = 0; i < static_cast<std::size_t>(settings_.trajectories); ++i) {
       if (i != static_at) list.push_back(&kinds[i < static_at ? i : (i - static_at - 1) % kinds.size()]);
     }
@@ -307,7 +183,7 @@ class Planner {
   }
 
   /// Shrinks the motion until it is feasible; whether it got there.
-  bool make_feasible(const Coordinates& coordinates, VectorXd& x) const {
+  bool make_feasible(const SeriesCoordinates& coordinates, VectorXd& x) const {
     for (int i = 0; check_.violation(coordinates.decode(x).motion, between_samples) > 0; ++i) {
       if (i == 40) return false;
       coordinates.shrink(x, 0.85);
@@ -315,7 +191,7 @@ class Planner {
     return true;
   }
 
-  VectorXd random_feasible(const Coordinates& coordinates, std::uint64_t seed) const {
+  VectorXd random_feasible(const SeriesCoordinates& coordinates, std::uint64_t seed) const {
     Random random(seed);
     VectorXd x;
     for (int tries = 0; tries < 20; ++tries) {
@@ -326,7 +202,7 @@ class Planner {
     refuse("no motion", coordinates.decode(x).motion);
   }
 
-  MatrixXd information(const Coordinates& coordinates, const Motion& motion) const {
+  MatrixXd information(const SeriesCoordinates& coordinates, const Motion& motion) const {
     return columns_.information(motion, plan_.noise) * coordinates.kind().periods;
   }
 
@@ -353,7 +229,7 @@ class Planner {
   /// Random feasible plans: what the optimised one is compared with, and what it starts from.
   void random_baseline() {
     const auto list = fourier_kinds();
-    for (const Kind* kind : list) coordinates_.emplace_back(check_, *kind, settings_);
+    for (const SeriesKind* kind : list) coordinates_.emplace_back(check_, *kind, settings_);
     progress_.stage("random plans", random_plans);
     draws_.assign(list.size(), std::vector<Draw>(random_plans));
     std::vector<Conditioning> plans(random_plans), firsts(random_plans);
@@ -369,7 +245,7 @@ class Planner {
       }
       if (has_static()) {
         Random random(settings_.seed * 7919 + i);
-        sum += static_information(walk(random));
+        sum += static_information(random_walk(random));
       }
       plans[i] = conditioning(sum);
       progress_.step();
@@ -383,7 +259,7 @@ class Planner {
   void search() {
     total_ = MatrixXd::Zero(columns_.size(), columns_.size());
     for (std::size_t k = 0; k < coordinates_.size(); ++k) {
-      const Coordinates& coordinates = coordinates_[k];
+      const SeriesCoordinates& coordinates = coordinates_[k];
       progress_.stage(fmt::format("searching {} ({}/{})", coordinates.kind().name, k + 1, coordinates_.size()),
                       static_cast<std::size_t>(settings_.starts * search_generations(coordinates.size())));
       std::vector<double> ranks(draws_[k].size());
@@ -419,7 +295,7 @@ class Planner {
     }
   }
 
-  void improve(const Coordinates& coordinates, const VectorXd& start, const MatrixXd& others, double weight,
+  void improve(const SeriesCoordinates& coordinates, const VectorXd& start, const MatrixXd& others, double weight,
                const EvolutionSettings& evolution, Draw& best, double& best_value) {
     const auto objective = [&](const VectorXd& x) {
       const auto decoded = coordinates.decode(x);
@@ -435,17 +311,9 @@ class Planner {
     }
   }
 
-  /// Indices in ascending order of the values.
-  static std::vector<std::size_t> ascending(const std::vector<double>& values) {
-    std::vector<std::size_t> order(values.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return values[a] < values[b]; });
-    return order;
-  }
-
   /// Samples the series at the plan's step; what the coarse samples missed shrinks it.
   void add_fourier(std::size_t index) {
-    const Coordinates& coordinates = coordinates_[index];
+    const SeriesCoordinates& coordinates = coordinates_[index];
     VectorXd x = chosen_[index].x;
     PlannedTrajectory planned;
     planned.kind = coordinates.kind().name;
@@ -471,67 +339,34 @@ class Planner {
     }
   }
 
-  MatrixXd matrix(const Walk& walk) const {
-    MatrixXd poses(static_cast<Index>(walk.poses.size()), joints());
-    for (Index i = 0; i < poses.rows(); ++i) poses.row(i) = walk.poses[static_cast<std::size_t>(i)].transpose();
-    return poses;
-  }
-  Motion motion(const Walk& walk, double step_s) const {
-    return dwell_and_move(matrix(walk), walk.moves_s, dwell_s, step_s);
-  }
-  static constexpr double coarse_step_s = 0.1;
   static constexpr int most_shrinks = 100;
-  MatrixXd static_information(const Walk& walk) const {
-    return columns_.information(motion(walk, coarse_step_s), plan_.noise);
+  MatrixXd static_information(const PoseWalk& walk) const {
+    return columns_.information(walk.motion(coarse_step_s), plan_.noise);
   }
 
-  /// Duration of a move at which its quintic, with peaks of 1.875 d / T and 5.7735 d / T^2, keeps velocity and
-  /// acceleration limits; whole coarse steps.
-  double move_s(const VectorXd& from, const VectorXd& to) const {
-    const double share = static_speed * (1 - check_.margin());
-    double longest = 0;
-    for (Index j = 0; j < joints(); ++j) {
-      const double distance = std::fabs(to[j] - from[j]);
-      longest = std::max({longest, 1.875 * distance / (share * check_.limits().velocity[j]),
-                          std::sqrt(5.7735026919 * distance / (share * check_.limits().acceleration[j]))});
-    }
-    return std::max(1.0, std::ceil(longest / coarse_step_s)) * coarse_step_s;
-  }
-  bool move_is_feasible(const VectorXd& from, const VectorXd& to) const {
-    const Walk walk{{from, to}, {move_s(from, to)}};
-    return check_.violation(dwell_and_move(matrix(walk), walk.moves_s, 0, 0.5 * coarse_step_s), between_samples) == 0;
-  }
-
-  Walk walk(Random& random) const {
-    Walk out;
+  PoseWalk random_walk(Random& random) const {
+    PoseWalk out;
     for (int tries = 0; tries < 100 && static_cast<Index>(out.poses.size()) < static_poses; ++tries) {
       const auto pick = static_cast<std::size_t>(random.uniform() * static_cast<double>(pool_.size()));
-      extend(out, pool_[pick]);
+      out.extend(pool_[pick], check_, between_samples);
     }
     return out;
-  }
-  bool extend(Walk& walk, const VectorXd& pose) const {
-    if (!walk.poses.empty()) {
-      if (pose == walk.poses.back() || !move_is_feasible(walk.poses.back(), pose)) return false;
-      walk.moves_s.push_back(move_s(walk.poses.back(), pose));
-    }
-    walk.poses.push_back(pose);
-    return true;
   }
 
   /// Poses one by one, each the one that adds most to log det.
   void choose_walk() {
     progress_.stage("choosing poses", static_cast<std::size_t>(static_poses));
     std::vector<MatrixXd> gains(pool_.size());
-    parallel_for(pool_.size(),
-                 [&](std::size_t i) { gains[i] = dwell_s * columns_.information(one_pose(pool_[i]), plan_.noise); });
+    parallel_for(pool_.size(), [&](std::size_t i) {
+      gains[i] = PoseWalk::dwell_s * columns_.information(one_pose(pool_[i]), plan_.noise);
+    });
     MatrixXd sum = total_;
     while (static_cast<Index>(walk_.poses.size()) < static_poses) {
       std::vector<double> lost(pool_.size());
       parallel_for(pool_.size(), [&](std::size_t i) { lost[i] = -log_determinant(sum + gains[i]); });
       const std::vector<std::size_t> order = ascending(lost);
-      const auto next =
-          std::find_if(order.begin(), order.end(), [&](std::size_t i) { return extend(walk_, pool_[i]); });
+      const auto next = std::find_if(order.begin(), order.end(),
+                                     [&](std::size_t i) { return walk_.extend(pool_[i], check_, between_samples); });
       if (next == order.end()) break;
       sum += gains[*next];
       progress_.step();
@@ -541,32 +376,12 @@ class Planner {
 
   void add_static() {
     PlannedTrajectory planned;
-    static_cast<Motion&>(planned) = motion(walk_, settings_.step_s);
+    static_cast<Motion&>(planned) = walk_.motion(settings_.step_s);
     planned.kind = "static";
-    planned.poses = matrix(walk_);
+    planned.poses = walk_.matrix();
     planned.moves_s = walk_.moves_s;
-    planned.dwell_s = dwell_s;
+    planned.dwell_s = PoseWalk::dwell_s;
     plan_.trajectories.push_back(std::move(planned));
-  }
-
-  /// The motion of a robot that moves freely: random states, uniform within +-pi (sliding joints: +-0.5 m) and
-  /// within the velocity and acceleration limits.
-  Motion free_motion() const {
-    constexpr Index states = 400;
-    Random random(1);
-    Motion motion{"", 1.0 / states, VectorXd::Zero(states), MatrixXd(states, joints()), {}, {}};
-    motion.dq = motion.ddq = motion.q;
-    for (Index j = 0; j < joints(); ++j) {
-      const bool turns = project_.robot.joints[static_cast<std::size_t>(j)].type == JointType::revolute;
-      const MotionLimits& limits = check_.limits();
-      const double reach = turns ? std::numbers::pi : 0.5;
-      for (Index k = 0; k < states; ++k) {
-        motion.q(k, j) = random.uniform(-reach, reach);
-        motion.dq(k, j) = random.uniform(-1, 1) * limits.velocity[j];
-        motion.ddq(k, j) = random.uniform(-1, 1) * limits.acceleration[j];
-      }
-    }
-    return motion;
   }
 
   void judge() {
@@ -581,7 +396,7 @@ class Planner {
     }
     plan_.after = conditioning(whole);
     plan_.information = whole / settings_.step_s;
-    const Motion free = free_motion();
+    const Motion free = free_motion(project_.robot, check_.limits());
     ParameterSizes sizes{columns_.names(),
                          columns_.joints(),
                          {},
@@ -622,56 +437,14 @@ class Planner {
   LimitCheck check_;
   ParameterColumns columns_;
   std::vector<VectorXd> pool_;
-  std::vector<Coordinates> coordinates_;  ///< of each Fourier trajectory
-  std::vector<std::vector<Draw>> draws_;  ///< likewise, random ones
-  std::vector<Draw> chosen_;              ///< likewise, the plan's
-  Walk walk_;
+  std::vector<SeriesCoordinates> coordinates_;  ///< of each Fourier trajectory
+  std::vector<std::vector<Draw>> draws_;        ///< likewise, random ones
+  std::vector<Draw> chosen_;                    ///< likewise, the plan's
+  PoseWalk walk_;
   MatrixXd total_;  ///< information of the plan so far
 };
 
 }  // namespace
-
-Motion play(const std::vector<FourierJoint>& series, double period_s, int periods, double step_s) {
-  const auto samples = static_cast<Index>(std::llround(period_s * periods / step_s)) + 1;
-  const auto n = static_cast<Index>(series.size());
-  Motion motion{"", step_s, VectorXd(samples), MatrixXd(samples, n), MatrixXd(samples, n), MatrixXd(samples, n)};
-  for (Index k = 0; k < samples; ++k) {
-    motion.t[k] = step_s * static_cast<double>(k);
-    for (Index j = 0; j < n; ++j) {
-      const FourierState state = evaluate(series[static_cast<std::size_t>(j)], period_s, motion.t[k]);
-      motion.q(k, j) = state.q;
-      motion.dq(k, j) = state.dq;
-      motion.ddq(k, j) = state.ddq;
-    }
-  }
-  return motion;
-}
-
-Motion dwell_and_move(const MatrixXd& poses, const std::vector<double>& moves_s, double dwell_s_, double step_s) {
-  const Index n = poses.cols();
-  const double duration =
-      std::accumulate(moves_s.begin(), moves_s.end(), 0.0) + dwell_s_ * static_cast<double>(poses.rows());
-  const auto samples = static_cast<Index>(std::llround(duration / step_s)) + 1;
-  Motion motion{
-      "", step_s, VectorXd(samples), MatrixXd(samples, n), MatrixXd::Zero(samples, n), MatrixXd::Zero(samples, n)};
-  Index pose = 0;
-  double from = 0;  // when the dwell at `pose` begins
-  for (Index k = 0; k < samples; ++k) {
-    const double t = motion.t[k] = step_s * static_cast<double>(k);
-    while (pose + 1 < poses.rows() && t >= from + dwell_s_ + moves_s[static_cast<std::size_t>(pose)]) {
-      from += dwell_s_ + moves_s[static_cast<std::size_t>(pose)];
-      ++pose;
-    }
-    motion.q.row(k) = poses.row(pose);
-    if (pose + 1 == poses.rows() || t <= from + dwell_s_) continue;
-    const double length = moves_s[static_cast<std::size_t>(pose)], u = (t - from - dwell_s_) / length;
-    const Eigen::RowVectorXd way = poses.row(pose + 1) - poses.row(pose);
-    motion.q.row(k) += u * u * u * (10 + u * (6 * u - 15)) * way;
-    motion.dq.row(k) = 30 * u * u * (1 - u) * (1 - u) / length * way;
-    motion.ddq.row(k) = 60 * u * (1 - u) * (1 - 2 * u) / (length * length) * way;
-  }
-  return motion;
-}
 
 Plan make_plan(const Project& project, const std::filesystem::path& directory, Progress& progress) {
   return Planner(project, directory, progress).plan();

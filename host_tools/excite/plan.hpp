@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "host_tools/excite/limits.hpp"
+#include "host_tools/excite/motions.hpp"
 #include "host_tools/regression/information.hpp"
 #include "host_tools/signals/fourier.hpp"
 #include "host_tools/signals/motion.hpp"
@@ -52,12 +53,5 @@ inline constexpr int random_plans = 100;
 /// @throws InputError: limits that no pose meets, naming limit and joint. DataError: parameters that the best plan
 /// can't tell, naming them and the joint to move.
 Plan make_plan(const Project& project, const std::filesystem::path& directory, Progress& progress);
-
-/// A rest-to-rest move along the straight line of joint space, s = 10 u^3 - 15 u^4 + 6 u^5, sampled with dwells:
-/// dwell, move, dwell, .. dwell. Ends with the last instant at rest.
-Motion dwell_and_move(const Eigen::MatrixXd& poses, const std::vector<double>& moves_s, double dwell_s, double step_s);
-
-/// `periods` of the series, the last instant included.
-Motion play(const std::vector<FourierJoint>& series, double period_s, int periods, double step_s);
 
 }  // namespace fxdyn

@@ -238,6 +238,71 @@ MatrixXd jacobian(const Inertial& body) {
   return out;
 }
 
+/// Mass, centre and tensor with their standard deviations. `apart`: which of the ten standard parameters the motion
+/// determines.
+std::array<LoadParameter, 10> parameters_of(const Inertial& body, const VectorXd& std,
+                                            const std::array<bool, 10>& apart) {
+  std::array<LoadParameter, 10> out;
+  const Matrix3d& t = body.tensor;
+  const double values[] = {body.mass, body.centre.x(), body.centre.y(), body.centre.z(), t(0, 0),
+                           t(1, 1),   t(2, 2),         t(0, 1),         t(0, 2),         t(1, 2)};
+  static constexpr std::array names{"mass", "x", "y", "z", "ixx", "iyy", "izz", "ixy", "ixz", "iyz"};
+  // an entry of the tensor is a sum of the second moments across it
+  const bool xx = apart[4], yy = apart[5], zz = apart[6];
+  const bool identifiable[] = {apart[0], apart[1], apart[2], apart[3], yy && zz,
+                               xx && zz, xx && yy, apart[7], apart[8], apart[9]};
+  for (std::size_t k = 0; k < 10; ++k) {
+    out[k] = {names[k], k == 0 ? "kg" : k < 4 ? "m" : "kg m^2", values[k], std[static_cast<Index>(k)], identifiable[k]};
+  }
+  return out;
+}
+
+/// Changes of friction, and what the model misses before and after.
+void add_residuals(const Rows& rows, const Fit& fit, const VectorXd& theta, LoadFit& out) {
+  const auto n = static_cast<Index>(rows.columns.size());
+  Inertial point = out.body;
+  point.tensor.setZero();
+  const auto in_urdf = [](const Inertial& body) {
+    const auto v = to_array(to_link_inertia(body, Eigen::Isometry3d::Identity()));
+    return VectorXd(Eigen::Map<const VectorXd>(v.data(), ten));
+  };
+  const VectorXd whole = in_urdf(out.body), point_only = in_urdf(point);
+  out.coulomb = out.coulomb_std = out.offset = out.before = out.after = out.with_effect = VectorXd::Zero(n);
+  for (Index j = 0; j < n; ++j) {
+    const auto at = static_cast<std::size_t>(j);
+    const auto nuisance = theta.segment(nuisances * j, nuisances);
+    out.coulomb[j] = nuisance[0];
+    out.coulomb_std[j] = fit.nuisance_std[nuisances * j];
+    out.offset[j] = nuisance[1];
+    const MatrixXd& x = rows.columns[at];
+    const VectorXd& y = rows.missing[at];
+    const double root = std::sqrt(static_cast<double>(y.size()));
+    out.before[j] = y.norm() / root;
+    out.after[j] = (y - x.leftCols(ten) * whole - x.rightCols(nuisances) * nuisance).norm() / root;
+    out.with_effect[j] = (y - x.leftCols(ten) * point_only).norm() / root;
+  }
+}
+
+/// The possible body that fits best, the prior's centre where the motion shows it.
+ConsistentFit possible_load(const Fit& fit, const std::array<bool, 10>& apart, Index joints) {
+  const double mass = fit.solution[0];
+  Vector3d centre = Vector3d::Zero();
+  for (int k = 0; k < 3; ++k) {
+    if (apart[static_cast<std::size_t>(1 + k)]) centre[k] = fit.solution[1 + k] / mass;
+  }
+  const VectorXd free = VectorXd::Constant(nuisances * joints, unbounded);
+  std::vector<Index> columns(static_cast<std::size_t>(ten));
+  for (Index k = 0; k < ten; ++k) columns[static_cast<std::size_t>(k)] = k;
+  return fit_consistent({fit.information,
+                         fit.projection,
+                         -free,
+                         free,
+                         MatrixXd::Identity(ten, ten),
+                         columns,
+                         {ball(mass, centre)},
+                         fit.correlated});
+}
+
 }  // namespace
 
 LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log) {
@@ -261,50 +326,13 @@ LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log) {
                                 mass, mass_std, what_to_move(model.robot, log, rows)));
   }
 
-  Vector3d centre = Vector3d::Zero();
-  for (int k = 0; k < 3; ++k) {
-    if (apart[static_cast<std::size_t>(1 + k)]) centre[k] = fit.solution[1 + k] / mass;
-  }
-  const VectorXd free = VectorXd::Constant(nuisances * n, unbounded);
-  std::vector<Index> columns(static_cast<std::size_t>(ten));
-  for (Index k = 0; k < ten; ++k) columns[static_cast<std::size_t>(k)] = k;
-  const ConsistentFit possible = fit_consistent({fit.information,
-                                                 fit.projection,
-                                                 -free,
-                                                 free,
-                                                 MatrixXd::Identity(ten, ten),
-                                                 columns,
-                                                 {ball(mass, centre)},
-                                                 fit.correlated});
+  const ConsistentFit possible = possible_load(fit, apart, n);
   LoadFit out;
   out.constrained = possible.constrained;
   out.body = to_inertial(from_pseudo_inertia(possible.bodies[0]), Eigen::Isometry3d::Identity());
   const MatrixXd to_output = jacobian(out.body);
   const VectorXd std = (to_output * fit.covariance * to_output.transpose()).diagonal().cwiseMax(0).cwiseSqrt();
-  const Matrix3d& t = out.body.tensor;
-  const double values[] = {out.body.mass,
-                           out.body.centre.x(),
-                           out.body.centre.y(),
-                           out.body.centre.z(),
-                           t(0, 0),
-                           t(1, 1),
-                           t(2, 2),
-                           t(0, 1),
-                           t(0, 2),
-                           t(1, 2)};
-  static constexpr std::array names{"mass", "x", "y", "z", "ixx", "iyy", "izz", "ixy", "ixz", "iyz"};
-  // an entry of the tensor is a sum of the second moments across it
-  const bool xx = apart[4], yy = apart[5], zz = apart[6];
-  const bool identifiable[] = {apart[0], apart[1], apart[2], apart[3], yy && zz,
-                               xx && zz, xx && yy, apart[7], apart[8], apart[9]};
-  for (std::size_t k = 0; k < 10; ++k) {
-    out.parameters[k] = {names[k],
-                         k == 0  ? "kg"
-                         : k < 4 ? "m"
-                                 : "kg m^2",
-                         values[k], std[static_cast<Index>(k)], identifiable[k]};
-  }
-
+  out.parameters = parameters_of(out.body, std, apart);
   out.effect.effect = Payload::name;
   out.effect.named = true;
   const Vector3d& com = out.body.centre;
@@ -312,27 +340,7 @@ LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log) {
   out.effect.linear_std = {std[0]};
   for (Index k = 1; k < 4; ++k) out.effect.linear_std.push_back(std[k]);
 
-  Inertial point = out.body;
-  point.tensor.setZero();
-  const auto in_urdf = [](const Inertial& body) {
-    const auto v = to_array(to_link_inertia(body, Eigen::Isometry3d::Identity()));
-    return VectorXd(Eigen::Map<const VectorXd>(v.data(), ten));
-  };
-  const VectorXd whole = in_urdf(out.body), point_only = in_urdf(point);
-  out.coulomb = out.coulomb_std = out.offset = out.before = out.after = out.with_effect = VectorXd::Zero(n);
-  for (Index j = 0; j < n; ++j) {
-    const auto at = static_cast<std::size_t>(j);
-    const auto nuisance = possible.theta.segment(nuisances * j, nuisances);
-    out.coulomb[j] = nuisance[0];
-    out.coulomb_std[j] = fit.nuisance_std[nuisances * j];
-    out.offset[j] = nuisance[1];
-    const MatrixXd& x = rows.columns[at];
-    const VectorXd& y = rows.missing[at];
-    const double root = std::sqrt(static_cast<double>(y.size()));
-    out.before[j] = y.norm() / root;
-    out.after[j] = (y - x.leftCols(ten) * whole - x.rightCols(nuisances) * nuisance).norm() / root;
-    out.with_effect[j] = (y - x.leftCols(ten) * point_only).norm() / root;
-  }
+  add_residuals(rows, fit, possible.theta, out);
   return out;
 }
 

@@ -6,7 +6,7 @@
 
 #include "host_tools/forward/forward.hpp"
 #include "host_tools/page/plot.hpp"
-#include "host_tools/pipeline/pipeline.hpp"
+#include "host_tools/pipeline/one_log.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
 #include "host_tools/support/progress.hpp"

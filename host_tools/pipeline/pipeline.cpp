@@ -10,8 +10,8 @@
 #include "host_tools/diagnose/plots.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
-#include "host_tools/export/proof.hpp"
-#include "host_tools/identify/payload.hpp"
+#include "host_tools/pipeline/fit_metrics.hpp"
+#include "host_tools/pipeline/tables_export.hpp"
 #include "host_tools/project/provenance.hpp"
 #include "host_tools/regression/metrics.hpp"
 #include "host_tools/report/report.hpp"
@@ -19,9 +19,6 @@
 #include "host_tools/simulate/recordings.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
-#include "host_tools/train/kept_effects.hpp"
-#include "host_tools/train/stored_information.hpp"
-#include "host_tools/train/train.hpp"
 
 namespace fxdyn {
 
@@ -30,73 +27,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// |fixed - double| on the logs beyond which tables are refused, of rated torque.
-constexpr double largest_error = 1e-3;
-/// The proven range of the rigid body's torque is refined until it is no more than this times what is attained ...
-constexpr double tight_enough = 2;
-/// ... or this many boxes were looked at.
-constexpr int proof_boxes = 40'000;
-constexpr Eigen::Index random_states = 20'000;
-
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-/// Settings of [train] that the others leave without effect, and why; empty: none. Sparse features have windows of
-/// nodes of their own, whatever searches.
-std::string unused_settings(const TrainSettings& settings) {
-  if (!settings.enabled) return {};
-  const bool sparse = settings.features == "sparse", swarm = settings.pso.has_value();
-  std::string names;
-  const auto add = [&](bool unused, const char* key) {
-    if (unused) names += (names.empty() ? "" : ", ") + std::string(key);
-  };
-  const bool sized = swarm || settings.enhancement;
-  add(settings.windows && !sparse && (sized || !settings.nodes), "windows");
-  add(settings.nodes && !sparse && sized, "nodes");
-  add(settings.enhancement && swarm, "enhancement");
-  add(settings.ridge && swarm, "ridge");
-  if (names.empty()) return {};
-  return fmt::format("train.{}: not used, {}", names,
-                     swarm                  ? "the swarm of [train.pso] chooses within its bounds"
-                     : settings.enhancement ? "enhancement says how many nodes there are"
-                                            : "the number of nodes is searched; give nodes too to set it");
-}
-
-std::string weak_note(const std::vector<WeakParameter>& weak, const Robot& robot) {
-  if (weak.empty()) return {};
-  std::string names;
-  for (const WeakParameter& one : weak) names += (names.empty() ? "" : ", ") + one.name;
-  const auto worst =
-      std::max_element(weak.begin(), weak.end(), [](const auto& a, const auto& b) { return a.error < b.error; });
-  return fmt::format(
-      "these logs tell {} poorly (at the limits up to {:.0f} % of rated torque): move joint {} ({}) more and faster",
-      names, 100 * worst->error, worst->joint + 1, robot.joints[static_cast<std::size_t>(worst->joint)].name);
-}
-
-/// Mean logarithm of the errors on the validate logs; NaN where there are none.
-double gate_error(const json& stage) {
-  double sum = 0, count = 0;
-  for (const json& log : stage.at("logs")) {
-    if (log.at("role") != "validate") continue;
-    for (const json& joint : log.at("joints")) {
-      sum += std::log(std::max(joint.at("rmse").get<double>(), 1e-300));
-      ++count;
-    }
-  }
-  return sum / count;
-}
-
-/// Estimates on the way through the logs: one row a moment, base parameters first, then each joint's coefficients.
-json recursion_json(const Fitter::Recursion& recursion, double forgetting) {
-  json trace = json::array();
-  for (Eigen::Index k = 0; k < recursion.trace.rows(); ++k) {
-    const Eigen::VectorXd row = recursion.trace.row(k);
-    trace.push_back(std::vector<double>(row.begin(), row.end()));
-  }
-  return {{"forgetting", forgetting},
-          {"t", std::vector<double>(recursion.t.begin(), recursion.t.end())},
-          {"estimates", trace}};
-}
 
 }  // namespace
 
@@ -178,53 +110,21 @@ std::vector<ProcessedLog> Pipeline::logs(Role role) {
   return out;
 }
 
-json Pipeline::stage_metrics(const IdentifiedModel& model, const std::string& stage) {
-  json list = json::array();
-  const auto add = [&](const ProcessedLog& log) {
-    list.push_back(metrics_json(log, model.robot, judge(log, predict(model, log))));
-  };
-  for (const ProcessedLog& log : data().logs) add(log);
-  for (const ProcessedLog& log : logs(Role::test)) add(log);
-  return {{"stage", stage}, {"logs", list}};
+StageErrors Pipeline::stage_errors(const IdentifiedModel& model, const std::string& stage) {
+  StageErrors out{stage, {}};
+  for (const ProcessedLog& log : data().logs) out.logs.push_back(errors_of(log, model.robot, predict(model, log)));
+  for (const ProcessedLog& log : logs(Role::test)) out.logs.push_back(errors_of(log, model.robot, predict(model, log)));
+  return out;
 }
 
-/// The same structure without effects and BLS, refitted.
-json Pipeline::rigid_metrics(Fitter fitter) {
-  for (std::size_t j = 0; j < fitter.joints(); ++j) {
-    JointFit design = fitter.design(j);
-    design.bls.reset();
-    design.effects.clear();
-    fitter.set_design(j, design);
-  }
-  weigh(fitter, project_.identify);
-  IdentifiedModel rigid = fitter.to_model(fitter.estimate());
-  rigid.filter = data().filter;
-  rigid.filter.torque_lead_s = fitter.torque_lead_s();
-  return stage_metrics(rigid, "rigid");
+Trainer::ErrorsOf Pipeline::stage_errors() {
+  return [this](const IdentifiedModel& model, const std::string& stage) { return stage_errors(model, stage); };
 }
 
-json Pipeline::fit_metrics(const Fitter& fitter, const Estimate& estimate, const json& stages) {
-  json metrics = {
-      {"schema", "fxdyn.metrics/1"}, {"gate", fitter.gate()},         {"base_parameters", fitter.base().columns.size()},
-      {"notes", data().notes},       {"logs", stages.back()["logs"]}, {"stages", stages}};
-  metrics["method"] = project_.identify.method;
-  metrics["condition_number"] = std::isfinite(estimate.condition) ? json(estimate.condition) : json(nullptr);
-  metrics["weak_parameters"] = json::array();
-  for (const WeakParameter& one : estimate.weak) {
-    metrics["weak_parameters"].push_back(
-        {{"parameter", one.name},
-         {"share_of_rated", one.error},
-         {"joint_to_move", project_.robot.joints[static_cast<std::size_t>(one.joint)].name}});
-  }
-  const std::vector<Eigen::Index> saturated = fitter.saturated_rows();
-  metrics["saturated_rows"] = std::vector<std::int64_t>(saturated.begin(), saturated.end());
-  if (estimate.physical) {
-    metrics["physical"] = physical_json(project_.robot, to_dh(project_.robot), *estimate.physical);
-    write_urdf(project_.urdf, directory_ / "identified.urdf", project_.robot, to_dh(project_.robot),
-               estimate.physical->inertia);
-  }
-  if (estimate.recursion) metrics["recursive"] = recursion_json(*estimate.recursion, project_.identify.forgetting);
-  return metrics;
+void Pipeline::write_possible_bodies(const Estimate& estimate) const {
+  if (!estimate.physical) return;
+  write_urdf(project_.urdf, directory_ / "identified.urdf", project_.robot, to_dh(project_.robot),
+             estimate.physical->inertia);
 }
 
 void Pipeline::identify() {
@@ -237,12 +137,13 @@ void Pipeline::identify() {
   if (const std::string weak = weak_note(estimate.weak, project_.robot); !weak.empty()) model.notes.push_back(weak);
   data().notes = model.notes;
   progress_.stage("errors on all logs", 2);
-  json stages = json::array({rigid_metrics(*fitter)});
+  std::vector<StageErrors> stages{rigid_errors(*fitter, project_, data().filter, stage_errors())};
   progress_.step();
-  stages.push_back(stage_metrics(model, "friction"));
+  stages.push_back(stage_errors(model, "friction"));
   progress_.step();
   progress_.done();
-  const json metrics = fit_metrics(*fitter, estimate, stages);
+  const json metrics = fit_metrics(project_, *fitter, estimate, data().notes, stages);
+  write_possible_bodies(estimate);
   write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
   write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
   for (const std::string& note : data().notes) fmt::print(stderr, "note: {}\n", note);
@@ -264,9 +165,9 @@ void Pipeline::diagnose() {
   IdentifiedModel nominal = diagnosis.nominal;
   model.logs = nominal.logs = diagnosed_logs();
   progress_.stage("errors on all logs, fixed point, closed loop, plots", 4);
-  json stages = json::array({stage_metrics(nominal, "friction")});
+  std::vector<StageErrors> stages{stage_errors(nominal, "friction")};
   progress_.step();
-  stages.push_back(stage_metrics(model, "diagnosed"));
+  stages.push_back(stage_errors(model, "diagnosed"));
   progress_.step();
   std::vector<ProcessedLog> held_out = logs(Role::test);
   if (held_out.empty()) held_out = logs(Role::validate);
@@ -275,7 +176,7 @@ void Pipeline::diagnose() {
   progress_.step();
   const json metrics = {{"schema", "fxdyn.metrics/1"},          {"gate", diagnosis.report.at("gate")},
                         {"base_parameters", model.base.size()}, {"notes", data().notes},
-                        {"logs", stages.back()["logs"]},        {"stages", stages}};
+                        {"logs", to_json(stages.back().logs)},  {"stages", to_json(stages)}};
   write_file(directory_ / "nominal.json", to_json(nominal).dump(1) + "\n");
   write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
   write_file(directory_ / "diagnosis.json", report.dump(1) + "\n");
@@ -293,6 +194,16 @@ void Pipeline::diagnose() {
   note_seconds(directory_, "diagnose", seconds_since(start));
 }
 
+std::vector<StageErrors> Pipeline::diagnosed_stages() const {
+  std::vector<StageErrors> out;
+  const fs::path file = directory_ / "metrics.json";
+  if (!fs::exists(file)) return out;
+  for (StageErrors& stage : stages_of(json::parse(read_file(file)))) {
+    if (stage.stage == "friction" || stage.stage == "diagnosed") out.push_back(std::move(stage));
+  }
+  return out;
+}
+
 void Pipeline::train() {
   const TrainSettings& settings = project_.train;
   check_motion();
@@ -306,92 +217,21 @@ void Pipeline::train() {
   const auto start = Clock::now();
   const IdentifiedModel diagnosed = read_model(directory_ / "model.json");
   check_excited();
-  json stages = json::array();
-  if (const fs::path file = directory_ / "metrics.json"; fs::exists(file)) {
-    const json before = json::parse(read_file(file));
-    for (const json& stage : before.at("stages")) {
-      if (stage.at("stage") == "friction" || stage.at("stage") == "diagnosed") stages.push_back(stage);
-    }
-  }
+  std::vector<StageErrors> stages = diagnosed_stages();
   data().notes = diagnosed.notes;
   if (const std::string note = unused_settings(settings); !note.empty()) {
     if (std::find(data().notes.begin(), data().notes.end(), note) == data().notes.end()) data().notes.push_back(note);
   }
-  const KeptEffects kept(diagnosed, data().logs);
-  kept.mark_hidden(data().logs);
-  progress_.stage("building the regressor", 1);
-  Fitter fitter(project_.robot, data().logs, kept.design());
-  fitter.set_torque_lead(diagnosed.filter.torque_lead_s);
-  weigh(fitter, project_.identify);
-  progress_.step();
-  const json rigid = rigid_metrics(fitter);
-  // The kept effects, and the load that a BLS sees, follow the rigid body that is fitted beside them.
-  const auto follow = [&](const IdentifiedModel& model) {
-    if (settings.enabled && settings.inputs == ExtendedInputs::name)
-      fitter.set_structural(structural_torque(model, data().logs));
-    fitter.set_torque_lead(diagnosed.filter.torque_lead_s, kept.torque(model, data().logs));
-    weigh(fitter, project_.identify);
-  };
-  follow(diagnosed);
-  json training = json::array();
-  if (settings.enabled) {
-    // The model holds the hashes of project and logs: all that the outcome depends on.
-    resume.identity = hash_of(to_json(diagnosed).dump());
-    // Where the model is the outcome already, a run was stopped between writing it and removing the search.
-    if (settings.pso && diagnosed.stage == "trained") resume.drop_finished();
-    const auto outcomes = fxdyn::train(fitter, settings, progress_, resume);
-    for (std::size_t j = 0; j < outcomes.size(); ++j) {
-      training.push_back({{"joint", project_.robot.joints[j].name},
-                          {"index", j + 1},
-                          {"unit", project_.robot.joints[j].torque_unit()},
-                          {"held_out_without", outcomes[j].error_without},
-                          {"held_out_with", outcomes[j].error_with},
-                          {"kept", outcomes[j].kept},
-                          {"evaluations", outcomes[j].evaluations},
-                          {"choice", choice_json(outcomes[j])}});
-    }
-  }
-  progress_.stage("fit, standard deviations, possible bodies", 2);
-  IdentifiedModel fitted = kept.restore(fitter.to_model(fitter.estimate()));
-  fitted.filter = diagnosed.filter;
-  follow(fitted);
-  progress_.step();
-  Estimate estimate = finish_model(fitter, project_, data());
-  IdentifiedModel& model = estimate.model;
-  model = kept.restore(std::move(model));
-  progress_.step();
-  progress_.stage("errors on all logs", 2);
-  json trained = stage_metrics(model, "bls");
-  StoredInformation stored = stored_information(fitter);
-  progress_.step();
-  // A baseline taught the diagnosed model what the train logs alone may not: where validation says so, it stays.
-  IdentifiedModel before = diagnosed;
-  for (JointFit& joint : before.joints) joint.bls.reset();
-  const bool possible = !estimate.physical || !estimate.physical->constrained;
-  if (json unchanged = stage_metrics(before, "bls"); possible && gate_error(unchanged) < gate_error(trained)) {
-    const std::string note = "training: the diagnosed model stays as it was, a new fit is worse on the validate logs";
-    if (std::find(before.notes.begin(), before.notes.end(), note) == before.notes.end()) before.notes.push_back(note);
-    data().notes = before.notes;
-    model = std::move(before);
-    model.drop_tables();  // they are another model's now
-    trained = std::move(unchanged);
-    // What the train logs tell holds around what this model has from a baseline too.
-    fitter.set_designs(kept.design());
-    follow(model);
-    stored = stored_information(fitter);
-    stored.information.recentre(coefficients_of(model, kept.design()));
-    for (json& joint : training) joint["kept"] = false;
-  }
-  model.stage = "trained";
-  stages.insert(stages.begin(), rigid);
-  stages.push_back(trained);
-  progress_.step();
-  progress_.done();
-  json metrics = fit_metrics(fitter, estimate, stages);
-  metrics["training"] = training;
+  Trainer trainer(project_, data(), diagnosed, stage_errors(), progress_);
+  const Training training = trainer.run(resume);
+  stages.insert(stages.begin(), training.rigid);
+  stages.push_back(training.trained);
+  json metrics = fit_metrics(project_, trainer.fitter(), training.estimate, data().notes, stages);
+  metrics["training"] = outcomes_json(training.outcomes, project_.robot);
+  write_possible_bodies(training.estimate);
   write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
-  write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
-  write_information(stored, read_model(directory_ / "model.json"), directory_);
+  write_file(directory_ / "model.json", to_json(training.model).dump(1) + "\n");
+  write_information(training.stored, read_model(directory_ / "model.json"), directory_);
   fs::remove(resume.path);  // a search can take hours: not before its outcome is written
   note_seconds(directory_, "train", seconds_since(start));
 }
@@ -427,88 +267,9 @@ void Pipeline::export_tables() {
 }
 
 void Pipeline::write_export(IdentifiedModel& model, const Formats& formats, const fs::path& directory) {
-  progress_.stage("proving ranges and errors, writing tables", 4);
-  model.formats = formats;
-  model.layout = layout_of(model, formats);
-  if (model.lineage.sequence == 0) model.lineage = {FixedModel(model, formats).crc(), 1};
-  model.lineage.sequence = std::max(model.lineage.sequence, project_.target.sequence);
-  const Proof proof = prove(model, &formats);
-  progress_.step();
-  const Attained attained = attain(model);
-  const Eigen::VectorXd structural = prove_structural(model, attained.structural, tight_enough, proof_boxes);
-  progress_.step();
-  std::vector<TickStates> states, judged;
-  for (const ProcessedLog& log : data().logs) states.push_back(at_ticks(log, model.tick_s));
-  judged = states;
-  for (std::size_t i = 0; i < states.size(); ++i) judged.push_back(perturbed(states[i], model, 1000 + i));
-  judged.push_back(within_limits(model, random_states, 77));
-  judged.push_back(creeping(model, formats));
-  const QuantisationError clean = quantisation_error(model, formats, states);
-  const QuantisationError error = quantisation_error(model, formats, judged);
-  progress_.step();
-  for (std::size_t j = 0; j < model.joints.size(); ++j) {
-    const auto k = static_cast<Eigen::Index>(j);
-    if (error.largest[k] > proof.error[k]) {
-      throw DataError(fmt::format(
-          "joint {} ({}): fixed point is off by {:.3g}, more than the {:.3g} that were proven: please "
-          "report this with {}",
-          j + 1, model.robot.joints[j].name, error.largest[k], proof.error[k], (directory_ / "model.json").string()));
-    }
-    const double share = clean.largest[static_cast<Eigen::Index>(j)] / model.joints[j].rated_torque;
-    if (!(share <= largest_error)) {
-      throw DataError(fmt::format(
-          "joint {} ({}): fixed point is off by {:.1g} of rated torque on the logs, more than {:.0g}: narrow the "
-          "project's limits to what the robot does",
-          j + 1, model.robot.joints[j].name, share, largest_error));
-    }
-  }
-  const auto n = model.joints.size();
-  model.tables_crc = write_tables(model, formats, error, proof.error, all_joints(model), directory);
-  // Tables of drives that the project no longer asks for would be of another model.
-  for (std::size_t j = 0; j < n; ++j) {
-    for (const char* name : {"tables.hpp", "tables.bin", "replay.json"})
-      fs::remove(directory / fmt::format("joint_{}", j + 1) / name);
-  }
-  json drives = json::array();
-  for (const std::size_t j : project_.target.joints) {
-    const fs::path own = directory / fmt::format("joint_{}", j + 1);
-    fs::create_directories(own);
-    const std::uint32_t crc = write_tables(model, formats, error, proof.error, 1U << j, own);
-    drives.push_back({{"index", j + 1}, {"tables_crc", crc}, {"table_bytes", fs::file_size(own / "tables.bin")}});
-  }
-  json joints = json::array();
-  for (std::size_t j = 0; j < n; ++j) {
-    const auto k = static_cast<Eigen::Index>(j);
-    joints.push_back({{"joint", model.robot.joints[j].name},
-                      {"index", j + 1},
-                      {"unit", model.robot.joints[j].torque_unit()},
-                      {"rated_torque", model.joints[j].rated_torque},
-                      {"formats", formats_json(formats)},
-                      {"proven_bound", proof.error[k]},
-                      {"proven_bound_of_rated", proof.error[k] / model.joints[j].rated_torque},
-                      {"observed_max", error.largest[k]},
-                      {"observed_max_of_rated", error.largest[k] / model.joints[j].rated_torque},
-                      {"quantisation_rms", error.rms[k]},
-                      {"torque_range",
-                       {{"proven", std::min(proof.torque[k], structural[k] + proof.effects[k])},
-                        {"proven_structural", structural[k]},
-                        {"attained", attained.total[k]},
-                        {"attained_structural", attained.structural[k]}}}});
-  }
-  const json document = {{"schema", "fxdyn.export/1"},
-                         {"tick_s", model.tick_s},
-                         {"board", project_.target.board},
-                         {"tables_crc", model.tables_crc},
-                         {"origin", model.lineage.origin},
-                         {"sequence", model.lineage.sequence},
-                         {"formats", formats_json(formats)},
-                         {"joints", joints},
-                         {"drives", drives},
-                         {"saturations_on_logs", clean.saturations},
-                         {"table_bytes", fs::file_size(directory / "tables.bin")}};
-  write_file(directory / "export.json", document.dump(1) + "\n");
-  progress_.step();
-  progress_.done();
+  const ExportResult result = fxdyn::export_tables(model, formats, project_.target, data().logs, directory,
+                                                   directory_ / "model.json", progress_);
+  write_file(directory / "export.json", to_json(result).dump(1) + "\n");
 }
 
 void Pipeline::report() {
@@ -535,75 +296,6 @@ void Pipeline::run() {
   train();
   export_tables();
   report();
-}
-
-Log read_log_for(const IdentifiedModel& model, const fs::path& file, std::optional<double> from_s,
-                 std::optional<double> to_s, bool torque_required) {
-  std::vector<bool> revolute;
-  for (const Joint& joint : model.robot.joints) revolute.push_back(joint.type == JointType::revolute);
-  for (const std::string& name : {file.filename().string(), std::string()}) {
-    if (const auto found = model.log_formats.find(name); found != model.log_formats.end())
-      return read_log(file, model.robot.size(), revolute, found->second, from_s, to_s, torque_required);
-  }
-  throw InputError(fmt::format(
-      "{}: the project's logs have different columns or gains, and this one is none of them; name it like one",
-      file.string()));
-}
-
-void identify_payload(const fs::path& model_file, const fs::path& log_file, const fs::path& directory) {
-  IdentifiedModel model = read_model(model_file);
-  std::error_code ignored;
-  if (fs::equivalent(directory / "model.json", model_file, ignored)) {
-    throw InputError(
-        fmt::format("{}: would be overwritten by the model with load; choose another --out", model_file.string()));
-  }
-  const Log log = read_log_for(model, log_file, {}, {});
-  const LoadFit fit = identify_load(model, process(log, model.filter));
-  model.body.push_back(fit.effect);
-  model.drop_tables();  // they are another model's now
-  const json report = load_json(fit, model.robot);
-  write_file(directory / "model.json", to_json(model).dump(1) + "\n");
-  write_file(directory / "payload.json", report.dump(1) + "\n");
-}
-
-void predict_log(const fs::path& model_file, const fs::path& log_file, bool fixed, const fs::path& directory) {
-  const IdentifiedModel model = read_model(model_file);
-  const Robot& robot = model.robot;
-  // The run's own metrics.json must survive.
-  if (fs::exists(directory / "model.json")) {
-    throw InputError(fmt::format("{}: holds a model and its metrics; choose another --out", directory.string()));
-  }
-  Log log = read_log_for(model, log_file, {}, {}, false);
-  log.role = Role::test;
-  const bool resampled = log.resampled;
-  const Eigen::VectorXd stamps = std::move(log.stamps);
-  const ProcessedLog processed = process(std::move(log), model.filter);
-
-  Eigen::MatrixXd torque;
-  if (fixed) {
-    if (!model.formats)
-      throw InputError(fmt::format("{}: has no fixed-point formats; run `fxdyn export` first", model_file.string()));
-    // At the drive's ticks, as the firmware computes; then back to the log's samples.
-    const TickStates ticks = at_ticks(processed, model.tick_s, true);
-    torque = at_other_times(
-        interpolate(predict_fixed(model, *model.formats, ticks, age_of(model, processed)), ticks.t, processed.t),
-        model.filter.torque_lead_s / processed.step_s);
-  } else {
-    torque = predict(model, processed);
-  }
-  const fs::path out = directory / log_file.filename();
-  std::error_code ignored;
-  if (fs::equivalent(out, log_file, ignored)) {
-    throw InputError(fmt::format("{}: would be overwritten by its prediction; choose another --out", out.string()));
-  }
-  Log result;
-  result.t = resampled ? stamps : processed.t;
-  result.tau = resampled ? interpolate(torque, processed.t, stamps) : torque;
-  write_log(out, result);
-  json logs = json::array();
-  if (processed.tau.size() > 0) logs.push_back(metrics_json(processed, robot, judge(processed, torque)));
-  write_file(directory / "metrics.json",
-             json{{"schema", "fxdyn.metrics/1"}, {"numbers", fixed ? "fixed" : "real"}, {"logs", logs}}.dump(1) + "\n");
 }
 
 }  // namespace fxdyn

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "host_tools/identify/identify.hpp"
+#include "host_tools/pipeline/training.hpp"
 
 namespace fxdyn {
 
@@ -38,8 +39,8 @@ class Pipeline {
   std::vector<ProcessedLog> logs(Role role);
   /// Tables of the model in these formats and export.json; the model says what is in them.
   void write_export(IdentifiedModel& model, const Formats& formats, const std::filesystem::path& directory);
-  /// Errors of the model on all logs, for metrics.json.
-  nlohmann::json stage_metrics(const IdentifiedModel& model, const std::string& stage);
+  /// Errors of the model on all logs, under a stage's name.
+  StageErrors stage_errors(const IdentifiedModel& model, const std::string& stage);
 
  private:
   GateData& data();
@@ -53,9 +54,11 @@ class Pipeline {
   std::optional<std::pair<int, std::string>> not_excited() const;
   /// @throws DataError: there is one
   void check_excited() const;
-  nlohmann::json rigid_metrics(Fitter fitter);
-  /// Of a fit: what metrics.json and DIR hold beside the model.
-  nlohmann::json fit_metrics(const Fitter& fitter, const Estimate& estimate, const nlohmann::json& stages);
+  Trainer::ErrorsOf stage_errors();
+  /// The stages before training that DIR/metrics.json holds.
+  std::vector<StageErrors> diagnosed_stages() const;
+  /// DIR/identified.urdf, where the estimate has bodies.
+  void write_possible_bodies(const Estimate& estimate) const;
 
   Project project_;
   std::filesystem::path directory_;
@@ -64,18 +67,5 @@ class Pipeline {
   std::optional<std::vector<LogReference>> diagnosed_logs_;
   Progress progress_;
 };
-
-/// A log that the project need not name, or a window of it, with the columns and gains that the model knows.
-/// @throws InputError also where the project's logs differ in them
-Log read_log_for(const IdentifiedModel& model, const std::filesystem::path& file, std::optional<double> from_s,
-                 std::optional<double> to_s, bool torque_required = true);
-
-/// `fxdyn predict`: torque of the model over one log.
-void predict_log(const std::filesystem::path& model, const std::filesystem::path& log, bool fixed,
-                 const std::filesystem::path& directory);
-
-/// `fxdyn payload`: the load of a second log, payload.json and the model with it, model.json.
-void identify_payload(const std::filesystem::path& model, const std::filesystem::path& log,
-                      const std::filesystem::path& directory);
 
 }  // namespace fxdyn

@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
 #include <limits>
+#include <sstream>
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/project/log_entries.hpp"
@@ -42,8 +44,12 @@ const Names role_names{"baseline", "train", "validate", "test"};
 const Names method_names{"ls", "wls", "irls", "rls"};
 const Names input_names{"physical", "extended", "state"}, feature_names{"random", "sparse"};
 const Names activation_names{"tanh", "sigmoid", "relu"};
-const Names board_names{"host",      "mps2-an385", "mps2-an386",    "mps2-an500", "mps2-an505",
-                        "zynqmp_r5", "microbit",   "netduinoplus2", "stm32g474"};
+/// Words of a text.
+Names words(const char* text) {
+  std::istringstream in(text);
+  return {std::istream_iterator<std::string>(in), {}};
+}
+const Names board_names = words(FXDYN_BOARDS);
 
 auto between(int lowest, int highest) {
   return [=](const Value& value) {

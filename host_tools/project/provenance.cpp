@@ -52,9 +52,9 @@ void note_seconds(const fs::path& directory, const char* verb, double seconds) {
   write_file(directory / "timing.json", json{{"schema", "fxdyn.timing/1"}, {"seconds", all}}.dump(1) + "\n");
 }
 
-json training_seconds(const fs::path& directory) {
+std::optional<double> training_seconds(const fs::path& directory) {
   const json all = read_seconds(directory);
-  if (!all.contains("diagnose") || !all.contains("train")) return nullptr;
+  if (!all.contains("diagnose") || !all.contains("train")) return {};
   return all.at("diagnose").get<double>() + all.at("train").get<double>();
 }
 

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "host_tools/project/project.hpp"
 #include "model/table_page.hpp"
@@ -17,8 +18,8 @@ bool is_unchanged(const nlohmann::json& made_from, const std::filesystem::path& 
 
 /// Wall time of the verbs that make DIR's model, in DIR/timing.json: it differs from run to run.
 void note_seconds(const std::filesystem::path& directory, const char* verb, double seconds);
-/// Of diagnose and train together; null where one of them is not known.
-nlohmann::json training_seconds(const std::filesystem::path& directory);
+/// Of diagnose and train together; none where one of them is not known.
+std::optional<double> training_seconds(const std::filesystem::path& directory);
 
 /// What a file with a page of tables says of itself; all zero where it is too short.
 PageHeader header_of(const std::filesystem::path& page);

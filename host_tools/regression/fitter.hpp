@@ -8,6 +8,8 @@
 #include "host_tools/effects/forward.hpp"
 #include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/regression/dataset.hpp"
+#include "host_tools/regression/fit_data.hpp"
+#include "host_tools/regression/judgement.hpp"
 #include "host_tools/regression/products.hpp"
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/regression/square_root.hpp"
@@ -40,28 +42,6 @@ struct NormalEquations {
   Eigen::MatrixXd information;
   Eigen::VectorXd projection;
   std::vector<Eigen::Index> offset;  ///< of each joint's theta in x; one more element: the number of unknowns
-};
-
-/// Which blocks fit and which judge. With `validate` logs: train fits, validate judges. Without: every train log is
-/// judged by a fit of the others; a single one is cut into five contiguous blocks.
-struct Split {
-  std::vector<std::vector<std::size_t>> fit, judge;  ///< block numbers, one entry a fold
-  bool has_validation = false;
-  std::string kind;  ///< for people
-};
-
-/// How one joint did on the rows that judge.
-struct Judgement {
-  double rmse = 1e300;         ///< of the residual over all judging blocks [N*m | N]
-  std::vector<double> blocks;  ///< RMSE of each judging block
-  bool physical = true;        ///< the effect that was added last keeps its bounds in every fold
-  double coefficient_sum = 0;  ///< sum of |c| of the BLS, most of any fold [N*m | N]
-
-  bool blocks_of_one_log =
-      false;  ///< the blocks resemble the fit's data: four times the improvement is asked for, on every block
-
-  /// Better by `worth` over all, better at all on three blocks in four, and physical.
-  bool beats(const Judgement& other, double worth) const;
 };
 
 /// Structure and effects of all joints fitted together by weighted least squares, with moments kept by block so that a
@@ -166,33 +146,14 @@ class Fitter {
   std::vector<Eigen::Index> saturated_rows() const;
 
  private:
-  struct Block {
-    std::size_t log;
-    Eigen::Index from, to;  ///< of all rows
-    bool train;
-  };
-  /// What all copies and all designs have in common. Rows of all logs are stacked.
-  struct Data {
-    Robot robot;
-    const std::vector<ProcessedLog>* logs;
-    DhChain chain;
-    BaseSet base;
-    std::vector<Eigen::Index> first_base;    ///< per joint: base columns from here on act on it
-    std::vector<Eigen::Index> first_row;     ///< per log
-    std::vector<Eigen::MatrixXd> base_rows;  ///< per joint: rows x base columns that act on it
-    std::vector<Eigen::VectorXd> load_rows;  ///< per joint: torque of the logs' known loads
-    std::vector<Eigen::VectorXd> usable;     ///< per joint and row: 0 where saturated, else 1
-    std::vector<Block> blocks;
-    Split split;
-  };
-  using Own = std::vector<OwnMoments>;  ///< by block
+  using OwnByBlock = std::vector<OwnMoments>;  ///< by block
 
   JointSeries joint_series(std::size_t joint, std::size_t log) const;
   Eigen::MatrixXd own_rows(std::size_t joint, const std::vector<JointFit>& designs) const;
   /// But for what the torque enters.
   void make_base_moments(std::size_t joint);
   void project_torque(std::size_t joint);
-  Own own_moments(std::size_t joint, const Eigen::MatrixXd& own) const;
+  OwnByBlock own_moments(std::size_t joint, const Eigen::MatrixXd& own) const;
   Eigen::VectorXd residual(std::size_t joint, const Solution& solution) const;
   /// Where x has its parts: NormalEquations::offset.
   std::vector<Eigen::Index> offsets() const;
@@ -201,7 +162,7 @@ class Fitter {
                SquareRootInformation& information) const;
   static Eigen::VectorXd ridge_of(const JointFit& design, double ridge, Eigen::Index count);
   double square_error(std::size_t joint, std::size_t block, const OwnMoments& own, const Solution& solution) const;
-  NormalEquations assemble(const std::vector<std::size_t>& blocks, const std::vector<const Own*>& own,
+  NormalEquations assemble(const std::vector<std::size_t>& blocks, const std::vector<const OwnByBlock*>& own,
                            const std::vector<const JointFit*>& design) const;
   Solution solve(const NormalEquations& equations) const;
   Solution split(const std::vector<Eigen::Index>& offset, const Eigen::VectorXd& x) const;
@@ -217,18 +178,18 @@ class Fitter {
 
     explicit Tally(std::size_t joints) : judgements(joints), square(joints, 0), count(joints, 0) {}
     /// One more fold of joint number `i` of these.
-    void add(std::size_t i, const Fitter& fitter, std::size_t joint, std::size_t fold, const Own& own,
+    void add(std::size_t i, const Fitter& fitter, std::size_t joint, std::size_t fold, const OwnByBlock& own,
              const JointFit& design, const Solution& solution);
     std::vector<Judgement> done(bool one_log);
   };
   /// Joints `first` .. `last` - 1.
-  std::vector<Judgement> judged(std::size_t first, std::size_t last, const std::vector<const Own*>& own,
+  std::vector<Judgement> judged(std::size_t first, std::size_t last, const std::vector<const OwnByBlock*>& own,
                                 const std::vector<const JointFit*>& design) const;
   std::vector<std::size_t> train_blocks() const;
-  std::vector<const Own*> current() const;
+  std::vector<const OwnByBlock*> current() const;
   std::vector<const JointFit*> designs() const;
 
-  std::shared_ptr<const Data> data_;
+  std::shared_ptr<const FitData> data_;
   std::vector<JointFit> design_;
   std::shared_ptr<const std::vector<Eigen::MatrixXd>> structural_;  ///< set_structural(); none: not known
   double torque_lead_s_ = 0;
@@ -237,7 +198,7 @@ class Fitter {
   std::vector<Eigen::VectorXd> row_weights_;            ///< per joint and row
   std::vector<std::vector<BaseMoments>> base_moments_;  ///< [joint][block]
   std::vector<Eigen::MatrixXd> own_rows_;               ///< per joint: rows x own columns
-  std::vector<Own> own_moments_;                        ///< [joint][block]
+  std::vector<OwnByBlock> own_moments_;                 ///< [joint][block]
   Eigen::VectorXd weights_;
 };
 

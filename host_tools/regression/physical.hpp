@@ -6,42 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/regression/consistent.hpp"
 #include "host_tools/regression/fitter.hpp"
+#include "host_tools/regression/pseudo_inertia.hpp"
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/robot/robot.hpp"
 
 namespace fxdyn {
-
-/// P = integral of [r; 1] [r; 1]^T dm = [[J, h], [h^T, m]] of a link (Wensing, Kim, Slotine 2018). A body of matter has
-/// P > 0, and every P > 0 belongs to one: mass positive, inertia tensor positive with the triangle inequality.
-Eigen::Matrix4d pseudo_inertia(const LinkInertia<Real>& link);
-LinkInertia<Real> from_pseudo_inertia(const Eigen::Matrix4d& p);
-
-/// Bodies pi (10 a body) that are physically possible, and coefficients theta within bounds, closest to the data:
-///   minimise (z - z*)^T information (z - z*) / variance, z = [beta; theta], beta = grouping * pi,
-///   subject to P_i > 0 and lower <= theta <= upper.
-struct ConsistentProblem {
-  Eigen::MatrixXd information;         ///< X^T W X over [beta; theta]
-  Eigen::VectorXd projection;          ///< X^T W tau
-  Eigen::VectorXd lower, upper;        ///< of theta; +-1e30: unbounded
-  Eigen::MatrixXd grouping;            ///< beta x 10 bodies, the unit matrix in `columns`
-  std::vector<Eigen::Index> columns;   ///< the parameters that stand for beta
-  std::vector<Eigen::Matrix4d> prior;  ///< one a body, P > 0
-  double variance = 1;                 ///< of a row's weighted residual: 1 where W is one over the residual's variance
-};
-
-struct ConsistentFit {
-  std::vector<Eigen::Matrix4d> bodies;
-  Eigen::VectorXd beta, theta;
-  bool constrained = false;  ///< false: beta and theta are the least squares solution itself
-};
-
-/// Interior-point Newton whose barrier is the prior: the divergence between pseudo-inertias
-///   D(P || P0) = tr(P0^-1 P) - log det(P0^-1 P) - 4
-/// (Lee, Wensing, Park, "Geometric robot dynamic identification", T-RO 2020), which no choice of units or frames
-/// changes. Its weight falls to a hundredth of what one independent row tells. Where some possible bodies make the
-/// least squares solution, that is the result and the prior only chooses among those.
-ConsistentFit fit_consistent(const ConsistentProblem& problem);
 
 /// The fit of a robot: see ConsistentProblem.
 struct PhysicalProblem {

@@ -80,7 +80,7 @@ NormalEquations Fitter::with_shapes(const Solution& solution, std::vector<Matrix
     const Index at = out.offset[j], count = shapes[j].cols(), first = data_->first_base[j];
     const Index own = linear.offset[j], own_count = linear.offset[j + 1] - own;
     for (const std::size_t b : train_blocks()) {
-      const Block& block = data_->blocks[b];
+      const RowRange& block = data_->blocks[b];
       const auto cut = [&](const auto& m) { return m.middleRows(block.from, block.to - block.from); };
       const MatrixXd ws = (w * cut(row_weights_[j])).asDiagonal() * cut(shapes[j]);
       const auto x = cut(data_->base_rows[j]);
@@ -102,7 +102,7 @@ double Fitter::weighted_square(const Solution& solution) const {
   for (std::size_t j = 0; j < joints(); ++j) {
     const VectorXd e = residual(j, solution);
     for (const std::size_t b : train_blocks()) {
-      const Block& block = data_->blocks[b];
+      const RowRange& block = data_->blocks[b];
       const Index count = block.to - block.from;
       sum += weights_[static_cast<Index>(j)] *
              row_weights_[j].segment(block.from, count).dot(e.segment(block.from, count).cwiseAbs2());
@@ -220,6 +220,30 @@ class NoiseOfJoint {
   VectorXd residual_, noise_;  ///< autocorrelation at lags 0, 1, ..
 };
 
+/// `std`: of all unknowns, where linear[j] is the first of joint j's coefficients and shapes[j] the first of its shapes
+/// (logarithms; none with a BLS).
+void set_standard_deviations(Solution& solution, const VectorXd& std, const std::vector<Index>& linear,
+                             const std::vector<Index>& shapes, const std::vector<JointFit>& designs) {
+  solution.beta_std = std.head(solution.beta.size());
+  solution.theta_std.clear();
+  solution.sign_width_std.assign(designs.size(), 0.0);
+  solution.shape_std.assign(designs.size(), {});
+  for (std::size_t j = 0; j < designs.size(); ++j) {
+    solution.theta_std.emplace_back(std.segment(linear[j], linear[j + 1] - linear[j]));
+    Index at = shapes[j];
+    const bool has_shapes = shapes[j + 1] > at;
+    if (has_shapes) solution.sign_width_std[j] = std[at++] * designs[j].sign_width;
+    for (const EffectFit& fit : designs[j].effects) {
+      const auto infos = find_effect(fit.effect)->shape;
+      std::vector<double> stds(infos.size(), 0.0);
+      for (std::size_t i = 0; i < infos.size(); ++i) {
+        if (is_continuous(infos[i]) && has_shapes) stds[i] = std[at++] * fit.shape[i];
+      }
+      solution.shape_std[j].push_back(stds);
+    }
+  }
+}
+
 }  // namespace
 
 void Fitter::add_standard_deviations(Solution& solution) const {
@@ -292,23 +316,7 @@ void Fitter::add_standard_deviations(Solution& solution) const {
     if (!(covariance(k, k) > 0)) std[k] = std::sqrt(std::max(0.0, inverse(k, k)));
   }
   solution.covariance = covariance.topLeftCorner(linear.offset.back(), linear.offset.back());
-  solution.beta_std = std.head(solution.beta.size());
-  solution.theta_std.clear();
-  solution.sign_width_std.assign(joints(), 0.0);
-  solution.shape_std.assign(joints(), {});
-  for (std::size_t j = 0; j < joints(); ++j) {
-    solution.theta_std.emplace_back(std.segment(linear.offset[j], linear.offset[j + 1] - linear.offset[j]));
-    Index at = all.offset[j];
-    if (shapes[j].cols() > 0) solution.sign_width_std[j] = std[at++] * design_[j].sign_width;
-    for (const EffectFit& fit : design_[j].effects) {
-      const auto infos = find_effect(fit.effect)->shape;
-      std::vector<double> stds(infos.size(), 0.0);
-      for (std::size_t i = 0; i < infos.size(); ++i) {
-        if (is_continuous(infos[i]) && shapes[j].cols() > 0) stds[i] = std[at++] * fit.shape[i];
-      }
-      solution.shape_std[j].push_back(stds);
-    }
-  }
+  set_standard_deviations(solution, std, linear.offset, all.offset, design_);
 }
 
 void Fitter::reweight_rows() {
@@ -388,7 +396,7 @@ void Fitter::take_in(Index from, Index count, const std::vector<VectorXd>& row_w
 SquareRootInformation Fitter::information() const {
   SquareRootInformation out(offsets().back());
   for (const std::size_t b : train_blocks()) {
-    const Block& block = data_->blocks[b];
+    const RowRange& block = data_->blocks[b];
     take_in(block.from, block.to - block.from, row_weights_, out);
   }
   return out;

@@ -1,5 +1,3 @@
-#include "host_tools/report/comparison_section.hpp"
-
 #include <fmt/format.h>
 #include <map>
 
@@ -7,7 +5,8 @@
 #include <numeric>
 
 #include "host_tools/page/page.hpp"
-#include "host_tools/page/plot.hpp"
+#include "host_tools/report/comparison_plots.hpp"
+#include "host_tools/report/section.hpp"
 #include "host_tools/support/files.hpp"
 
 namespace fxdyn {
@@ -58,8 +57,7 @@ std::string paper_table(const json& methods) {
 
 }  // namespace
 
-std::string comparison_section(const json& comparison, const std::filesystem::path& directory) {
-  if (comparison.is_null()) return {};
+std::string comparison_section(const ReportInput& input, const json& comparison) {
   const json& methods = comparison.at("methods");
   std::string out = section("Methods compared");
   out += paragraph("Every method had the same train and validate logs; errors on the test logs, against the " +
@@ -103,109 +101,9 @@ std::string comparison_section(const json& comparison, const std::filesystem::pa
   out += absolute.html();
   if (comparison.value("paper", false)) out += paper_table(methods);
   for (const ComparisonPlot& plot : comparison_plots) {
-    const std::filesystem::path file = directory / "plots" / plot.file;
+    const std::filesystem::path file = input.directory / "plots" / plot.file;
     if (std::filesystem::exists(file)) out += subsection(plot.title) + read_file(file);
   }
-  return out;
-}
-
-std::string vibration_section(const json& vibration) {
-  if (vibration.is_null()) return {};
-  const json& control = vibration.at("control");
-  std::string out = section("Vibration");
-  out += paragraph(fmt::format(
-      "The scenario's robot in closed loop, gears that bend and friction on its motors, in a simulator that shares no "
-      "code "
-      "with the model. PD of {:.3g} Hz and damping {:.2g}, the best of a grid without feedforward; tick {:.3g} ms.",
-      control.at("bandwidth_hz").get<double>(), control.at("damping").get<double>(),
-      1e3 * control.at("tick_s").get<double>()));
-  for (const char* kind : {"all", "point_to_point", "reversals", "slow"}) {
-    Table table({{"feedforward"},
-                 {"computed in"},
-                 {"parameters off"},
-                 {"reference of"},
-                 {"motor [mrad]", "n"},
-                 {"link [mrad]", "n"},
-                 {"residual [mrad]", "n"},
-                 {"settling [ms]", "n"},
-                 {"roughness of rated", "n"}});
-    for (const json& method : vibration.at("methods")) {
-      const json& move = method.at("moves").at(kind);
-      table.add({{method.at("feedforward").get<std::string>()},
-                 {method.at("numbers").get<std::string>()},
-                 {method.at("parameters_off").get<std::string>()},
-                 {method.value("reference", "link")},
-                 number(move.at("tracking_motor"), 3),
-                 number(move.at("tracking_link"), 3),
-                 number(move.at("residual"), 3),
-                 {fmt::format("{:.0f}", 1e3 * move.at("settling_s").get<double>()), "n"},
-                 number(move.at("roughness"), 2)});
-    }
-    out += subsection(std::string("Moves: ") + kind) + table.html();
-  }
-  Table ratios({{"feedforward"},
-                {"computed in"},
-                {"parameters off"},
-                {"motor / PD alone", "n"},
-                {"link / PD alone", "n"},
-                {"residual / PD alone", "n"},
-                {"motor / rigid", "n"},
-                {"link / rigid", "n"}});
-  for (const json& method : vibration.at("methods")) {
-    const auto ratio = [&](const char* base, const char* key) {
-      const json::json_pointer at(fmt::format("/ratios/{}/{}", base, key));
-      return method.contains(at) ? number(method.at(at), 3) : Cell{"-", "n"};
-    };
-    ratios.add({{method.at("feedforward").get<std::string>()},
-                {method.at("numbers").get<std::string>()},
-                {method.at("parameters_off").get<std::string>()},
-                ratio("none", "tracking_motor"),
-                ratio("none", "tracking_link"),
-                ratio("none", "residual"),
-                ratio("rigid", "tracking_motor"),
-                ratio("rigid", "tracking_link")});
-  }
-  out += subsection("All moves, against the PD alone and the rigid body") + ratios.html();
-  return out + paragraph(
-                   "Motor, link: RMS of the position error while it moves, the motor's against what it was asked for, "
-                   "the link's against the links' reference. With the motors' reference they are asked to be ahead by "
-                   "what the model says that the gears bend. Residual: how far a link is from where it "
-                   "comes to rest, "
-                   "at most, after the stop, mean over the joints. Settling: until every link stays within a quarter "
-                   "of what it is "
-                   "off at most with the PD alone. "
-                   "Roughness: RMS of the torque's change from tick to tick.");
-}
-
-std::string efficiency_section(const json& efficiency) {
-  if (efficiency.is_null()) return {};
-  std::string out = section("Error against seconds of data");
-  const auto draw_curves = [&](const char* key, const char* x_of, const std::string& x_label) {
-    std::map<std::string, std::pair<std::vector<double>, std::vector<double>>> curves;
-    for (const json& point : efficiency.at(key)) {
-      for (const auto& [name, error] : point.at("percent_rated").items()) {
-        if (error.is_null()) continue;
-        std::string title = name;
-        if (std::string(key) == "mix") title += fmt::format(", {:g} s", point.at("seconds").get<double>());
-        curves[title].first.push_back(point.at(x_of).get<double>());
-        curves[title].second.push_back(error.get<double>());
-      }
-    }
-    static constexpr const char* colours[] = {"#2e6fb7", "#e4572e", "#2a9d4a", "#8e5ea2", "#b8860b", "#444444"};
-    Chart chart{x_label, "test error, % of rated", {}, true};
-    for (const auto& [title, points] : curves) {
-      const auto vector = [](const std::vector<double>& v) {
-        return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size())));
-      };
-      chart.curves.push_back(
-          {vector(points.first), vector(points.second), colours[chart.curves.size() % 6], 1.6, title});
-    }
-    return draw({chart}, 1);
-  };
-  out += paragraph("Half of the seconds fast motion, half slow.");
-  out += draw_curves("curve", "seconds", "seconds of train data");
-  out += subsection("Which mix of fast and slow motion");
-  out += draw_curves("mix", "slow_share", "share of slow motion");
   return out;
 }
 

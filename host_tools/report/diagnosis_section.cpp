@@ -1,4 +1,4 @@
-#include "host_tools/report/diagnosis_section.hpp"
+#include "host_tools/report/diagnosis_plot.hpp"
 
 #include <fmt/format.h>
 
@@ -6,6 +6,7 @@
 
 #include "host_tools/page/page.hpp"
 #include "host_tools/report/diagnosis_words.hpp"
+#include "host_tools/report/section.hpp"
 #include "host_tools/support/files.hpp"
 
 namespace fxdyn {
@@ -195,7 +196,7 @@ std::string pictures(const json& joints, const fs::path& directory) {
 
 }  // namespace
 
-std::string diagnosis_section(const json& diagnosis, const fs::path& directory) {
+std::string diagnosis_section(const ReportInput& input, const json& diagnosis) {
   const json joints = diagnosis.value("joints", json::array());
   std::string out = section("Diagnosis") + paragraph(what_it_means(diagnosis)) + figures(diagnosis) +
                     joint_table(joints) + effect_table(diagnosis);
@@ -208,7 +209,7 @@ std::string diagnosis_section(const json& diagnosis, const fs::path& directory) 
   for (const json& note : diagnosis.value("notes", json::array())) {
     if (note.is_string()) out += paragraph("Note: " + note.get<std::string>() + ".");
   }
-  return out + pictures(joints, directory);
+  return out + pictures(joints, input.directory);
 }
 
 fs::path diagnosis_plot(const fs::path& directory, std::size_t joint) {

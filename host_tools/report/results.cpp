@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "host_tools/project/provenance.hpp"
+#include "host_tools/report/section.hpp"
 #include "host_tools/support/files.hpp"
 
 namespace fxdyn {
@@ -47,6 +48,22 @@ json read_of_inputs(const std::string& verb, const fs::path& directory, const js
   return {};
 }
 
+json read_result(const ResultFile& result, const fs::path& directory, const json& model,
+                 std::vector<std::string>& stale) {
+  const std::string name(result.name);
+  switch (result.belongs) {
+    case Belongs::to_tables:
+      return read_of_tables(directory / (name + ".json"), model);
+    case Belongs::to_diagnosis:
+      return read_diagnosis(directory, model);
+    case Belongs::to_inputs:
+      return read_of_inputs(name, directory, model, stale);
+    case Belongs::to_anything:
+      break;
+  }
+  return read_json(directory / (name + ".json"));
+}
+
 std::string shown_role(const json& logs) {
   for (const char* role : {"test", "validate"}) {
     for (const json& log : logs) {
@@ -67,41 +84,27 @@ std::string processor_of(const std::string& image) {
 
 }  // namespace
 
+const json& Results::operator[](std::string_view name) const {
+  static const json missing;
+  const auto found = files.find(name);
+  return found == files.end() ? missing : found->second;
+}
+
 Results read_results(const fs::path& directory) {
   Results results;
-  results.metrics = read_json(directory / "metrics.json");
   const json model = read_json(directory / "model.json");
-  results.exported = read_of_tables(directory / "export.json", model);
-  results.replayed = read_of_tables(directory / "replay.json", model);
-  results.diagnosis = read_diagnosis(directory, model);
-  results.compared = read_of_inputs("compare", directory, model, results.stale);
-  results.efficiency = read_of_inputs("efficiency", directory, model, results.stale);
-  results.vibration = read_of_inputs("vibration", directory, model, results.stale);
-  if (!results.metrics.is_null()) results.role = shown_role(results.metrics.at("logs"));
+  for (const ReportSection& section : report_sections()) {
+    const std::string name(section.needs.name);
+    if (name.empty() || results.files.contains(name)) continue;
+    results.files[name] = read_result(section.needs, directory, model, results.stale);
+  }
+  if (const json& metrics = results["metrics"]; !metrics.is_null()) results.role = shown_role(metrics.at("logs"));
   return results;
 }
 
-PooledError pooled_error(const json& logs, const std::string& role, std::size_t joint) {
-  double error = 0, torque = 0, floor = 0;
-  int count = 0;
-  for (const json& log : logs) {
-    if (log.at("role") != role) continue;
-    const json& entry = log.at("joints").at(joint);
-    const double rmse = entry.at("rmse"), relative = entry.at("relative"), noise = entry.at("noise_floor");
-    const double rms = relative > 0 ? rmse / relative : 0;
-    error += rmse * rmse;
-    torque += rms * rms;
-    floor += noise * noise;
-    ++count;
-  }
-  const double n = std::max(1, count);
-  return {std::sqrt(error / n), std::sqrt(torque / n), std::sqrt(floor / n)};
-}
-
-std::string stage_title(const json& stage) {
-  const std::string name = stage.at("stage");
-  if (name == "rigid") return "rigid body only";
-  return name == "bls" ? "+ BLS" : "+ " + name;
+std::string stage_title(const StageErrors& stage) {
+  if (stage.stage == "rigid") return "rigid body only";
+  return stage.stage == "bls" ? "+ BLS" : "+ " + stage.stage;
 }
 
 ReplaySummary summarise_replay(const json& replayed) {

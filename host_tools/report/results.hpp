@@ -1,31 +1,43 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
+
+#include "host_tools/regression/metrics.hpp"
 
 namespace fxdyn {
 
-/// What the stages left in DIR, as far as it belongs together: an export or a replay of other tables
-/// than the model's (CRC) counts as missing (null), and so does a diagnosis of other logs or another
-/// project, and what compare, efficiency and vibration wrote for another project file, other logs or another model.
+/// What a result in DIR has to belong to; else it counts as missing.
+enum class Belongs {
+  to_anything,
+  to_tables,     ///< of the model (CRC)
+  to_diagnosis,  ///< nominal.json, from which it started, is of the model's project and logs
+  to_inputs,     ///< project file, logs and model are as they were
+};
+/// DIR/name.json; no name: none.
+struct ResultFile {
+  std::string_view name;
+  Belongs belongs = Belongs::to_anything;
+};
+
+/// What the stages left in DIR, as far as it belongs together.
 struct Results {
-  nlohmann::json metrics, exported, replayed, diagnosis, compared, efficiency, vibration;
+  std::map<std::string, nlohmann::json, std::less<>> files;
   std::vector<std::string> stale;  ///< verbs whose results are left out because they belong to something else
   std::string role;                ///< of the logs that a reader wants to see: test, else validate, else train
+  /// Null where it is missing or left out.
+  const nlohmann::json& operator[](std::string_view name) const;
 };
+/// The files that the report's sections need.
 Results read_results(const std::filesystem::path& directory);
 
-/// RMSE and RMS of the torque of one joint over all logs of a role [N*m | N], and the mean noise floor.
-struct PooledError {
-  double rmse = 0, rms = 0, noise_floor = 0;
-  double relative() const { return rms > 0 ? rmse / rms : 0; }
-};
-PooledError pooled_error(const nlohmann::json& logs, const std::string& role, std::size_t joint);
-
 /// "rigid body only", "+ friction", "+ BLS".
-std::string stage_title(const nlohmann::json& stage);
+std::string stage_title(const StageErrors& stage);
 
 /// What a replay comes to, over all its logs.
 struct ReplaySummary {

@@ -11,12 +11,11 @@ using nlohmann::json;
 namespace fs = std::filesystem;
 
 /// What the BLS did to a joint's error on the shown logs: "-85 %", or "not kept" where validation said no.
-std::string bls_verdict(const json& metrics, const std::string& role, std::size_t joint) {
-  const json& stages = metrics.at("stages");
+std::string bls_verdict(const json& metrics, const std::vector<StageErrors>& stages, Role role, std::size_t joint) {
   if (!metrics.contains("training") || joint >= metrics.at("training").size() || stages.size() < 2) return "";
   if (!metrics.at("training").at(joint).at("kept").get<bool>()) return "not kept";
-  const double before = pooled_error(stages.at(stages.size() - 2).at("logs"), role, joint).rmse;
-  const double after = pooled_error(stages.back().at("logs"), role, joint).rmse;
+  const double before = pooled_error(stages[stages.size() - 2].logs, role, joint).rmse;
+  const double after = pooled_error(stages.back().logs, role, joint).rmse;
   return before > 0 ? fmt::format("{:+.0f} %", 100 * (after / before - 1)) : "";
 }
 
@@ -38,30 +37,30 @@ std::string replay_line(const json& replayed) {
 
 std::string summary_table(const fs::path& directory) {
   const Results results = read_results(directory);
-  const json &metrics = results.metrics, &exported = results.exported, &replayed = results.replayed,
-             &diagnosis = results.diagnosis;
-  const std::string& role = results.role;
+  const json &metrics = results["metrics"], &exported = results["export"], &replayed = results["replay"],
+             &diagnosis = results["diagnosis"];
   const std::string diagnosed = diagnosis.is_null() ? "" : diagnosis_table(diagnosis);
   if (metrics.is_null()) return diagnosed;
-  const json& stages = metrics.at("stages");
+  const std::vector<StageErrors> stages = stages_of(metrics);
+  const Role role = role_of(results.role);
   const json& joints = metrics.at("logs").at(0).at("joints");
   std::size_t width = 8;
   for (const json& joint : joints) width = std::max(width, joint.at("joint").get<std::string>().size() + 2);
 
   std::string out = fmt::format("\nRMSE on the {} logs (in parentheses: share of the RMS of the torque)\n{:<{}}{:<6}",
-                                role, "joint", width, "unit");
-  for (const json& stage : stages) out += fmt::format("{:>20}", stage_title(stage));
+                                results.role, "joint", width, "unit");
+  for (const StageErrors& stage : stages) out += fmt::format("{:>20}", stage_title(stage));
   if (metrics.contains("training")) out += fmt::format("{:>10}", "by BLS");
   if (!exported.is_null()) out += fmt::format("{:>22}", "|fixed - double| max");
   out += "\n";
   for (std::size_t j = 0; j < joints.size(); ++j) {
     out += fmt::format("{:<{}}{:<6}", joints.at(j).at("joint").get<std::string>(), width,
                        joints.at(j).at("unit").get<std::string>());
-    for (const json& stage : stages) {
-      const PooledError error = pooled_error(stage.at("logs"), role, j);
+    for (const StageErrors& stage : stages) {
+      const PooledError error = pooled_error(stage.logs, role, j);
       out += fmt::format("{:>10.4g} ({:6.2f}%)", error.rmse, 100 * error.relative());
     }
-    if (metrics.contains("training")) out += fmt::format("{:>10}", bls_verdict(metrics, role, j));
+    if (metrics.contains("training")) out += fmt::format("{:>10}", bls_verdict(metrics, stages, role, j));
     if (!exported.is_null()) {
       out += fmt::format("{:>13.1e} of rated", exported.at("joints").at(j).at("observed_max_of_rated").get<double>());
     }

@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace fxdyn {
@@ -13,6 +14,8 @@ namespace fxdyn {
 /// Which data decides what: see docs/guide. `baseline` serves `diagnose` only.
 enum class Role { baseline, train, validate, test };
 std::string to_string(Role role);
+/// The role of that name. @throws InputError: there is none
+Role role_of(std::string_view name);
 
 /// A load on the flange: a point mass at `com` in the last link's URDF frame.
 struct Load {

@@ -10,9 +10,9 @@
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/identify/plausible.hpp"
+#include "host_tools/pipeline/one_log.hpp"
 #include "host_tools/project/provenance.hpp"
 #include "host_tools/regression/metrics.hpp"
-#include "host_tools/report/results.hpp"
 #include "host_tools/simulate/recordings.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
@@ -184,10 +184,9 @@ Refit refit(const Project& project, const IdentifiedModel& old, const StoredInfo
 /// Errors of a model over some logs, pooled.
 struct Errors {
   explicit Errors(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs) {
-    json list = json::array();
-    for (const ProcessedLog* log : logs)
-      list.push_back(metrics_json(*log, model.robot, judge(*log, predict(model, *log))));
-    for (std::size_t j = 0; j < model.joints.size(); ++j) rmse.push_back(pooled_error(list, "test", j).rmse);
+    std::vector<LogErrors> errors;
+    for (const ProcessedLog* log : logs) errors.push_back(errors_of(*log, model.robot, predict(model, *log)));
+    for (std::size_t j = 0; j < model.joints.size(); ++j) rmse.push_back(pooled_error(errors, Role::test, j).rmse);
   }
   std::vector<double> rmse;  ///< of each joint [N*m | N]
 };
@@ -360,7 +359,7 @@ Update update(Pipeline& pipeline, const UpdateSettings& settings) {
   write_information(known, read_model(staging.path() / "model.json"), staging.path());
   if (const fs::path file = directory / "metrics.json"; fs::exists(file)) {
     json metrics = json::parse(read_file(file));
-    metrics["logs"] = pipeline.stage_metrics(updated, "update").at("logs");
+    metrics["logs"] = to_json(pipeline.stage_errors(updated, "update").logs);
     metrics["notes"].push_back(updated.notes.back());
     write_file(staging.path() / "metrics.json", metrics.dump(1) + "\n");
   }

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/pipeline/one_log.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/support/files.hpp"

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/pipeline/one_log.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
 #include "host_tools/regression/physical.hpp"
 #include "host_tools/signals/fourier.hpp"

@@ -1,12 +1,8 @@
 #pragma once
 
-#include <filesystem>
-#include <nlohmann/json_fwd.hpp>
-#include <string>
-
 namespace fxdyn {
 
-/// A picture that write_comparison_plots() draws.
+/// A picture that write_comparison_plots() draws and the section of report.html shows.
 struct ComparisonPlot {
   const char* file;   ///< in DIR/plots
   const char* title;  ///< for the report
@@ -20,11 +16,5 @@ inline constexpr ComparisonPlot comparison_plots[] = {
     {"compare_methods.svg", "RLS, MLP, BLS against the truth (as Fig. 10)"},
     {"compare_methods_error.svg", "Smoothed error of the methods (as Fig. 11)"},
 };
-
-/// Sections of report.html from compare.json, with the pictures in DIR/plots, and from vibration.json and
-/// efficiency.json; null: left out.
-std::string comparison_section(const nlohmann::json& comparison, const std::filesystem::path& directory);
-std::string vibration_section(const nlohmann::json& vibration);
-std::string efficiency_section(const nlohmann::json& efficiency);
 
 }  // namespace fxdyn

@@ -1,12 +1,14 @@
-// What the report shows of compare.json, vibration.json and efficiency.json.
+// The table of sections, and what the report shows of compare.json, vibration.json and efficiency.json.
 
-#include "host_tools/report/comparison_section.hpp"
+#include "host_tools/report/section.hpp"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
+#include <set>
 
-#include "host_tools/compare/figures.hpp"
+#include "host_tools/report/comparison_plots.hpp"
 #include "host_tools/support/files.hpp"
 #include "tests/support/files.hpp"
 
@@ -17,6 +19,48 @@ using nlohmann::json;
 
 void expect_all(const std::string& page, const std::vector<std::string>& parts) {
   for (const std::string& part : parts) EXPECT_NE(page.find(part), std::string::npos) << part << " not in " << page;
+}
+
+/// What the section of that name draws from its result alone.
+std::string drawn(std::string_view name, const json& result, const std::filesystem::path& directory = test::folder()) {
+  const auto sections = report_sections();
+  const auto section = std::find_if(sections.begin(), sections.end(), [&](const auto& s) { return s.name == name; });
+  if (section == sections.end()) return "no such section";
+  Results results;
+  results.files[std::string(section->needs.name)] = result;
+  const IdentifiedModel model;
+  const std::vector<ProcessedLog> logs;
+  return draw_sections({model, {}, logs, results, directory}, {&*section, 1});
+}
+
+TEST(Sections, EachHasItsName) {
+  std::set<std::string_view> names;
+  for (const ReportSection& section : report_sections()) EXPECT_TRUE(names.insert(section.name).second) << section.name;
+  EXPECT_TRUE(names.contains("replay"));
+}
+
+TEST(Sections, OneThatIsAlwaysDrawnSaysHowToMakeItsResult) {
+  expect_all(drawn("replay", nullptr), {"<h2>Replay on the firmware</h2>", "run fxdyn replay"});
+  expect_all(drawn("fixed_point", nullptr), {"run fxdyn export"});
+}
+
+TEST(Sections, OneMoreIsDrawnInItsPlace) {
+  constexpr ReportSection first{"first", {"numbers"}, false, [](const ReportInput&, const json& result) {
+                                  return "first " + std::to_string(result.at("count").get<int>()) + "\n";
+                                }};
+  constexpr ReportSection second{"second", {""}, true, [](const ReportInput& input, const json&) {
+                                   return "second " + input.results.role + "\n";
+                                 }};
+  const std::array both{first, second};
+  const IdentifiedModel model;
+  const std::vector<ProcessedLog> logs;
+  Results results;
+  results.role = "test";
+  const auto directory = test::folder();
+  const ReportInput input{model, {}, logs, results, directory};
+  EXPECT_EQ(draw_sections(input, both), "second test\n");
+  results.files["numbers"] = {{"count", 3}};
+  EXPECT_EQ(draw_sections(input, both), "first 3\nsecond test\n");
 }
 
 json method(const std::string& name, double percent, const json& fixed) {
@@ -38,8 +82,8 @@ json comparison(bool paper) {
 }
 
 TEST(ComparisonSection, HasEveryMethodAndJoint) {
-  EXPECT_EQ(comparison_section(nullptr, test::folder()), "");
-  const std::string page = comparison_section(comparison(false), test::folder());
+  EXPECT_EQ(drawn("comparison", nullptr), "");
+  const std::string page = drawn("comparison", comparison(false));
   expect_all(page, {"<h2>Methods compared</h2>", "against the truth", "rls", "bls_pso", "1.500 %", "3.000 %", "2 %",
                     "1 %", "321", "1.5e-05", "0.5, 1.5", "0.25, 0.75", "joint 2"});
   EXPECT_EQ(page.find("Table 2"), std::string::npos);
@@ -48,7 +92,7 @@ TEST(ComparisonSection, HasEveryMethodAndJoint) {
 TEST(ComparisonSection, ShowsThePapersTableAndThePicturesThatAreThere) {
   const auto directory = test::folder() / "pictures";
   write_file(directory / "plots" / comparison_plots[2].file, "<svg>picture</svg>");
-  const std::string page = comparison_section(comparison(true), directory);
+  const std::string page = drawn("comparison", comparison(true), directory);
   // Mean of the joints' RMSE; the MLP, which was not run, has no row.
   expect_all(page, {"Table 2", "0.375", "0.11723", "0.10893", "<svg>picture</svg>", comparison_plots[2].title});
   EXPECT_EQ(page.find("0.11116"), std::string::npos);
@@ -64,25 +108,25 @@ json move(double motor) {
 }
 
 TEST(VibrationSection, HasATableOfEveryKindOfMove) {
-  EXPECT_EQ(vibration_section(nullptr), "");
+  EXPECT_EQ(drawn("vibration", nullptr), "");
   json moves;
   for (const char* kind : {"all", "point_to_point", "reversals", "slow"}) moves[kind] = move(0.0137);
   const json vibration = {
       {"control", {{"bandwidth_hz", 32}, {"damping", 0.3}, {"tick_s", 0.002}}},
       {"methods", {{{"feedforward", "rigid"}, {"numbers", "fixed"}, {"parameters_off", "-20 %"}, {"moves", moves}}}}};
-  expect_all(vibration_section(vibration),
+  expect_all(drawn("vibration", vibration),
              {"<h2>Vibration</h2>", "PD of 32 Hz", "damping 0.3", "tick 2 ms", "Moves: all", "Moves: point_to_point",
               "Moves: reversals", "Moves: slow", "rigid", "-20 %", "0.0137", "0.44", "0.017", "123", "0.0016"});
 }
 
 TEST(EfficiencySection, DrawsACurveOfEveryMethodThatHasFigures) {
-  EXPECT_EQ(efficiency_section(nullptr), "");
+  EXPECT_EQ(drawn("efficiency", nullptr), "");
   const auto point = [](double seconds, double slow) {
     return json{
         {"seconds", seconds}, {"slow_share", slow}, {"percent_rated", {{"lugre", 0.1 * seconds}, {"mlp", nullptr}}}};
   };
   const json efficiency = {{"curve", {point(5, 0.5), point(10, 0.5)}}, {"mix", {point(10, 0), point(10, 0.5)}}};
-  const std::string page = efficiency_section(efficiency);
+  const std::string page = drawn("efficiency", efficiency);
   expect_all(page, {"<h2>Error against seconds of data</h2>", "<svg", "lugre", "lugre, 10 s", "seconds of train data",
                     "share of slow motion"});
   EXPECT_EQ(page.find("mlp"), std::string::npos);  // it failed everywhere

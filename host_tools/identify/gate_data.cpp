@@ -1,0 +1,148 @@
+#include "host_tools/identify/gate_data.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "host_tools/simulate/recordings.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/files.hpp"
+#include "host_tools/support/parallel.hpp"
+
+namespace fxdyn {
+namespace {
+
+/// Of all logs together.
+constexpr double most_rows = 60'000;
+/// Samples from which on memory counts more than time.
+constexpr Eigen::Index long_logs = 1'500'000;
+
+/// What is assumed where the project says nothing.
+void add_notes(const Project& project, std::size_t logs, std::vector<std::string>& notes) {
+  if (project.limits.position.empty() || project.limits.velocity.empty() || project.limits.acceleration.empty()) {
+    notes.push_back(
+        "limits not in the project: 1.2 times the largest in the logs (URDF limits where they are within a factor of "
+        "ten)");
+  }
+  if (logs == 1) {
+    notes.push_back(
+        "one trajectory fits and judges: five blocks of it are judged by fits of the others, and they resemble each "
+        "other, "
+        "so that errors come out too small and effects that do not carry over can stay; record another trajectory with "
+        "role "
+        "= \"validate\"");
+  }
+  if (project.rated_torque.empty())
+    notes.push_back("robot.rated_torque not in the project: the largest measured torque stands for it");
+}
+
+/// Largest motion and torque, and how long it stays at its limit.
+void add_extremes(const ProcessedLog& processed, const Robot& robot, GateData& data) {
+  for (Eigen::Index j = 0; j < processed.tau.cols(); ++j) {
+    const MotionRows motion = processed.joint_motion(j);
+    const auto inside = [&](const Eigen::MatrixXd& m) {
+      return m.col(0).segment(processed.first, processed.last - processed.first);
+    };
+    data.q_lower[j] = std::min(data.q_lower[j], inside(motion.q).minCoeff());
+    data.q_upper[j] = std::max(data.q_upper[j], inside(motion.q).maxCoeff());
+    data.dq[j] = std::max(data.dq[j], inside(motion.dq).cwiseAbs().maxCoeff());
+    data.ddq[j] = std::max(data.ddq[j], inside(motion.ddq).cwiseAbs().maxCoeff());
+    data.largest_torque[j] = std::max(data.largest_torque[j], processed.tau.col(j).cwiseAbs().maxCoeff());
+    const auto& runs = processed.saturated[static_cast<std::size_t>(j)];
+    Eigen::Index saturated = 0;
+    for (const auto& [from, to] : runs) saturated += to - from;
+    if (saturated > 0) {
+      data.notes.push_back(
+          fmt::format("{}: torque of joint {} ({}) stays at its limit for {} samples: left out of the fit",
+                      processed.name, j + 1, robot.joints[static_cast<std::size_t>(j)].name, saturated));
+    }
+  }
+}
+
+}  // namespace
+
+GateData read_gate_data(const Project& project, const std::filesystem::path& directory) {
+  if (!project.has_role(Role::train)) {
+    throw InputError(project.file.string() + ": no log to learn from; add a [[log]] with role = \"train\"");
+  }
+  std::vector<Log> logs;
+  for (const Role role : {Role::train, Role::validate}) {
+    for (Log& log : read_logs(project, role, directory)) logs.push_back(std::move(log));
+  }
+  GateData data;
+  data.filter = choose_filter(logs, project.signals);
+  const auto n = static_cast<Eigen::Index>(project.robot.size());
+  data.largest_torque = data.dq = data.ddq = Eigen::VectorXd::Zero(n);
+  data.q_lower = Eigen::VectorXd::Constant(n, 1e300);
+  data.q_upper = -data.q_lower;
+  add_notes(project, logs.size(), data.notes);
+  ProcessSettings settings;
+  settings.torque_limits = project.limits.torque;
+  // Enough rows for any fit of a few hundred unknowns; a long log is decimated more.
+  // At one interval for all logs, so that their noise is alike from row to row.
+  double seconds = 0;
+  for (const Log& log : logs) seconds += log.step_s * static_cast<double>(log.samples());
+  settings.shortest_interval_s = seconds / most_rows;
+  Eigen::Index samples = 0;
+  for (const Log& log : logs) samples += log.samples();
+  most_threads = samples > long_logs ? 1 : threads_allowed();
+  for (Log& log : logs) {
+    if (log.resampled) {
+      data.notes.push_back(
+          fmt::format("{}: irregular time stamps, resampled to {:.6g} s", log.file.filename().string(), log.step_s));
+    }
+    check_torque(log, project.robot);
+    data.references.push_back(
+        {log.file.filename().string(), to_string(log.role), hash_of_file(log.file), log.from_s, log.to_s});
+    data.logs.push_back(process(std::move(log), data.filter, settings));
+    add_extremes(data.logs.back(), project.robot, data);
+  }
+  return data;
+}
+
+void check_torque(const Log& log, const Robot& robot) {
+  constexpr double parked = 1e-3;  // rad or m; a brake may hold the joint, its drive off
+  for (Eigen::Index j = 0; j < log.tau.cols(); ++j) {
+    if (log.tau.col(j).maxCoeff() > log.tau.col(j).minCoeff()) continue;
+    if (log.q.col(j).maxCoeff() - log.q.col(j).minCoeff() < parked) continue;
+    throw DataError(fmt::format("{}: torque of joint {} ({}) never changes: check the column and its gain",
+                                log.file.string(), j + 1, robot.joints[static_cast<std::size_t>(j)].name));
+  }
+}
+
+std::vector<JointFit> initial_joints(const Project& project, const GateData& data) {
+  constexpr double margin = 1.2;
+  std::vector<JointFit> joints(project.robot.size());
+  const LimitSettings& given = project.limits;
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    const auto k = static_cast<Eigen::Index>(j);
+    JointFit& joint = joints[j];
+    const std::optional<Limits>& urdf = project.robot.joints[j].limits;
+    // A URDF's placeholder limits (1e6 N) would cost resolution for ranges that never occur.
+    const auto choose = [&](const std::vector<double>& set, double from_urdf, double measured) {
+      if (!set.empty()) return set[j];
+      return urdf && from_urdf > 0 && from_urdf <= 10 * measured ? std::max(from_urdf, measured) : margin * measured;
+    };
+    joint.rated_torque = project.rated_torque.empty() ? data.largest_torque[k] : project.rated_torque[j];
+    joint.dq_limit = choose(given.velocity, urdf ? urdf->velocity : 0, data.dq[k]);
+    joint.ddq_limit = choose(given.acceleration, 0, data.ddq[k]);
+    joint.tau_limit =
+        choose(given.torque, urdf ? urdf->effort : 0, std::max(data.largest_torque[k], joint.rated_torque));
+    if (!given.position.empty()) {
+      joint.q_lower = given.position[j][0];
+      joint.q_upper = given.position[j][1];
+    } else {
+      const double middle = (data.q_lower[k] + data.q_upper[k]) / 2, half = (data.q_upper[k] - data.q_lower[k]) / 2;
+      joint.q_lower = middle - margin * half;
+      joint.q_upper = middle + margin * half;
+      if (urdf && urdf->upper > urdf->lower && urdf->upper - urdf->lower <= 20 * half) {
+        joint.q_lower = std::min(urdf->lower, data.q_lower[k]);
+        joint.q_upper = std::max(urdf->upper, data.q_upper[k]);
+      }
+    }
+    joint.sign_width = std::max(0.01 * data.dq[k], 1e-6);  // of a joint at rest
+  }
+  return joints;
+}
+
+}  // namespace fxdyn

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <string_view>
+
+#include "host_tools/regression/fitter.hpp"
+
+namespace fxdyn {
+
+/// An effect must lower the joint's held-out error by this share to be kept.
+inline constexpr double worth_keeping = 0.02;
+
+/// A joint's design and how it did on the rows that judge.
+struct Candidate {
+  JointFit design;
+  Judgement judgement;
+};
+
+/// How far and how fast a joint moves in the logs.
+struct Scales {
+  double velocity;  ///< [rad/s | m/s]
+  double range;     ///< [rad | m]
+};
+
+/// The joint's design at its best width of the Coulomb sign.
+Candidate search_width(const Fitter& fitter, std::size_t joint, const Scales& scales);
+/// The joint's design with the effect added, at its best shape.
+/// @throws InputError: the effect needs a second joint
+Candidate search_effect(const Fitter& fitter, std::size_t joint, std::string_view effect, const Scales& scales);
+
+}  // namespace fxdyn

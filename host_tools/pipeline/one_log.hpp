@@ -1,0 +1,24 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/signals/log.hpp"
+
+namespace fxdyn {
+
+/// A log that the project need not name, or a window of it, with the columns and gains that the model knows.
+/// @throws InputError also where the project's logs differ in them
+Log read_log_for(const IdentifiedModel& model, const std::filesystem::path& file, std::optional<double> from_s,
+                 std::optional<double> to_s, bool torque_required = true);
+
+/// `fxdyn predict`: torque of the model over one log.
+void predict_log(const std::filesystem::path& model, const std::filesystem::path& log, bool fixed,
+                 const std::filesystem::path& directory);
+
+/// `fxdyn payload`: the load of a second log, payload.json and the model with it, model.json.
+void identify_payload(const std::filesystem::path& model, const std::filesystem::path& log,
+                      const std::filesystem::path& directory);
+
+}  // namespace fxdyn

@@ -1,0 +1,163 @@
+#include "host_tools/pipeline/tables_export.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "host_tools/export/export.hpp"
+#include "host_tools/export/proof.hpp"
+#include "host_tools/support/error.hpp"
+
+namespace fxdyn {
+namespace {
+
+using nlohmann::json;
+namespace fs = std::filesystem;
+
+/// |fixed - double| on the logs beyond which tables are refused, of rated torque.
+constexpr double largest_error = 1e-3;
+/// The proven range of the rigid body's torque is refined until it is no more than this times what is attained ...
+constexpr double tight_enough = 2;
+/// ... or this many boxes were looked at.
+constexpr int proof_boxes = 40'000;
+constexpr Eigen::Index random_states = 20'000;
+
+/// Errors of the tables: on the logs, and on these and what disturbs them.
+struct Observed {
+  QuantisationError on_logs, anywhere;
+};
+
+Observed observe(const IdentifiedModel& model, const Formats& formats, const std::vector<ProcessedLog>& logs) {
+  std::vector<TickStates> states, judged;
+  for (const ProcessedLog& log : logs) states.push_back(at_ticks(log, model.tick_s));
+  judged = states;
+  for (std::size_t i = 0; i < states.size(); ++i) judged.push_back(perturbed(states[i], model, 1000 + i));
+  judged.push_back(within_limits(model, random_states, 77));
+  judged.push_back(creeping(model, formats));
+  return {quantisation_error(model, formats, states), quantisation_error(model, formats, judged)};
+}
+
+void check_errors(const IdentifiedModel& model, const Observed& observed, const Proof& proof,
+                  const fs::path& reported) {
+  for (std::size_t j = 0; j < model.joints.size(); ++j) {
+    const auto k = static_cast<Eigen::Index>(j);
+    const double error = observed.anywhere.largest[k];
+    if (error > proof.error[k]) {
+      throw DataError(
+          fmt::format("joint {} ({}): fixed point is off by {:.3g}, more than the {:.3g} that were proven: please "
+                      "report this with {}",
+                      j + 1, model.robot.joints[j].name, error, proof.error[k], reported.string()));
+    }
+    const double share = observed.on_logs.largest[k] / model.joints[j].rated_torque;
+    if (!(share <= largest_error)) {
+      throw DataError(fmt::format(
+          "joint {} ({}): fixed point is off by {:.1g} of rated torque on the logs, more than {:.0g}: narrow the "
+          "project's limits to what the robot does",
+          j + 1, model.robot.joints[j].name, share, largest_error));
+    }
+  }
+}
+
+fs::path drive_folder(const fs::path& directory, std::size_t joint) {
+  return directory / fmt::format("joint_{}", joint + 1);
+}
+
+/// Tables of drives that the project no longer asks for would be of another model.
+void remove_drives(std::size_t joints, const fs::path& directory) {
+  for (std::size_t j = 0; j < joints; ++j) {
+    for (const char* name : {"tables.hpp", "tables.bin", "replay.json"}) fs::remove(drive_folder(directory, j) / name);
+  }
+}
+
+}  // namespace
+
+ExportResult export_tables(IdentifiedModel& model, const Formats& formats, const TargetSettings& target,
+                           const std::vector<ProcessedLog>& logs, const fs::path& directory, const fs::path& reported,
+                           Progress& progress) {
+  progress.stage("proving ranges and errors, writing tables", 4);
+  model.formats = formats;
+  model.layout = layout_of(model, formats);
+  if (model.lineage.sequence == 0) model.lineage = {FixedModel(model, formats).crc(), 1};
+  model.lineage.sequence = std::max(model.lineage.sequence, target.sequence);
+  const Proof proof = prove(model, &formats);
+  progress.step();
+  const Attained attained = attain(model);
+  const Eigen::VectorXd structural = prove_structural(model, attained.structural, tight_enough, proof_boxes);
+  progress.step();
+  const Observed observed = observe(model, formats, logs);
+  const QuantisationError& error = observed.anywhere;
+  progress.step();
+  check_errors(model, observed, proof, reported);
+  model.tables_crc = write_tables(model, formats, error, proof.error, all_joints(model), directory);
+  ExportResult out{model.tick_s,
+                   target.board,
+                   model.tables_crc,
+                   model.lineage,
+                   formats,
+                   {},
+                   {},
+                   observed.on_logs.saturations,
+                   fs::file_size(directory / "tables.bin")};
+  remove_drives(model.joints.size(), directory);
+  for (const std::size_t j : target.joints) {
+    const fs::path own = drive_folder(directory, j);
+    fs::create_directories(own);
+    const std::uint32_t crc = write_tables(model, formats, error, proof.error, 1U << j, own);
+    out.drives.push_back({j, crc, fs::file_size(own / "tables.bin")});
+  }
+  for (std::size_t j = 0; j < model.joints.size(); ++j) {
+    const auto k = static_cast<Eigen::Index>(j);
+    out.joints.push_back({.name = model.robot.joints[j].name,
+                          .unit = model.robot.joints[j].torque_unit(),
+                          .rated_torque = model.joints[j].rated_torque,
+                          .proven_error = proof.error[k],
+                          .largest_error = error.largest[k],
+                          .rms_error = error.rms[k],
+                          .proven_torque = std::min(proof.torque[k], structural[k] + proof.effects[k]),
+                          .attained_torque = attained.total[k],
+                          .proven_structural = structural[k],
+                          .attained_structural = attained.structural[k]});
+  }
+  progress.step();
+  progress.done();
+  return out;
+}
+
+json to_json(const ExportResult& result) {
+  json drives = json::array(), joints = json::array();
+  for (const ExportResult::Drive& drive : result.drives)
+    drives.push_back(
+        {{"index", drive.joint + 1}, {"tables_crc", drive.tables_crc}, {"table_bytes", drive.table_bytes}});
+  for (std::size_t j = 0; j < result.joints.size(); ++j) {
+    const ExportResult::Joint& joint = result.joints[j];
+    joints.push_back({{"joint", joint.name},
+                      {"index", j + 1},
+                      {"unit", joint.unit},
+                      {"rated_torque", joint.rated_torque},
+                      {"formats", formats_json(result.formats)},
+                      {"proven_bound", joint.proven_error},
+                      {"proven_bound_of_rated", joint.proven_error / joint.rated_torque},
+                      {"observed_max", joint.largest_error},
+                      {"observed_max_of_rated", joint.largest_error / joint.rated_torque},
+                      {"quantisation_rms", joint.rms_error},
+                      {"torque_range",
+                       {{"proven", joint.proven_torque},
+                        {"proven_structural", joint.proven_structural},
+                        {"attained", joint.attained_torque},
+                        {"attained_structural", joint.attained_structural}}}});
+  }
+  return {{"schema", "fxdyn.export/1"},
+          {"tick_s", result.tick_s},
+          {"board", result.board},
+          {"tables_crc", result.tables_crc},
+          {"origin", result.lineage.origin},
+          {"sequence", result.lineage.sequence},
+          {"formats", formats_json(result.formats)},
+          {"joints", joints},
+          {"drives", drives},
+          {"saturations_on_logs", result.saturations_on_logs},
+          {"table_bytes", result.table_bytes}};
+}
+
+}  // namespace fxdyn

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <vector>
+
+#include "host_tools/effects/identified_model.hpp"
+
+namespace fxdyn {
+
+/// How one joint did on the rows that judge.
+struct Judgement {
+  double rmse = 1e300;         ///< of the residual over all judging blocks [N*m | N]
+  std::vector<double> blocks;  ///< RMSE of each judging block
+  bool physical = true;        ///< the effect that was added last keeps its bounds in every fold
+  double coefficient_sum = 0;  ///< sum of |c| of the BLS, most of any fold [N*m | N]
+
+  bool blocks_of_one_log =
+      false;  ///< the blocks resemble the fit's data: four times the improvement is asked for, on every block
+
+  /// Better by `worth` over all, better at all on three blocks in four, and physical.
+  bool beats(const Judgement& other, double worth) const;
+};
+
+/// Whether the linear parameters of the last effect keep their bounds. Only those: viscous friction that is zero in
+/// truth comes out a little negative, and that must not keep another effect out. (With a BLS beside it, one coefficient
+/// means nothing.)
+bool last_is_physical(const JointFit& design, const Eigen::VectorXd& theta);
+
+}  // namespace fxdyn

@@ -1,0 +1,46 @@
+#include <fmt/format.h>
+
+#include "host_tools/page/page.hpp"
+#include "host_tools/report/section.hpp"
+
+namespace fxdyn {
+
+using namespace page;
+using nlohmann::json;
+
+namespace {
+
+/// Standard deviation over value: small ones with two digits, large ones without decimals or exponents.
+std::string uncertainty(double share) {
+  return share > 10    ? "> 1000 %"
+         : share < 0.1 ? fmt::format("{:.2g} %", 100 * share)
+                       : fmt::format("{:.0f} %", 100 * share);
+}
+
+}  // namespace
+
+std::string base_section(const ReportInput& input, const json&) {
+  constexpr const char* units[] = {"kg", "kg*m", "kg*m^2"};
+  Table table({{"parameter"}, {"value", "n"}, {"std", "n"}, {"std / |value|", "n"}, {"unit"}});
+  for (const json& p : input.model.at("base_parameters")) {
+    const int kind = p.at("column").get<int>() % 10;
+    const double relative = p.at("relative_std");
+    table.add({{text(p.at("name"))},
+               number(p.at("value")),
+               number(p.at("std"), 2),
+               {uncertainty(relative), relative > 0.3 ? "n bad" : "n"},
+               {units[kind == 0  ? 0
+                      : kind < 4 ? 1
+                                 : 2]}});
+  }
+  return section("Base parameters") +
+         paragraph(
+             "m: mass, hx hy hz: first moment, Jxx .. Jyz: inertia about the frame's origin, of the link with that "
+             "number, in "
+             "modified Denavit-Hartenberg frames. Each stands for its group: what can't be told apart from it is added "
+             "to it. "
+             "Red: the standard deviation is above 30 % of the value, the data hardly determine it.") +
+         "<div class=\"split\">" + table.bare_html() + "</div>\n";
+}
+
+}  // namespace fxdyn

@@ -1,0 +1,45 @@
+#include <fmt/format.h>
+
+#include <map>
+
+#include "host_tools/page/page.hpp"
+#include "host_tools/page/plot.hpp"
+#include "host_tools/report/section.hpp"
+
+namespace fxdyn {
+
+using namespace page;
+using nlohmann::json;
+
+std::string efficiency_section(const ReportInput&, const json& efficiency) {
+  std::string out = section("Error against seconds of data");
+  const auto draw_curves = [&](const char* key, const char* x_of, const std::string& x_label) {
+    std::map<std::string, std::pair<std::vector<double>, std::vector<double>>> curves;
+    for (const json& point : efficiency.at(key)) {
+      for (const auto& [name, error] : point.at("percent_rated").items()) {
+        if (error.is_null()) continue;
+        std::string title = name;
+        if (std::string(key) == "mix") title += fmt::format(", {:g} s", point.at("seconds").get<double>());
+        curves[title].first.push_back(point.at(x_of).get<double>());
+        curves[title].second.push_back(error.get<double>());
+      }
+    }
+    static constexpr const char* colours[] = {"#2e6fb7", "#e4572e", "#2a9d4a", "#8e5ea2", "#b8860b", "#444444"};
+    Chart chart{x_label, "test error, % of rated", {}, true};
+    for (const auto& [title, points] : curves) {
+      const auto vector = [](const std::vector<double>& v) {
+        return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size())));
+      };
+      chart.curves.push_back(
+          {vector(points.first), vector(points.second), colours[chart.curves.size() % 6], 1.6, title});
+    }
+    return draw({chart}, 1);
+  };
+  out += paragraph("Half of the seconds fast motion, half slow.");
+  out += draw_curves("curve", "seconds", "seconds of train data");
+  out += subsection("Which mix of fast and slow motion");
+  out += draw_curves("mix", "slow_share", "share of slow motion");
+  return out;
+}
+
+}  // namespace fxdyn

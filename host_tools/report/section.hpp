@@ -1,0 +1,42 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/regression/dataset.hpp"
+#include "host_tools/report/results.hpp"
+
+namespace fxdyn {
+
+/// What a section may draw from.
+struct ReportInput {
+  const IdentifiedModel& fitted;
+  const nlohmann::json model;              ///< content of model.json
+  const std::vector<ProcessedLog>& logs;   ///< to draw
+  const Results& results;                  ///< all of them
+  const std::filesystem::path& directory;  ///< where the results are
+};
+
+/// A part of report.html. One more: a file NAME_section.cpp with its function, and a line in sections.cpp.
+struct ReportSection {
+  std::string_view name;
+  ResultFile needs;  ///< "" : the model alone
+  bool always;       ///< drawn without the result too, which is null then: it says how to make it
+  /// Content of the page from the heading on; empty: nothing to say.
+  std::string (*draw)(const ReportInput& input, const nlohmann::json& result);
+};
+
+/// A string of a result.
+inline std::string text(const nlohmann::json& value) { return value.get<std::string>(); }
+
+/// In the order of the page.
+std::span<const ReportSection> report_sections();
+
+/// What the sections draw, one after another.
+std::string draw_sections(const ReportInput& input, std::span<const ReportSection> sections);
+
+}  // namespace fxdyn

@@ -1,0 +1,92 @@
+#include "host_tools/signals/units.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "host_tools/signals/quantile.hpp"
+#include "host_tools/support/error.hpp"
+
+namespace fxdyn {
+
+using Eigen::Index;
+
+namespace {
+
+/// Units: compares dq with the slope of q.
+void check_velocity(const Log& log, Index joint, bool revolute, const std::string& where) {
+  constexpr double degrees = 180 / std::numbers::pi;
+  // Over 20 ms on either side: the slope from one sample to the next is mostly the encoder's noise.
+  const Index half = std::max<Index>(1, static_cast<Index>(0.02 / log.step_s));
+  const Index n = log.samples() - 2 * half;
+  if (n < 5) return;
+  const Eigen::VectorXd span = log.t.tail(n) - log.t.head(n);
+  const Eigen::VectorXd slope = (log.q.col(joint).tail(n) - log.q.col(joint).head(n)).cwiseQuotient(span);
+  const Eigen::VectorXd dq = log.dq.col(joint).segment(half, n);
+  const double power = dq.squaredNorm();
+  if (power == 0 || slope.dot(dq) < 0.7 * slope.norm() * dq.norm()) return;  // too noisy or at rest: can't tell
+  const double ratio = slope.dot(dq) / power;
+  const auto near = [ratio](double value) { return std::abs(ratio / value - 1) < 0.15; };
+  if (revolute && near(degrees)) {
+    throw InputError(
+        fmt::format("{}: q{} looks like degrees (it changes {:.3g} times as fast as dq{} says); multiply by pi/180",
+                    where, joint + 1, ratio, joint + 1));
+  }
+  if (revolute && near(1 / degrees)) {
+    throw InputError(
+        fmt::format("{}: dq{} looks like degrees (q{} changes only {:.3g} times as fast); multiply by pi/180", where,
+                    joint + 1, joint + 1, ratio));
+  }
+  if (near(1e-3)) {
+    throw InputError(fmt::format(
+        "{}: t looks like milliseconds (q{} changes only {:.3g} times as fast as dq{} says); divide by 1000", where,
+        joint + 1, ratio, joint + 1));
+  }
+}
+
+/// Units without dq: a joint that turns more than four times, less than an arm's few hundred degrees do as radians, and
+/// does so faster than robots turn for a good part of the log.
+void check_range(const Log& log, Index joint, const std::string& where) {
+  const double range = log.q.col(joint).maxCoeff() - log.q.col(joint).minCoeff();
+  if (range < 25 || range > 800) return;
+  const Index stride =
+      std::clamp<Index>(static_cast<Index>(0.02 / log.step_s), 1, std::max<Index>(1, log.samples() / 4));
+  const Index n = log.samples() - stride;
+  const Eigen::VectorXd speed =
+      (log.q.col(joint).tail(n) - log.q.col(joint).head(n)).cwiseAbs() / (static_cast<double>(stride) * log.step_s);
+  const double fast = quantile(speed, 0.9);
+  if (fast < 25) return;
+  throw InputError(fmt::format("{}: q{} looks like degrees (range {:.3g}, {:.3g} per second), multiply by pi/180",
+                               where, joint + 1, range, fast));
+}
+
+/// Slow logs: one joint may turn more than twice, but not nearly every joint of an arm.
+void check_ranges(const Log& log, const std::vector<bool>& revolute, const std::string& where) {
+  std::size_t turning = 0;
+  double widest = 0;
+  for (Index joint = 0; joint < log.joints(); ++joint) {
+    if (!revolute[static_cast<std::size_t>(joint)]) continue;
+    const double range = log.q.col(joint).maxCoeff() - log.q.col(joint).minCoeff();
+    if (range > 4 * std::numbers::pi) ++turning;
+    widest = std::max(widest, range);
+  }
+  const auto count = static_cast<std::size_t>(std::count(revolute.begin(), revolute.end(), true));
+  if (count < 3 || turning + 1 < count || widest > 800) return;
+  throw InputError(fmt::format("{}: q looks like degrees ({} of {} joints turn more than twice), multiply by pi/180",
+                               where, turning, count));
+}
+
+}  // namespace
+
+void check_units(const Log& log, const std::vector<bool>& revolute, const std::string& where) {
+  for (Index joint = 0; joint < log.joints(); ++joint) {
+    const bool turns = revolute[static_cast<std::size_t>(joint)];
+    if (log.dq.size() > 0) check_velocity(log, joint, turns, where);
+    if (turns) check_range(log, joint, where);
+  }
+  check_ranges(log, revolute, where);
+}
+
+}  // namespace fxdyn

@@ -1,5 +1,0 @@
-# The library computes in integers only. Without the FPU the compiler can't park integers in its registers either, which
-# interrupts would have to save; a firmware of your own that needs it sets its own float ABI.
-set(FXDYN_CPU_FLAGS -mcpu=cortex-m4 -mfloat-abi=soft)
-set(FXDYN_BOARD mps2-an386)
-set(FXDYN_LINKER_SCRIPT mps2.ld)
