@@ -8,7 +8,6 @@
 
 #include "host_tools/diagnose/search.hpp"
 #include "host_tools/effects/effects.hpp"
-#include "host_tools/regression/regressor.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn::diagnosis {
@@ -100,14 +99,6 @@ std::vector<std::vector<double>> grids(const EffectInfo& info, std::size_t joint
   return out;
 }
 
-/// A rotor that an effect of the gear's load would tell from the base parameters, which have it; null: none.
-std::shared_ptr<const Rotor> hidden_rotor(const Linearised& at, const DhChain& chain, const BaseSet& base,
-                                          std::size_t joint) {
-  if (at.models().current.joints[joint].find(RotorInertia::name) != nullptr) return nullptr;
-  Rotor rotor{joint, rotor_in_base(chain, base, static_cast<Index>(joint))};
-  return rotor.in_base.size() > 0 ? std::make_shared<const Rotor>(std::move(rotor)) : nullptr;
-}
-
 bool is_nominal(std::string_view effect) {
   return effect == Viscous::name || effect == Coulomb::name || effect == Offset::name || effect == RotorInertia::name;
 }
@@ -126,15 +117,15 @@ std::vector<Group> dictionary(const Linearised& at, const std::vector<EffectCand
   std::vector<Group> out;
   const std::size_t n = at.joints();
   const Robot& robot = at.models().current.robot;
-  const BaseSet base = base_of(at.models().current);
-  const DhChain chain = to_dh(robot);
   std::vector<std::shared_ptr<const Rotor>> rotors(n);
   std::vector<double> inertia(n);
   std::vector<const MatrixXd*> positions;
   for (std::size_t l = 0; l < at.logs().size(); ++l) positions.push_back(&at.motion(l).q);
   for (std::size_t j = 0; j < n; ++j) {
-    rotors[j] = hidden_rotor(at, chain, base, j);
-    if (rotors[j]) inertia[j] = least_inertia(at.models().current, j, positions);
+    const VectorXd in_base = hidden_rotor(at.models().current, j);
+    if (in_base.size() == 0) continue;
+    rotors[j] = std::make_shared<const Rotor>(Rotor{j, in_base});
+    inertia[j] = least_inertia(at.models().current, j, positions);
   }
   for (const EffectInfo& info : effect_infos()) {
     if (is_nominal(info.name) || info.name == Ripple::name) continue;
@@ -195,7 +186,7 @@ std::vector<Group> dictionary(const Linearised& at, const std::vector<EffectCand
 std::vector<Group> ripples(const Linearised& at, std::size_t joint, const VectorXd& residual, std::size_t most) {
   const Scales s = scales_of(at, joint);
   if (!(s.range > 0)) return {};
-  const VectorXd& a = at.whitening()[joint];
+  const VectorXd& a = at.noise().whitening()[joint];
   const auto j = static_cast<Index>(joint);
   const double fc = at.logs().front().log.filter.torque_cutoff_hz;
   // The adjoint of decimation, filter and whitening on the residual; and how often which speed occurs.
@@ -205,7 +196,7 @@ std::vector<Group> ripples(const Linearised& at, std::size_t joint, const Vector
     const SessionLog& entry = at.logs()[l];
     if (entry.healthy || !entry.fits) continue;
     const ProcessedLog& log = entry.log;
-    const Block& b = at.log_rows(l);
+    const Block& b = at.blocks().of_log[l];
     VectorXd e = residual.segment(b.first, b.count), w = e;
     for (Index lag = 1; lag <= a.size() && lag < b.count; ++lag)
       w.head(b.count - lag) -= a[lag - 1] * e.tail(b.count - lag);
