@@ -7,14 +7,13 @@
 
 #include "host_tools/effects/broad_learning_types.hpp"
 #include "host_tools/regression/bls_rows.hpp"
+#include "host_tools/regression/row_ranges.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {
 namespace {
-
-constexpr int blocks_of_one_log = 5;
 
 /// The inputs, then the nodes, at full rate.
 Eigen::MatrixXd bls_columns(const BroadLearningFit& bls, double sign_width, const JointSeries& series) {
@@ -187,9 +186,8 @@ Fitter::Fitter(const Robot& robot, const std::vector<ProcessedLog>& logs, std::v
   auto& blocks = data->blocks;
   for (std::size_t l = 0; l < logs.size(); ++l) {
     const Eigen::Index count = logs[l].rows(), first = data->first_row[l];
-    for (int part = 0; part < parts; ++part)
-      blocks.push_back(
-          {l, first + count * part / parts, first + count * (part + 1) / parts, logs[l].role == Role::train});
+    for (const RowRange& range : cut({first, count}, parts))
+      blocks.push_back({l, range.first, range.first + range.count, logs[l].role == Role::train});
   }
   const std::size_t folds = split.has_validation ? 1 : blocks.size();
   split.fit.resize(folds);
