@@ -41,7 +41,7 @@ inline IdentifiedModel fitted_puma() {
 /// A log of a robot with that model: some 480 rows with white noise.
 inline diagnosis::SessionLog small_session_log(const IdentifiedModel& robot, Role role, std::uint64_t seed) {
   diagnosis::SessionLog out;
-  out.log = small_log(robot, role, seed);
+  out.log = small_log(robot, role, seed, 0.25);
   out.log.filter.encoder_step = out.log.filter.position_noise = std::vector<double>(robot.joints.size(), 0.0);
   out.log.torque_noise = Eigen::VectorXd::Constant(6, 0.03);  // 0.1 N*m white, up to 10 of 125 Hz
   out.log.decimation = 10;
