@@ -203,7 +203,7 @@ class Diagnoser {
     result.report =
         verdicts({result.nominal, result.model, outcome, gate, deflections_, impacts, still_, data_.logs, test_});
     for (std::size_t j = 0; j < joints(); ++j) {
-      // What stands still has no friction that these logs tell.
+      // What stands still has no friction that these logs show.
       if (!still_[j]) continue;
       result.model.joints[j].effects.clear();
       result.nominal.joints[j].effects.clear();

@@ -56,7 +56,7 @@ VectorXd only(const Linearised& problem, const VectorXd& e, const std::vector<st
   return out;
 }
 
-/// Features on one session's rows. Where the encoder does not tell which way the joint moves they are zero: friction's
+/// Features on one session's rows. Where the encoder does not show which way the joint moves they are zero: friction's
 /// mean over what the velocity may be is a smoother function of it than friction is, and that is no structure of the
 /// robot.
 MatrixXd only(const Linearised& problem, std::size_t joint, const MatrixXd& x, const std::vector<std::size_t>& blocks,
@@ -202,7 +202,7 @@ LackOfFit lack_of_fit(const Linearised& problem, std::size_t joint, const Linear
     const auto rank = static_cast<double>(statistic.rank());
     // The columns are fitted to both sessions; today's rows bear their share of them.
     const double rest = today.rows - fitted * today.rows / fit.rows[k] - rank;
-    // With hardly more rows than functions nothing can be told.
+    // With hardly more rows than functions no statement is possible.
     if (rank == 0 || rest <= 0.3 * rank) return 1.0;
     VectorXd null(draws);
     for (Index s = 0; s < null.size(); ++s) null[s] = statistic(theirs.col(s));
@@ -218,7 +218,7 @@ LackOfFit lack_of_fit(const Linearised& problem, std::size_t joint, const Linear
       const double beyond =
           std::max(0.0, odds(then(before.residual), before.whole) - also / std::max(before.rows - also, 1.0));
       expected = std::max(expected, rank / rest + beyond);
-      // A background is known as well as so many of its functions tell it, not rows.
+      // A background is known as well as so many of its functions determine it, not rows.
       if (background != nullptr)
         known_by = expected * expected / (expected * expected / rest + beyond * beyond / freedom);
     }
@@ -249,7 +249,7 @@ double structured_share(const Linearised& problem, std::size_t joint, const Line
   const double whole = e.squaredNorm();
   // found = structure + expected * (whole - structure)
   const auto share_of = [&](const Projection& energy) {
-    if (2 * count < 3 * energy.rank()) return 0.0;  // too few rows to tell
+    if (2 * count < 3 * energy.rank()) return 0.0;  // too few rows
     double null = 0;
     for (Index s = 0; s < theirs.cols(); ++s) null += energy(theirs.col(s));
     const double found = energy(mine), expected = std::min(null / std::max(noise.squaredNorm(), 1e-300), 0.95);

@@ -72,7 +72,7 @@ TimeStructure spectral_lines(const std::vector<SessionLog>& logs, const Blocks& 
     add_lines(power, lines);
   }
   TimeStructure out;
-  if (lines.empty()) return out;  // too short to tell
+  if (lines.empty()) return out;  // too short
   double beyond = 0;
   for (const Line& line : lines) {
     const double p = chance_of(line, static_cast<double>(lines.size()));
