@@ -7,6 +7,7 @@
 #include <numeric>
 #include <optional>
 
+#include "host_tools/diagnose/changes.hpp"
 #include "host_tools/diagnose/deflection.hpp"
 #include "host_tools/diagnose/gate.hpp"
 #include "host_tools/diagnose/refit.hpp"
@@ -50,10 +51,8 @@ IdentifiedModel nominal_model(Project project, GateData& data, bool healthy, Pro
 }
 
 /// Standard deviations from the information of a fit around the models as they are.
-void add_deviations(Models& models, const Linearised& at) {
-  std::vector<Index> columns;
-  for (Index c = 0; c < static_cast<Index>(at.unknowns().size()); ++c) columns.push_back(c);
-  const LinearFit fit = at.solve(columns);
+void add_deviations(Models& models, const Linearised& problem) {
+  const LinearFit fit = problem.solver().solve(problem.unknown_columns());
   const MatrixXd covariance = SymmetricSolver(fit.information).inverse();
   IdentifiedModel& model = models.current;
   for (JointFit& joint : model.joints) {
@@ -65,8 +64,8 @@ void add_deviations(Models& models, const Linearised& at) {
     }
   }
   for (EffectFit& effect : model.body) effect.linear_std.assign(effect.linear.size(), 0.0);
-  for (std::size_t c = 0; c < at.unknowns().size(); ++c) {
-    const Unknown& u = at.unknowns()[c];
+  for (std::size_t c = 0; c < problem.unknowns().size(); ++c) {
+    const Unknown& u = problem.unknowns()[c];
     const double variance = covariance(static_cast<Index>(c), static_cast<Index>(c));
     const double std = std::sqrt(std::max(variance, 0.0));
     if (u.kind == Unknown::Kind::base) {
@@ -93,19 +92,19 @@ void add_deviations(Models& models, const Linearised& at) {
 
 /// In residuals with structure neighbouring rows say the same: a column counts as the residual's slowest part does.
 ///   variance of a mean / that of white noise = S(0) / r(0)
-VectorXd diluted(const Linearised& at) {
-  std::vector<Index> columns = at.columns_of(in_model(at));
-  const LinearFit fit = at.solve(columns);
-  VectorXd weights = at.weights();
-  for (std::size_t j = 0; j < at.joints(); ++j) {
-    const VectorXd e = at.residual(j, fit);
+VectorXd diluted(const Linearised& problem) {
+  std::vector<Index> columns = problem.columns_of(in_model(problem));
+  const LinearFit fit = problem.solver().solve(columns);
+  VectorXd weights = problem.solver().weights();
+  for (std::size_t j = 0; j < problem.joints(); ++j) {
+    const VectorXd e = problem.solver().residual(j, fit);
     double r0 = 0, sum = 0;
-    for (const std::size_t i : at.fit_blocks()) {
-      const Block& b = at.blocks()[i];
+    for (const std::size_t i : problem.blocks().fit) {
+      const Block& b = problem.blocks().all[i];
       const VectorXd x = e.segment(b.first, b.count);
       r0 += x.squaredNorm();
       // Bartlett's window over two seconds
-      const ProcessedLog& log = at.logs()[b.log].log;
+      const ProcessedLog& log = problem.logs()[b.log].log;
       const auto span =
           std::min<Index>(b.count, static_cast<Index>(2 / (log.step_s * static_cast<double>(log.decimation))));
       for (Index lag = 1; lag < span; ++lag)
@@ -118,10 +117,10 @@ VectorXd diluted(const Linearised& at) {
 }
 
 /// One diagnosis, step by step.
-class Work {
+class Diagnoser {
  public:
-  Work(const Project& project, GateData& data, const std::vector<ProcessedLog>& baseline,
-       const std::vector<ProcessedLog>& test, const std::vector<bool>& still, Progress& progress)
+  Diagnoser(const Project& project, GateData& data, const std::vector<ProcessedLog>& baseline,
+            const std::vector<ProcessedLog>& test, const std::vector<bool>& still, Progress& progress)
       : project_(project), data_(data), baseline_(baseline), test_(test), still_(still), progress_(progress) {
     models_.has_baseline = !baseline_.empty();
     models_.smallest_step_s = project_.target.tick_s;
@@ -191,23 +190,23 @@ class Work {
         outcome.look_again(logs_);
       }
       found.current = models_.current;
-      add_deviations(found, *outcome.at);
+      add_deviations(found, *outcome.problem);
     } else if (outcome.structured()) {
       refit(found, logs_, plain(), 4);
-      Linearised at(found, logs_, plain());
-      at.set_weights(diluted(at));
-      add_deviations(found, at);
+      Linearised problem(found, logs_, plain());
+      problem.solver().set_weights(diluted(problem));
+      add_deviations(found, problem);
     } else {
-      add_deviations(found, *outcome.at);
+      add_deviations(found, *outcome.problem);
     }
-    believe(found.current, gate, *outcome.at);
+    believe(found.current, gate, *outcome.problem);
     result.model = found.current;
-    if (models_.has_baseline) add_notes(changed_parameters(*outcome.at));
-    const auto jolts = find_jolts(result.model, data_.logs, found.healthy, baseline_);
+    if (models_.has_baseline) add_notes(changed_parameters(*outcome.problem));
+    const auto impacts = find_impacts(result.model, data_.logs, found.healthy, baseline_);
     result.report =
-        verdicts({result.nominal, result.model, outcome, gate, deflections_, jolts, still_, data_.logs, test_});
+        verdicts({result.nominal, result.model, outcome, gate, deflections_, impacts, still_, data_.logs, test_});
     for (std::size_t j = 0; j < joints(); ++j) {
-      // What stands still has no friction that these logs tell.
+      // What stands still has no friction that these logs show.
       if (!still_[j]) continue;
       result.model.joints[j].effects.clear();
       result.nominal.joints[j].effects.clear();
@@ -224,7 +223,7 @@ class Work {
   void add_notes(const std::vector<std::string>& notes) { notes_.insert(notes_.end(), notes.begin(), notes.end()); }
   const std::string& name_of(std::size_t j) const { return project_.robot.joints[j].name; }
 
-  /// The rotor that a link encoder told from the link.
+  /// The rotor that a link encoder separates from the link.
   static void add_rotor(Models& models, const DeflectionEffect& effect) {
     constexpr double share = 0.1;  // of it, standard deviation
     if (effect.rotor <= 0 || rotor_of(models.current.joints[effect.joint]) != nullptr) return;
@@ -289,9 +288,9 @@ class Work {
       std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.fit.effect < b.fit.effect; });
       return out;
     };
-    // Which part of the inertia is the rotor's is found anew where the deflection told it.
-    const auto without_rotors = [&](Models models, const Deflections& told, std::vector<EffectId>& ids) {
-      for (const DeflectionEffect& effect : told.found) {
+    // Which part of the inertia is the rotor's is found anew where the deflection separates it.
+    const auto without_rotors = [&](Models models, const Deflections& seen, std::vector<EffectId>& ids) {
+      for (const DeflectionEffect& effect : seen.found) {
         if (effect.rotor > 0) forget_rotor(models, ids, effect.joint);
       }
       return models;
@@ -378,8 +377,8 @@ class Work {
     bool structured = background.structured();
     if (!structured) {
       // Ripple is finer than the functions that the test knows.
-      Linearised at(alone, before);
-      Search ripples_only(at, modest);
+      Linearised problem(alone, before);
+      Search ripples_only(problem, modest);
       structured = !ripples_only.run({}, progress_).groups.empty();
     }
     if (structured) {
@@ -403,9 +402,9 @@ class Work {
   }
 
   /// What is not believed stays as an unnamed column, since the gate's data say that it helps.
-  void believe(IdentifiedModel& model, const Gate& gate, const Linearised& at) const {
+  void believe(IdentifiedModel& model, const Gate& gate, const Linearised& problem) const {
     for (std::size_t i = 0; i < gate.groups.size(); ++i) {
-      const EffectId& id = at.groups()[gate.groups[i]].id;
+      const EffectId& id = problem.groups()[gate.groups[i]].id;
       if (id.body) {
         model.body[id.effect].named = gate.robot_closure[i] >= least_closure;
       } else {
@@ -444,10 +443,10 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
   std::vector<ProcessedLog> baseline = given_baseline;
   leave_out(data.logs, still);
   leave_out(baseline, still);
-  Work work(project, data, baseline, test, still, progress);
-  Diagnosis result = work.run();
+  Diagnoser diagnoser(project, data, baseline, test, still, progress);
+  Diagnosis result = diagnoser.run();
   given.notes = data.notes;
-  given.notes.insert(given.notes.end(), work.notes().begin(), work.notes().end());
+  given.notes.insert(given.notes.end(), diagnoser.notes().begin(), diagnoser.notes().end());
   progress.done();
   return result;
 }

@@ -15,11 +15,11 @@ struct Diagnosis {
   std::vector<bool> still;  ///< joints that stand still: neither model has anything of their own
 };
 
-/// Finds what the nominal model lacks, names it, adds it, and tells what that is worth on logs that decided nothing.
+/// Finds what the nominal model lacks, names it, adds it, and says what that is worth on logs that decided nothing.
 /// docs/guide/diagnosis.md explains the rules.
 /// @param data train and validate logs @param baseline a healthy session, role train, filtered alike; may be empty
 /// @param test read for the figures only; but their sampling step, like that of all logs, bounds a delay
-/// @throws DataError: logs that tell too little, a baseline that can't be the same robot's
+/// @throws DataError: logs with too little information, a baseline that can't be the same robot's
 Diagnosis diagnose(const Project& project, GateData& data, const std::vector<ProcessedLog>& baseline,
                    const std::vector<ProcessedLog>& test, Progress& progress);
 

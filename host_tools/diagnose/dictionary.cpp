@@ -5,7 +5,6 @@
 
 #include "host_tools/diagnose/search.hpp"
 #include "host_tools/effects/effects.hpp"
-#include "host_tools/regression/regressor.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn::diagnosis {
@@ -57,14 +56,6 @@ std::vector<std::vector<double>> grids(const EffectInfo& info, const Linearised&
   return out;
 }
 
-/// A rotor that an effect of the gear's load would tell from the base parameters, which have it; null: none.
-std::shared_ptr<const Rotor> hidden_rotor(const Linearised& at, const DhChain& chain, const BaseSet& base,
-                                          std::size_t joint) {
-  if (rotor_of(at.models().current.joints[joint]) != nullptr) return nullptr;
-  Rotor rotor{joint, rotor_in_base(chain, base, static_cast<Index>(joint))};
-  return rotor.in_base.size() > 0 ? std::make_shared<const Rotor>(std::move(rotor)) : nullptr;
-}
-
 }  // namespace
 
 int searched_shape(const EffectCandidate& candidate) { return find_effect(candidate.effect)->refined_shape(); }
@@ -72,16 +63,15 @@ int searched_shape(const EffectCandidate& candidate) { return find_effect(candid
 std::vector<Group> dictionary(const Linearised& at, const std::vector<EffectCandidate>& skip) {
   std::vector<Group> out;
   const std::size_t n = at.joints();
-  const Robot& robot = at.models().current.robot;
-  const BaseSet base = base_of(at.models().current);
-  const DhChain chain = to_dh(robot);
   std::vector<std::shared_ptr<const Rotor>> rotors(n);
   std::vector<double> inertia(n);
   std::vector<const MatrixXd*> positions;
   for (std::size_t l = 0; l < at.logs().size(); ++l) positions.push_back(&at.motion(l).q);
   for (std::size_t j = 0; j < n; ++j) {
-    rotors[j] = hidden_rotor(at, chain, base, j);
-    if (rotors[j]) inertia[j] = least_inertia(at.models().current, j, positions);
+    const VectorXd in_base = hidden_rotor(at.models().current, j);
+    if (in_base.size() == 0) continue;
+    rotors[j] = std::make_shared<const Rotor>(Rotor{j, in_base});
+    inertia[j] = least_inertia(at.models().current, j, positions);
   }
   for (const EffectInfo& info : effect_infos()) {
     if (info.nominal || info.of_spectrum()) continue;
@@ -131,7 +121,7 @@ std::vector<Group> ripples(const Linearised& at, std::size_t joint, const Vector
   const auto& infos = effect_infos();
   const auto info = std::find_if(infos.begin(), infos.end(), [](const EffectInfo& one) { return one.of_spectrum(); });
   if (!(s.range > 0) || info == infos.end()) return {};
-  const VectorXd& a = at.whitening()[joint];
+  const VectorXd& a = at.noise().whitening()[joint];
   const auto j = static_cast<Index>(joint);
   const double fc = at.logs().front().log.filter.torque_cutoff_hz;
   // The adjoint of decimation, filter and whitening on the residual; and how often which speed occurs.
@@ -141,7 +131,7 @@ std::vector<Group> ripples(const Linearised& at, std::size_t joint, const Vector
     const SessionLog& entry = at.logs()[l];
     if (entry.healthy || !entry.fits) continue;
     const ProcessedLog& log = entry.log;
-    const Block& b = at.log_rows(l);
+    const Block& b = at.blocks().of_log[l];
     VectorXd e = residual.segment(b.first, b.count), w = e;
     for (Index lag = 1; lag <= a.size() && lag < b.count; ++lag)
       w.head(b.count - lag) -= a[lag - 1] * e.tail(b.count - lag);

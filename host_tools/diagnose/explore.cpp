@@ -15,21 +15,19 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Squared share of a column that is left: less can't be told from the nominal model.
-constexpr double nothing_left = 1e-5;
 /// A residual of that many times the noise is mostly gap.
 constexpr double much_more = 3;
 
 /// What can't be seen whatever its size: by joint, the robot's last.
-std::vector<std::vector<std::string>> blind_spots(const Linearised& at, const Search& search) {
-  std::vector<std::vector<std::string>> out(at.joints() + 1);
+std::vector<std::vector<std::string>> blind_spots(const Linearised& problem, const Search& search) {
+  std::vector<std::vector<std::string>> out(problem.joints() + 1);
   for (const EffectInfo& info : effect_infos()) {
-    for (std::size_t j = 0; j < at.joints() + 1; ++j) {
+    for (std::size_t j = 0; j < problem.joints() + 1; ++j) {
       bool any = false, seen = false;
-      for (std::size_t g = 0; g < search.not_absorbed().size() && g < at.groups().size(); ++g) {
-        const Group& group = at.groups()[g];
+      for (std::size_t g = 0; g < search.not_absorbed().size() && g < problem.groups().size(); ++g) {
+        const Group& group = problem.groups()[g];
         if (group.in_model || group.candidate.effect != info.name) continue;
-        if (group.on_body != (j == at.joints()) || (!group.on_body && group.candidate.joint != j)) continue;
+        if (group.on_body != (j == problem.joints()) || (!group.on_body && group.candidate.joint != j)) continue;
         any = true;
         seen |= search.not_absorbed()[g] >= nothing_left;
       }
@@ -46,11 +44,11 @@ std::vector<VectorXd> colours(const Models& models, const std::vector<SessionLog
   const std::size_t n = models.current.joints.size();
   const std::vector<VectorXd> white(n, VectorXd::Zero(1));
   const Linearised in_band(models, logs, white), coloured(models, logs);
-  std::vector<VectorXd> out = coloured.whitening();
+  std::vector<VectorXd> out = coloured.noise().whitening();
   for (std::size_t j = 0; j < n; ++j) {
     double noise = 0;
     for (const SessionLog& entry : logs) noise = std::max(noise, entry.log.torque_noise[static_cast<Index>(j)]);
-    if (1 / std::sqrt(in_band.weights()[static_cast<Index>(j)]) > much_more * noise) out[j] = white[j];
+    if (1 / std::sqrt(in_band.solver().weights()[static_cast<Index>(j)]) > much_more * noise) out[j] = white[j];
   }
   return out;
 }
@@ -62,32 +60,18 @@ bool Outcome::structured() const {
 }
 
 void Outcome::look_again(const std::vector<SessionLog>& logs) {
-  at = std::make_unique<Linearised>(models, logs, whitening);
-  whitening = at->whitening();
-  features.resize(at->joints());
-  lack.resize(at->joints());
-  const std::vector<Index> columns = at->columns_of(in_model(*at));
-  const LinearFit fit = at->solve(columns);
+  problem = std::make_unique<Linearised>(models, logs, whitening);
+  whitening = problem->noise().whitening();
+  features.resize(problem->joints());
+  lack.resize(problem->joints());
+  const std::vector<Index> columns = problem->columns_of(in_model(*problem));
+  const LinearFit fit = problem->solver().solve(columns);
   std::optional<LinearFit> alone;
-  if (models.has_baseline) {
-    std::vector<std::size_t> healthy;
-    for (const std::size_t b : at->fit_blocks()) {
-      if (at->blocks()[b].healthy) healthy.push_back(b);
-    }
-    alone = at->solve(columns, healthy);
-  }
-  parallel_for(at->joints(), [&](std::size_t j) {
-    features[j] = diagnosis::features(*at, j, models.has_baseline);
-    lack[j] = lack_of_fit(*at, j, fit, alone ? &*alone : nullptr, features[j]);
+  if (models.has_baseline) alone = problem->solver().solve(columns, problem->blocks().fit_of(true));
+  parallel_for(problem->joints(), [&](std::size_t j) {
+    features[j] = diagnosis::features(*problem, j, models.has_baseline);
+    lack[j] = lack_of_fit(*problem, j, fit, alone ? &*alone : nullptr, features[j]);
   });
-}
-
-std::vector<std::size_t> in_model(const Linearised& at) {
-  std::vector<std::size_t> groups;
-  for (std::size_t g = 0; g < at.groups().size(); ++g) {
-    if (at.groups()[g].in_model) groups.push_back(g);
-  }
-  return groups;
 }
 
 Outcome explore(Models models, const std::vector<SessionLog>& logs, const SearchSettings& settings,
@@ -96,28 +80,28 @@ Outcome explore(Models models, const std::vector<SessionLog>& logs, const Search
   std::vector<VectorXd> whitening = colours(models, logs);
   for (int pass = 0; pass < passes; ++pass) {
     progress.stage(pass == 0 ? "looking for what is missing" : "looking again, around what was found", 8);
-    Linearised at(models, logs, whitening);
+    Linearised problem(models, logs, whitening);
     std::vector<EffectCandidate> skip = never;
-    for (const std::size_t g : in_model(at)) skip.push_back(at.groups()[g].candidate);
+    for (const std::size_t g : in_model(problem)) skip.push_back(problem.groups()[g].candidate);
     std::erase_if(skip, [](const EffectCandidate& c) { return find_effect(c.effect)->several; });
-    at.add_all(dictionary(at, skip));
+    problem.add_all(dictionary(problem, skip));
     progress.step();
-    Search search(at, settings);
-    const std::vector<std::size_t> start = in_model(at);
+    Search search(problem, settings);
+    const std::vector<std::size_t> start = in_model(problem);
     const Choice choice = search.run(start, progress);
-    if (pass == 0) out.not_identifiable = blind_spots(at, search);
+    if (pass == 0) out.not_identifiable = blind_spots(problem, search);
     const std::vector<Found> found = search.explain(choice);
     // The model follows the choice. What is appended first leaves the ids of the others as they are.
     std::vector<EffectId> ids;
-    Index column = first_of_groups(at, choice);
+    Index column = first_of_groups(problem, choice);
     for (const std::size_t g : choice.groups) {
-      const Group& group = at.groups()[g];
+      const Group& group = problem.groups()[g];
       ids.push_back(group.in_model ? group.id : name(models, group, choice.fit.x.segment(column, group.count)));
       column += group.count;
     }
     for (const std::size_t g : start) {
       if (std::find(choice.groups.begin(), choice.groups.end(), g) == choice.groups.end())
-        ids.push_back(at.groups()[g].id);
+        ids.push_back(problem.groups()[g].id);
     }
     const bool changed = ids.size() > choice.groups.size() || choice.groups.size() > start.size();
     while (ids.size() > choice.groups.size()) {
@@ -125,19 +109,19 @@ Outcome explore(Models models, const std::vector<SessionLog>& logs, const Search
       ids.pop_back();
       take_back(models, ids, gone);
     }
-    if (changed) refit(models, logs, at.whitening(), 4);
+    if (changed) refit(models, logs, problem.noise().whitening(), 4);
     bool lost = false;
     for (std::size_t j = 0; j < models.current.joints.size(); ++j) {
       // A rotor that does not show is none.
       const EffectFit* rotor = rotor_of(models.current.joints[j]);
       if (rotor != nullptr && rotor->linear[0] <= 0) lost |= forget_rotor(models, ids, j);
     }
-    if (lost) refit(models, logs, at.whitening(), 2);
+    if (lost) refit(models, logs, problem.noise().whitening(), 2);
     out.found.clear();
     for (std::size_t i = 0; i < ids.size(); ++i) out.found.push_back({ids[i], found[i].score, found[i].alternatives});
     out.models = models;
     // Without a baseline the gap was part of what looked like noise.
-    whitening = changed && !models.has_baseline ? colours(models, logs) : at.whitening();
+    whitening = changed && !models.has_baseline ? colours(models, logs) : problem.noise().whitening();
     out.whitening = whitening;
     out.look_again(logs);
     if (!changed || (!out.structured() && out.found.size() < 2)) break;

@@ -20,7 +20,7 @@ struct Finding {
 struct Outcome {
   Models models;
   std::vector<Finding> found;
-  std::unique_ptr<Linearised> at;  ///< around the models, without candidates
+  std::unique_ptr<Linearised> problem;  ///< around the models, without candidates
   std::vector<Eigen::MatrixXd> features;
   std::vector<LackOfFit> lack;
   std::vector<std::vector<std::string>> not_identifiable;  ///< per joint, and of the robot
@@ -30,9 +30,6 @@ struct Outcome {
   /// Linearises around the models again and looks for lack of fit.
   void look_again(const std::vector<SessionLog>& logs);
 };
-
-/// Groups of the model's named effects, in the model's order.
-std::vector<std::size_t> in_model(const Linearised& at);
 
 /// Search, name, fit again around what was named; again where that left structure or found several effects.
 /// @param passes at most

@@ -27,53 +27,55 @@ constexpr double worse = 1.02;
 
 /// The model without some of its named effects. Leaving out their columns is not enough where they work on what others
 /// do, as those columns are of a model that has the effect: inertias seen through a gear that bends may do its work.
-std::unique_ptr<Linearised> without(const Outcome& outcome, const std::vector<SessionLog>& logs, const Linearised& at,
-                                    const std::vector<std::size_t>& groups) {
+std::unique_ptr<Linearised> without(const Outcome& outcome, const std::vector<SessionLog>& logs,
+                                    const Linearised& problem, const std::vector<std::size_t>& groups) {
   Models models = outcome.models;
   std::vector<EffectId> ids;
-  for (const std::size_t g : groups) ids.push_back(at.groups()[g].id);
+  for (const std::size_t g : groups) ids.push_back(problem.groups()[g].id);
   while (!ids.empty()) {
     const EffectId gone = ids.back();
     ids.pop_back();
     take_back(models, ids, gone);
   }
-  auto out = std::make_unique<Linearised>(models, logs, at.whitening());
-  out->set_weights(at.weights());
+  auto out = std::make_unique<Linearised>(models, logs, problem.noise().whitening());
+  out->solver().set_weights(problem.solver().weights());
   return out;
 }
 
-/// Squares of a model's judged rows, its coefficients fitted to a fold's others.
-VectorXd judged(const Linearised& at, const Fold& fold) {
-  return at.square(at.solve(at.columns_of(in_model(at)), fold.fit), fold.judge);
+/// Squares of judged rows, coefficients of some groups fitted to others.
+VectorXd judged(const Linearised& problem, const std::vector<std::size_t>& groups, const Fold& fold) {
+  const BlockSolver& solver = problem.solver();
+  return solver.square(solver.solve(problem.columns_of(groups), fold.fit), fold.judge);
 }
 
-HeldOut hold_out(const Outcome& outcome, const std::vector<SessionLog>& logs, const Linearised& at,
+/// .. of a model with all that it has.
+VectorXd judged(const Linearised& problem, const Fold& fold) { return judged(problem, in_model(problem), fold); }
+
+HeldOut hold_out(const Outcome& outcome, const std::vector<SessionLog>& logs, const Linearised& problem,
                  const std::vector<MatrixXd>& features, const std::vector<std::size_t>& groups) {
-  const auto n = static_cast<Index>(at.joints());
-  const VectorXd& w = at.weights();
-  const std::vector<Index> with = at.columns_of(groups);
+  const auto n = static_cast<Index>(problem.joints());
+  const VectorXd& w = problem.solver().weights();
+  const std::vector<Index> with = problem.columns_of(groups);
   HeldOut out;
   out.before = out.after = out.leftover = out.excess = out.rows = VectorXd::Zero(n);
   out.alone.assign(groups.size(), VectorXd::Zero(n));
-  const std::unique_ptr<Linearised> plain = groups.empty() ? nullptr : without(outcome, logs, at, groups);
-  const Linearised& before = plain ? *plain : at;
-  std::vector<std::size_t> todays;
-  for (const std::size_t b : at.fit_blocks()) {
-    if (!at.blocks()[b].healthy) todays.push_back(b);
-  }
-  out.fitted_before = before.square(before.solve(before.columns_of(in_model(before))), todays).cwiseProduct(w);
-  out.fitted_after = at.square(at.solve(with), todays).cwiseProduct(w);
-  out.fitted_rows = at.row_count(todays);
-  for (const Fold& fold : at.folds()) {
-    out.rows += at.row_count(fold.judge);
-    const LinearFit all = at.solve(with, fold.fit);
-    const VectorXd after = at.square(all, fold.judge).cwiseProduct(w);
+  const std::unique_ptr<Linearised> plain = groups.empty() ? nullptr : without(outcome, logs, problem, groups);
+  const Linearised& before = plain ? *plain : problem;
+  const Fold fitted{problem.blocks().fit, problem.blocks().fit_of(false)};
+  out.fitted_before = judged(before, fitted).cwiseProduct(w);
+  out.fitted_after = judged(problem, groups, fitted).cwiseProduct(w);
+  out.fitted_rows = problem.solver().row_count(fitted.judge);
+  for (const Fold& fold : problem.blocks().folds) {
+    out.rows += problem.solver().row_count(fold.judge);
+    const LinearFit all = problem.solver().solve(with, fold.fit);
+    const VectorXd after = problem.solver().square(all, fold.judge).cwiseProduct(w);
     out.after += after;
     VectorXd share(n), healthy(VectorXd::Zero(n));
-    parallel_for(at.joints(), [&](std::size_t j) {
+    parallel_for(problem.joints(), [&](std::size_t j) {
       const auto k = static_cast<Index>(j);
-      share[k] = structured_share(at, j, all, features[j], fold.judge);
-      if (at.models().has_baseline) healthy[k] = structured_share(at, j, all, features[j], at.fit_blocks(), true);
+      share[k] = structured_share(problem, j, all, features[j], fold.judge);
+      if (problem.models().has_baseline)
+        healthy[k] = structured_share(problem, j, all, features[j], problem.blocks().fit, true);
     });
     out.leftover += after.cwiseProduct(share);
     out.excess += after.cwiseProduct((share - healthy).cwiseMax(0.0));
@@ -82,14 +84,14 @@ HeldOut hold_out(const Outcome& outcome, const std::vector<SessionLog>& logs, co
   for (std::size_t i = 0; i < groups.size(); ++i) {
     std::vector<std::size_t> others = groups;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
-    const EffectInfo& info = *find_effect(at.groups()[groups[i]].candidate.effect);
+    const EffectInfo& info = *find_effect(problem.groups()[groups[i]].candidate.effect);
     const bool works_on_others = info.acts_on != ActsOn::torque || info.needs_structural || info.needs_total;
     std::unique_ptr<Linearised> less;
-    if (works_on_others && !others.empty()) less = without(outcome, logs, at, {groups[i]});
-    for (const Fold& fold : at.folds()) {
+    if (works_on_others && !others.empty()) less = without(outcome, logs, problem, {groups[i]});
+    for (const Fold& fold : problem.blocks().folds) {
       const VectorXd squares = others.empty() ? judged(before, fold)
                                : less         ? judged(*less, fold)
-                                              : at.square(at.solve(at.columns_of(others), fold.fit), fold.judge);
+                                              : judged(problem, others, fold);
       out.alone[i] += squares.cwiseProduct(w);
     }
     out.alone[i] -= out.after;
@@ -99,13 +101,13 @@ HeldOut hold_out(const Outcome& outcome, const std::vector<SessionLog>& logs, co
 
 /// Where structure remains, what counts is the error in the whole band: whitening would weigh it by how fast it is.
 HeldOut judge(const Outcome& outcome, const std::vector<SessionLog>& logs, const std::vector<std::size_t>& groups) {
-  HeldOut held = hold_out(outcome, logs, *outcome.at, outcome.features, groups);
+  HeldOut held = hold_out(outcome, logs, *outcome.problem, outcome.features, groups);
   if (!outcome.structured()) return held;
   const std::size_t n = outcome.lack.size();
-  const Linearised at(outcome.models, logs, std::vector<VectorXd>(n, VectorXd::Zero(1)));
+  const Linearised problem(outcome.models, logs, std::vector<VectorXd>(n, VectorXd::Zero(1)));
   std::vector<MatrixXd> in_band(n);
-  parallel_for(n, [&](std::size_t j) { in_band[j] = features(at, j, at.models().has_baseline); });
-  const HeldOut band = hold_out(outcome, logs, at, in_band, groups);
+  parallel_for(n, [&](std::size_t j) { in_band[j] = features(problem, j, problem.models().has_baseline); });
+  const HeldOut band = hold_out(outcome, logs, problem, in_band, groups);
   for (std::size_t j = 0; j < n; ++j) {
     if (!outcome.lack[j].structured()) continue;
     const auto k = static_cast<Index>(j);
@@ -160,9 +162,9 @@ void choose_time_constants(Outcome& outcome, const std::vector<SessionLog>& logs
       double best = found, least = 1e300;
       for (const double factor : {1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 2.0}) {
         fit.shape[0] = std::clamp(found * factor, 0.1, 1e4);
-        const Linearised at(outcome.models, logs, outcome.whitening);
+        const Linearised problem(outcome.models, logs, outcome.whitening);
         double sum = 0;
-        for (const Fold& fold : at.folds()) sum += judged(at, fold)[static_cast<Index>(j)];
+        for (const Fold& fold : problem.blocks().folds) sum += judged(problem, fold)[static_cast<Index>(j)];
         if (sum >= least) continue;
         least = sum;
         best = fit.shape[0];
@@ -192,7 +194,7 @@ void conclude(Gate& gate, const Outcome& outcome, const std::vector<bool>& still
                            held.excess[j] > (1 - sure_closure) * gate.gap[j]);
     gate.accepted.push_back(
         gate.closure[j] >= (gate.remains.back() ? sure_closure : least_closure) &&
-        (outcome.at->background(k) == nullptr || closed >= least_beside_background * (closed + held.leftover[j])));
+        (outcome.problem->background(k) == nullptr || closed >= least_beside_background * (closed + held.leftover[j])));
   }
 }
 
@@ -204,11 +206,11 @@ std::size_t weakest(const Gate& gate, const Outcome& outcome, const VectorXd& be
   std::size_t worst = none;
   bool worst_on_body = false;
   for (std::size_t i = 0; i < none; ++i) {
-    const Group& group = outcome.at->groups()[gate.groups[i]];
+    const Group& group = outcome.problem->groups()[gate.groups[i]];
     bool spoils = !group.on_body && rises(static_cast<Index>(group.candidate.joint));
     // Whatever it brings there: a load that others make up for in the linear fit may be far off in the model.
-    for (std::size_t j = 0; group.on_body && j < outcome.at->joints(); ++j)
-      spoils |= outcome.at->rows(j).local[static_cast<std::size_t>(group.first)] >= 0 && rises(static_cast<Index>(j));
+    for (std::size_t j = 0; group.on_body && j < outcome.problem->joints(); ++j)
+      spoils |= outcome.problem->solver().rows(j).place(group.first) >= 0 && rises(static_cast<Index>(j));
     if (!spoils && holds(outcome, group, gate.held, i)) continue;
     // An effect on the robot that spoils joints goes before theirs, which may have been bent by it.
     const bool on_body = spoils && group.on_body;
@@ -221,9 +223,9 @@ std::size_t weakest(const Gate& gate, const Outcome& outcome, const VectorXd& be
   // Beside a background, and with no more structure than the healthy session has, what is not believed only resembles
   // that background.
   for (std::size_t i = 0; i < none; ++i) {
-    const Group& group = outcome.at->groups()[gate.groups[i]];
+    const Group& group = outcome.problem->groups()[gate.groups[i]];
     const std::size_t j = group.candidate.joint;
-    if (group.on_body || outcome.at->background(j) == nullptr || outcome.lack[j].structured() || gate.accepted[j])
+    if (group.on_body || outcome.problem->background(j) == nullptr || outcome.lack[j].structured() || gate.accepted[j])
       continue;
     if (worst == none || gate.held.alone[i].sum() < gate.held.alone[worst].sum()) worst = i;
   }
@@ -232,9 +234,9 @@ std::size_t weakest(const Gate& gate, const Outcome& outcome, const VectorXd& be
 
 }  // namespace
 
-std::size_t Gate::place(const Linearised& at, const EffectId& id) const {
+std::size_t Gate::place(const Linearised& problem, const EffectId& id) const {
   for (std::size_t i = 0; i < groups.size(); ++i) {
-    if (at.groups()[groups[i]].id == id) return i;
+    if (problem.groups()[groups[i]].id == id) return i;
   }
   return groups.size();
 }
@@ -245,14 +247,14 @@ Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<Se
   const VectorXd before = plain_error(nominal, logs);
   Gate gate;
   for (;;) {
-    gate.groups = in_model(*outcome.at);
+    gate.groups = in_model(*outcome.problem);
     gate.held = judge(outcome, logs, gate.groups);
     conclude(gate, outcome, still);
     const VectorXd after =
         gate.groups.empty() || before.size() == 0 ? before : plain_error(outcome.models.current, logs);
     const std::size_t worst = weakest(gate, outcome, before, after);
     if (worst == gate.groups.size()) break;
-    const EffectId gone = outcome.at->groups()[gate.groups[worst]].id;
+    const EffectId gone = outcome.problem->groups()[gate.groups[worst]].id;
     std::erase_if(outcome.found, [&](const Finding& f) { return f.id == gone; });
     std::vector<EffectId> ids;
     for (const Finding& f : outcome.found) ids.push_back(f.id);
@@ -265,7 +267,7 @@ Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<Se
   const HeldOut& held = gate.held;
   gate.robot_closure.assign(gate.groups.size(), 0.0);
   for (std::size_t i = 0; i < gate.groups.size(); ++i) {
-    if (!outcome.at->groups()[gate.groups[i]].on_body) continue;
+    if (!outcome.problem->groups()[gate.groups[i]].on_body) continue;
     double left = 0;
     for (Index j = 0; j < held.excess.size(); ++j) {
       if (held.alone[i][j] > least_felt) left += held.excess[j];

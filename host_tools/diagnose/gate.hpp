@@ -38,7 +38,7 @@ struct Gate {
   std::vector<bool> accepted;         ///< joint's names are believed
 
   /// Place of an effect in `groups`; groups.size(): it has none.
-  std::size_t place(const Linearised& at, const EffectId& id) const;
+  std::size_t place(const Linearised& problem, const EffectId& id) const;
 };
 
 /// Judges each fold by a fit of the others; time constants of drift are chosen by that, and names that do not hold are

@@ -1,17 +1,9 @@
 #pragma once
 
+#include "host_tools/diagnose/features.hpp"
 #include "host_tools/diagnose/linearised.hpp"
 
 namespace fxdyn::diagnosis {
-
-/// Functions of the state that name no effect, for one joint: cosines over the ranges of all positions, velocities and
-/// their products, friction over the own position and over each session's rows in their order, paths with memory,
-/// random Fourier features of (q, dq, ddq, load). Filtered, decimated and whitened like everything else; rows x
-/// features, those of time last. Zero on the healthy session's rows unless `healthy`.
-Eigen::MatrixXd features(const Linearised& at, std::size_t joint, bool healthy = false);
-
-/// Features of time alone: what changes with time does not come back.
-constexpr Eigen::Index time_features = 15;
 
 struct LackOfFit {
   double state_p = 1;  ///< chance that noise looks as much like a function of the state
@@ -24,13 +16,13 @@ struct LackOfFit {
 /// comes from the healthy session's residual, else from the same residual at other times: noise of any colour counts as
 /// noise.
 /// @param alone the same columns fitted to the healthy session only; null where there is none
-LackOfFit lack_of_fit(const Linearised& at, std::size_t joint, const LinearFit& fit, const LinearFit* alone,
+LackOfFit lack_of_fit(const Linearised& problem, std::size_t joint, const LinearFit& fit, const LinearFit* alone,
                       const Eigen::MatrixXd& features);
 
 /// Share of the squared residual of a fit on the blocks that is a function of the state, or of the rest a matter of
 /// time (lines, slow changes), the expected part of noise taken off; 0..1.
 /// @param healthy of the blocks of the healthy session instead of today's, where matters of time are not looked for
-double structured_share(const Linearised& at, std::size_t joint, const LinearFit& fit, const Eigen::MatrixXd& features,
-                        const std::vector<std::size_t>& blocks, bool healthy = false);
+double structured_share(const Linearised& problem, std::size_t joint, const LinearFit& fit,
+                        const Eigen::MatrixXd& features, const std::vector<std::size_t>& blocks, bool healthy = false);
 
 }  // namespace fxdyn::diagnosis

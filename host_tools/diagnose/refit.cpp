@@ -18,21 +18,21 @@ using Eigen::VectorXd;
 namespace {
 
 /// -2 ln likelihood of the models as they are, but for a constant.
-double misfit(const Linearised& at) {
+double misfit(const Linearised& problem) {
   LinearFit now;
-  for (Index c = 0; c < static_cast<Index>(at.unknowns().size()); ++c) now.columns.push_back(c);
+  now.columns = problem.unknown_columns();
   now.x.resize(static_cast<Index>(now.columns.size()));
   double sum = 0;
-  for (std::size_t c = 0; c < at.unknowns().size(); ++c) {
-    const Unknown& u = at.unknowns()[c];
+  for (std::size_t c = 0; c < problem.unknowns().size(); ++c) {
+    const Unknown& u = problem.unknowns()[c];
     now.x[static_cast<Index>(c)] = u.value;
     if (u.prior_std > 0) sum += std::pow((u.value - u.prior) / u.prior_std, 2);
   }
-  const VectorXd square = at.square(now, at.fit_blocks());
-  const VectorXd rows = at.row_count(at.fit_blocks());
+  const VectorXd square = problem.solver().square(now, problem.blocks().fit);
+  const VectorXd rows = problem.solver().row_count(problem.blocks().fit);
   for (Index j = 0; j < square.size(); ++j) {
     sum += rows[j] * std::log(std::max(square[j], 1e-300));
-    sum -= 2 * at.log_scale(static_cast<std::size_t>(j));
+    sum -= 2 * problem.noise().log_scale(static_cast<std::size_t>(j));
   }
   return sum;
 }
@@ -53,18 +53,16 @@ void refit(Models& models, const std::vector<SessionLog>& all, const std::vector
   double least = 1e300, share = 1;
   int halvings = 0;
   for (int round = 0;; ++round) {
-    auto at = std::make_unique<Linearised>(models, logs, whitening);
-    whitening = at->whitening();  // one for all rounds, else their misfits can't be compared
-    const double now = misfit(*at);
+    auto problem = std::make_unique<Linearised>(models, logs, whitening);
+    whitening = problem->noise().whitening();  // one for all rounds, else their misfits can't be compared
+    const double now = misfit(*problem);
     if (now < least) {
       const bool converged = least - now < converged_below;
       best = models;
       least = now;
       if (converged || round >= rounds) return;
-      around = std::move(at);
-      std::vector<Index> columns;
-      for (Index c = 0; c < static_cast<Index>(around->unknowns().size()); ++c) columns.push_back(c);
-      step = around->solve(columns);
+      around = std::move(problem);
+      step = around->solver().solve(around->unknown_columns());
       share = 1;
       halvings = 0;
     } else {
@@ -74,7 +72,7 @@ void refit(Models& models, const std::vector<SessionLog>& all, const std::vector
       if (++halvings > most_halvings || round >= rounds + most_halvings) return;
       share *= 0.3;
     }
-    update(models, *around, step, share);
+    update(models, around->unknowns(), step, share);
   }
 }
 
@@ -134,7 +132,7 @@ void take_back(Models& models, std::vector<EffectId>& ids, const EffectId& id) {
   remove(models, ids, id);
   if (id.body) return;
   const auto& left = models.current.joints[id.joint].effects;
-  if (std::none_of(left.begin(), left.end(), [](const EffectFit& fit) { return tells_rotor(fit.effect); }))
+  if (std::none_of(left.begin(), left.end(), [](const EffectFit& fit) { return separates_rotor(fit.effect); }))
     forget_rotor(models, ids, id.joint);
 }
 
@@ -144,10 +142,11 @@ bool forget_rotor(Models& models, std::vector<EffectId>& ids, std::size_t joint)
   if (it == models.rotors.end()) return false;
   const auto is_rotor = [](const EffectFit& fit) { return in_base(fit.effect); };
   const auto& effects = models.current.joints[joint].effects;
-  const auto at = std::find_if(effects.begin(), effects.end(), is_rotor);
+  const auto fit = std::find_if(effects.begin(), effects.end(), is_rotor);
   // The base parameters have it back.
-  for (IdentifiedModel* model : {&models.current, &models.healthy}) take_from_base(*model, it->in_base, -at->linear[0]);
-  remove(models, ids, {false, joint, static_cast<std::size_t>(at - effects.begin())});
+  for (IdentifiedModel* model : {&models.current, &models.healthy})
+    take_from_base(*model, it->in_base, -fit->linear[0]);
+  remove(models, ids, {false, joint, static_cast<std::size_t>(fit - effects.begin())});
   if (models.has_baseline) std::erase_if(models.healthy.joints[joint].effects, is_rotor);
   models.rotors.erase(it);
   return true;

@@ -4,19 +4,12 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/diagnose/dictionary.hpp"
+#include "host_tools/diagnose/gain.hpp"
 #include "host_tools/diagnose/linearised.hpp"
 #include "host_tools/support/progress.hpp"
 
 namespace fxdyn::diagnosis {
-
-/// Candidates of the whole catalogue with their grids of shapes, for every joint and for the robot; but for what
-/// `skip` names. Ripples are not among them, see ripples().
-std::vector<Group> dictionary(const Linearised& at, const std::vector<EffectCandidate>& skip);
-
-/// Wavenumbers at which a joint's residual ripples, the strongest first: peaks of
-///   P(n) = |sum g exp(i n q)|^2 / expected power,
-/// g the residual with the adjoint of filter, decimation and whitening applied, so that no column has to be made.
-std::vector<Group> ripples(const Linearised& at, std::size_t joint, const Eigen::VectorXd& residual, std::size_t most);
 
 /// A set of effects beside the nuisance.
 struct Choice {
@@ -28,7 +21,7 @@ struct Choice {
 };
 
 /// Place in the fit's coefficients at which those of its groups begin.
-Eigen::Index first_of_groups(const Linearised& at, const Choice& choice);
+Eigen::Index first_of_groups(const Linearised& problem, const Choice& choice);
 
 struct Alternative {
   EffectCandidate candidate;
@@ -52,7 +45,7 @@ struct SearchSettings {
 /// Beam search forward, swaps, backward elimination.
 class Search {
  public:
-  Search(Linearised& at, const SearchSettings& settings) : at_(at), settings_(settings) {}
+  Search(Linearised& problem, const SearchSettings& settings) : problem_(problem), settings_(settings) {}
 
   /// @param start groups to begin with (named effects of the model)
   Choice run(std::vector<std::size_t> start, Progress& progress);
@@ -69,6 +62,19 @@ class Search {
     std::size_t group;
     double score;
   };
+  /// Candidates' columns once a state's have taken their part.
+  struct Candidates {
+    Eigen::Index first = 0;         ///< column of the first candidate
+    Eigen::MatrixXd by_state;       ///< coefficients of the state's columns in each candidate column
+    std::vector<Reduced> products;  ///< by group
+    std::vector<Gain> gain;         ///< by group
+    std::vector<char> usable;       ///< by group: may be added, and something of it is left
+  };
+  Eigen::VectorXd weights_of(const LinearFit& fit) const;
+  Candidates project(const Choice& state);
+  double absorbed(const Group& group, const Gain& gain) const;
+  void estimate_thresholds(const Choice& state, const Candidates& candidates);
+  Eigen::VectorXd scores_of_noise(std::size_t joint, const Choice& state, const Candidates& candidates) const;
   std::vector<Scored> score_all(const Choice& state, bool with_thresholds);
   std::size_t refine(const Choice& state, std::size_t group);
   double penalty(std::size_t group) const;
@@ -77,13 +83,10 @@ class Search {
   void find_ripples(const Choice& state, std::optional<std::size_t> joint);
   double samples() const;
 
-  Linearised& at_;
+  Linearised& problem_;
   SearchSettings settings_;
   Eigen::VectorXd thresholds_;
   std::vector<double> kept_;
 };
-
-/// Index of the shape parameter that is searched continuously; none: -1.
-int searched_shape(const EffectCandidate& candidate);
 
 }  // namespace fxdyn::diagnosis

@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "host_tools/effects/effects.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/regression/encoder_noise.hpp"
+#include "host_tools/regression/row_ranges.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/random.hpp"
 
@@ -23,8 +23,6 @@ using Eigen::VectorXd;
 constexpr double rows_per_period = 2.5;
 /// Faster than this there is nothing that these rules could name, and many rows.
 constexpr double highest_cutoff_hz = 40;
-/// Into which a single log is cut, as the search does.
-constexpr int blocks_of_one_log = 5;
 /// A robot that rested longer has cooled.
 constexpr double longest_pause_s = 1800;
 
@@ -117,11 +115,8 @@ std::vector<bool> still_joints(const GateData& data) {
   std::vector<bool> out = moving_joints(data.logs);
   const ProcessedLog& log = data.logs.front();
   for (std::size_t j = 0; j < out.size(); ++j) {
-    const FilterFit& filter = data.filter;
-    const double noise = std::max(filter.position_noise[j], filter.encoder_step[j] / std::sqrt(12.0));
-    const double cutoff = std::min(filter.position_cutoff_hz, 0.5 / log.step_s);
-    const double noise_dq = 2 * std::numbers::pi * noise * std::sqrt(2 * log.step_s * cutoff * cutoff * cutoff / 3);
-    out[j] = !out[j] || !(data.dq[static_cast<Index>(j)] > times_noise * noise_dq);
+    const double noise = velocity_noise(data.filter, j, log.step_s);
+    out[j] = !out[j] || !(data.dq[static_cast<Index>(j)] > times_noise * noise);
   }
   return out;
 }
@@ -164,26 +159,22 @@ std::vector<std::string> check_same_robot(Models models, const std::vector<Sessi
   constexpr double most = 0.2;  // of the torque's power that no fit explains
   constexpr double apart = 4;   // .. and times the noise: where a joint carries little that is most of it
   models.background.clear();    // explains anything
-  Linearised at(models, logs, std::vector<VectorXd>(models.current.joints.size(), VectorXd::Zero(1)));
-  const auto first = static_cast<Index>(at.nuisance().size());
+  Linearised problem(models, logs, std::vector<VectorXd>(models.current.joints.size(), VectorXd::Zero(1)));
+  const auto first = static_cast<Index>(problem.nuisance().size());
   for (const EffectInfo& info : effect_infos()) {
     if (info.acts_on != ActsOn::body) continue;
     Group group;
     group.candidate = {std::string(info.name), 0, {}};
     group.on_body = true;
-    at.add(group, at.make(group));
+    problem.add(group, problem.make(group));
   }
-  std::vector<Index> columns = at.nuisance();
-  for (Index c = first; c < at.columns(); ++c) columns.push_back(c);
-  const LinearFit fit = at.solve(columns);
-  std::vector<bool> strange(at.joints(), false);
+  std::vector<Index> columns = problem.nuisance();
+  for (Index c = first; c < problem.solver().columns(); ++c) columns.push_back(c);
+  const LinearFit fit = problem.solver().solve(columns);
+  std::vector<bool> strange(problem.joints(), false);
   for (const bool healthy : {false, true}) {
-    std::vector<std::size_t> blocks;
-    for (const std::size_t b : at.fit_blocks()) {
-      if (at.blocks()[b].healthy == healthy) blocks.push_back(b);
-    }
-    const VectorXd left = at.square(fit, blocks);
-    for (std::size_t j = 0; j < at.joints(); ++j) {
+    const VectorXd left = problem.solver().square(fit, problem.blocks().fit_of(healthy));
+    for (std::size_t j = 0; j < problem.joints(); ++j) {
       const auto k = static_cast<Index>(j);
       double whole = 0, noise = 0;
       for (const SessionLog& entry : logs) {
@@ -197,7 +188,7 @@ std::vector<std::string> check_same_robot(Models models, const std::vector<Sessi
   }
   std::size_t count = 0, judged = 0;
   std::vector<std::string> notes, names;
-  for (std::size_t j = 0; j < at.joints(); ++j) {
+  for (std::size_t j = 0; j < problem.joints(); ++j) {
     if (still[j]) continue;
     ++judged;
     if (!strange[j]) continue;

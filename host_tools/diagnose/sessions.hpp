@@ -19,7 +19,7 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
 /// trajectory only, its blocks have to, and are too short for that
 void check_lengths(const std::vector<SessionLog>& logs);
 
-/// Joints that this motion tells nothing of: they stand still, or as good as, beside what the encoder's noise looks
+/// Joints that this motion says nothing of: they stand still, or as good as, beside what the encoder's noise looks
 /// like.
 std::vector<bool> still_joints(const GateData& data);
 

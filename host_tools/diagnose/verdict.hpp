@@ -6,8 +6,7 @@
 
 #include "host_tools/diagnose/deflection.hpp"
 #include "host_tools/diagnose/gate.hpp"
-#include "host_tools/diagnose/jolts.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/diagnose/impacts.hpp"
 
 namespace fxdyn::diagnosis {
 
@@ -18,7 +17,7 @@ struct Conclusion {
   const Outcome& outcome;
   const Gate& gate;
   const Deflections& deflections;
-  const std::vector<std::optional<Jolts>>& jolts;
+  const std::vector<std::optional<Impacts>>& impacts;
   const std::vector<bool>& still;
   const std::vector<ProcessedLog>& now;   ///< train and validate
   const std::vector<ProcessedLog>& test;  ///< for figures only
@@ -26,12 +25,7 @@ struct Conclusion {
 
 /// What judged the names.
 std::string gate_of(const std::vector<ProcessedLog>& now);
-/// Nominal parameters that changed since the healthy session by more than sessions differ, one line each; and a line
-/// where half of the joints have such ones beside a changed load or tilt: that may be another robot.
-std::vector<std::string> changed_parameters(const Linearised& at);
-/// Effects of the healthy session, no friction, that are not today what they were then: by more than sessions differ.
-std::vector<EffectCandidate> changed_effects(const Linearised& at);
 /// diagnosis.json; its notes are those that the figures ask for.
-nlohmann::json verdicts(const Conclusion& told);
+nlohmann::json verdicts(const Conclusion& conclusion);
 
 }  // namespace fxdyn::diagnosis

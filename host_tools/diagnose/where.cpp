@@ -15,8 +15,8 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 constexpr Index bins = 24;
-/// A region says something where its share of the gap is that much more than its share of the samples.
-constexpr double telling = 0.15;
+/// A region is reported where its share of the gap is that much more than its share of the samples.
+constexpr double least_contrast = 0.15;
 constexpr std::size_t most_regions = 4;
 
 struct Region {
@@ -61,100 +61,119 @@ Region concentrated(const std::string& signal, const VectorXd& values, const Vec
   return best;
 }
 
-}  // namespace
+/// One joint's motion and squared error at the rows of all logs.
+struct Samples {
+  VectorXd q, dq, ddq, load, t, square;
+};
 
-nlohmann::json where(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs, std::size_t joint,
-                     const std::vector<VectorXd>& error, double noise) {
+Samples samples_of(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs, std::size_t joint,
+                   const std::vector<VectorXd>& error) {
   const auto j = static_cast<Index>(joint);
   Index total = 0;
   for (const ProcessedLog* log : logs) total += log->rows();
-  VectorXd q(total), dq(total), ddq(total), load(total), t(total), square(total);
+  Samples out;
+  for (VectorXd* v : {&out.q, &out.dq, &out.ddq, &out.load, &out.t, &out.square}) v->resize(total);
   IdentifiedModel rigid = model;
   for (JointFit& fit : rigid.joints) {
     fit.effects.clear();
     fit.bls.reset();
   }
-  Index at = 0;
+  Index row = 0;
   for (std::size_t l = 0; l < logs.size(); ++l) {
     const ProcessedLog& log = *logs[l];
     const MotionRows m = log.joint_motion(j);
     const VectorXd structural = predict(rigid, log).col(j);
-    for (Index r = 0; r < log.rows(); ++r, ++at) {
+    for (Index r = 0; r < log.rows(); ++r, ++row) {
       const Index k = log.first + r * log.decimation;
-      q[at] = m.q(k, 0);
-      dq[at] = m.dq(k, 0);
-      ddq[at] = m.ddq(k, 0);
-      load[at] = structural[k];
-      t[at] = log.t[k];
-      square[at] = error[l][k] * error[l][k];
+      out.q[row] = m.q(k, 0);
+      out.dq[row] = m.dq(k, 0);
+      out.ddq[row] = m.ddq(k, 0);
+      out.load[row] = structural[k];
+      out.t[row] = log.t[k];
+      out.square[row] = error[l][k] * error[l][k];
     }
   }
-  std::vector<Region> regions;
-  const Whole all{square.sum() - noise * noise * static_cast<double>(total), static_cast<double>(total)};
-  const auto look = [&](const std::string& signal, const VectorXd& values) {
-    Region region = concentrated(signal, values, square, noise, all);
-    if (region.share > 0) regions.push_back(region);
-  };
-  look("dq", dq);
-  look("q", q);
-  look("ddq", ddq);
-  look("load", load);
-  // Clocks start anywhere: time is a log's own.
-  Region when{"t"};
-  at = 0;
+  return out;
+}
+
+/// Clocks start anywhere: time is a log's own.
+Region in_time(const std::vector<const ProcessedLog*>& logs, const Samples& samples, double noise, const Whole& all) {
+  Region best{"t"};
+  Index first = 0;
   for (const ProcessedLog* log : logs) {
-    Region region = concentrated("t", t.segment(at, log->rows()), square.segment(at, log->rows()), noise, all);
+    Region region = concentrated("t", samples.t.segment(first, log->rows()), samples.square.segment(first, log->rows()),
+                                 noise, all);
     if (logs.size() > 1) region.log = log->name;
-    if (region.contrast > when.contrast) when = region;
-    at += log->rows();
+    if (region.contrast > best.contrast) best = region;
+    first += log->rows();
   }
-  if (when.share > 0) regions.push_back(when);
-  {
-    // direction of motion
-    double forward = 0, backward = 0, ahead = 0;
-    for (Index k = 0; k < total; ++k) {
-      (dq[k] > 0 ? forward : backward) += square[k] - noise * noise;
-      ahead += dq[k] > 0;
-    }
-    const double whole = forward + backward, share = ahead / static_cast<double>(std::max<Index>(total, 1));
-    if (whole > 0) {
-      const bool positive = forward / whole - share > 0;
-      const double mine = positive ? forward / whole : backward / whole;
-      regions.push_back({"direction", positive ? 0.0 : -1.0, positive ? 1.0 : 0.0, std::min(1.0, mine),
-                         mine - (positive ? share : 1 - share)});
-    }
+  return best;
+}
+
+/// Direction of motion, as -1..0 or 0..1; an empty interval: there is no gap.
+Region in_direction(const Samples& samples, double noise) {
+  double forward = 0, backward = 0, ahead = 0;
+  for (Index k = 0; k < samples.dq.size(); ++k) {
+    (samples.dq[k] > 0 ? forward : backward) += samples.square[k] - noise * noise;
+    ahead += samples.dq[k] > 0;
   }
-  {
-    // octaves of frequency, without a white noise of that size; contrast against the band
-    const double cutoff = logs.front()->filter.torque_cutoff_hz;
-    VectorXd power;
-    double step = 0;
-    for (std::size_t l = 0; l < logs.size(); ++l) {
-      const ProcessedLog& log = *logs[l];
-      const Spectrum spectrum = welch(error[l].segment(log.first, log.last - log.first), log.step_s);
-      if (power.size() == 0) power = VectorXd::Zero(spectrum.density.size());
-      if (power.size() != spectrum.density.size()) continue;
-      power += spectrum.density * static_cast<double>(log.rows());
-      step = spectrum.frequency(1) - spectrum.frequency(0);
-      const auto inside = std::min<Index>(power.size(), static_cast<Index>(cutoff / step));
-      power.head(inside).array() -= noise * noise / cutoff * static_cast<double>(log.rows());
-    }
-    const double whole = power.sum();
-    Region best{"frequency"};
-    for (double from = 0; from < cutoff && whole > 0 && step > 0; from = std::max(2 * from, 0.5)) {
-      const double to = std::max(2 * from, 0.5);
-      const auto a = static_cast<Index>(from / step), b = std::min<Index>(power.size(), static_cast<Index>(to / step));
-      if (b <= a) continue;
-      const double share = std::min(1.0, power.segment(a, b - a).sum() / whole),
-                   contrast = share - (to - from) / cutoff;
-      if (contrast > best.contrast) best = {"frequency", from, to, share, contrast};
-    }
-    if (best.share > 0) regions.push_back(best);
+  const double whole = forward + backward, share = ahead / static_cast<double>(std::max<Index>(samples.dq.size(), 1));
+  if (!(whole > 0)) return {"direction"};
+  const bool positive = forward / whole - share > 0;
+  const double mine = positive ? forward / whole : backward / whole;
+  return {"direction", positive ? 0.0 : -1.0, positive ? 1.0 : 0.0, std::min(1.0, mine),
+          mine - (positive ? share : 1 - share)};
+}
+
+/// Octaves of frequency, without a white noise of that size; contrast against the band.
+Region in_frequency(const std::vector<const ProcessedLog*>& logs, const std::vector<VectorXd>& error, double noise) {
+  const double cutoff = logs.front()->filter.torque_cutoff_hz;
+  VectorXd power;
+  double step = 0;
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    const ProcessedLog& log = *logs[l];
+    const Spectrum spectrum = welch(error[l].segment(log.first, log.last - log.first), log.step_s);
+    if (power.size() == 0) power = VectorXd::Zero(spectrum.density.size());
+    if (power.size() != spectrum.density.size()) continue;
+    power += spectrum.density * static_cast<double>(log.rows());
+    step = spectrum.frequency(1) - spectrum.frequency(0);
+    const auto inside = std::min<Index>(power.size(), static_cast<Index>(cutoff / step));
+    power.head(inside).array() -= noise * noise / cutoff * static_cast<double>(log.rows());
   }
+  const double whole = power.sum();
+  Region best{"frequency"};
+  for (double from = 0; from < cutoff && whole > 0 && step > 0; from = std::max(2 * from, 0.5)) {
+    const double to = std::max(2 * from, 0.5);
+    const auto a = static_cast<Index>(from / step), b = std::min<Index>(power.size(), static_cast<Index>(to / step));
+    if (b <= a) continue;
+    const double share = std::min(1.0, power.segment(a, b - a).sum() / whole), contrast = share - (to - from) / cutoff;
+    if (contrast > best.contrast) best = {"frequency", from, to, share, contrast};
+  }
+  return best;
+}
+
+}  // namespace
+
+nlohmann::json where(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs, std::size_t joint,
+                     const std::vector<VectorXd>& error, double noise) {
+  const Samples samples = samples_of(model, logs, joint, error);
+  const auto total = static_cast<double>(samples.square.size());
+  const Whole all{samples.square.sum() - noise * noise * total, total};
+  std::vector<Region> regions;
+  const auto add = [&](Region region) {
+    if (region.share > 0) regions.push_back(std::move(region));
+  };
+  add(concentrated("dq", samples.dq, samples.square, noise, all));
+  add(concentrated("q", samples.q, samples.square, noise, all));
+  add(concentrated("ddq", samples.ddq, samples.square, noise, all));
+  add(concentrated("load", samples.load, samples.square, noise, all));
+  add(in_time(logs, samples, noise, all));
+  if (const Region region = in_direction(samples, noise); region.to > region.from) regions.push_back(region);
+  add(in_frequency(logs, error, noise));
   std::sort(regions.begin(), regions.end(), [](const Region& a, const Region& b) { return a.contrast > b.contrast; });
   nlohmann::json out = nlohmann::json::array();
   for (const Region& region : regions) {
-    if (out.size() >= most_regions || (region.contrast < telling && !out.empty())) break;
+    if (out.size() >= most_regions || (region.contrast < least_contrast && !out.empty())) break;
     out.push_back(
         {{"signal", region.signal}, {"from", region.from}, {"to", region.to}, {"share_of_gap", region.share}});
     if (!region.log.empty()) out.back()["log"] = region.log;

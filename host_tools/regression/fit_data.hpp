@@ -21,7 +21,7 @@ struct FitData {
   std::vector<Eigen::MatrixXd> base_rows;  ///< per joint: rows x base columns that act on it
   std::vector<Eigen::VectorXd> load_rows;  ///< per joint: torque of the logs' known loads [N*m | N]
   std::vector<Eigen::VectorXd> usable;     ///< per joint and row: 0 where saturated, else 1
-  std::vector<RowRange> blocks;
+  std::vector<LogBlock> blocks;
   Split split;
 };
 

@@ -56,7 +56,7 @@ void Fitter::set_torque_lead(double seconds, const std::vector<Eigen::MatrixXd>&
 
 void Fitter::project_torque(std::size_t joint) {
   for (std::size_t b = 0; b < data_->blocks.size(); ++b) {
-    const RowRange& block = data_->blocks[b];
+    const LogBlock& block = data_->blocks[b];
     const Eigen::Index count = block.to - block.from;
     const auto y = torque_rows_[joint].segment(block.from, count);
     const Eigen::VectorXd wy = row_weights_[joint].segment(block.from, count).cwiseProduct(y);
@@ -150,7 +150,7 @@ Eigen::MatrixXd Fitter::own_rows(std::size_t joint, const std::vector<JointFit>&
 void Fitter::make_base_moments(std::size_t joint) {
   auto& moments = base_moments_[joint];
   moments.clear();
-  for (const RowRange& block : data_->blocks) {
+  for (const LogBlock& block : data_->blocks) {
     const Eigen::Index count = block.to - block.from;
     const auto x = data_->base_rows[joint].middleRows(block.from, count);
     const auto w = row_weights_[joint].segment(block.from, count);
@@ -165,7 +165,7 @@ void Fitter::make_base_moments(std::size_t joint) {
 
 Fitter::OwnByBlock Fitter::own_moments(std::size_t joint, const Eigen::MatrixXd& own) const {
   OwnByBlock out;
-  for (const RowRange& block : data_->blocks) {
+  for (const LogBlock& block : data_->blocks) {
     const Eigen::Index count = block.to - block.from;
     out.push_back(weighted_products(data_->base_rows[joint].middleRows(block.from, count),
                                     own.middleRows(block.from, count), row_weights_[joint].segment(block.from, count),

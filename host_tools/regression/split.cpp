@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
+#include "host_tools/regression/row_ranges.hpp"
+
 namespace fxdyn {
 namespace {
-
-constexpr int blocks_of_one_log = 5;
 
 bool has_validation(const std::vector<LogRows>& logs) {
   return std::any_of(logs.begin(), logs.end(), [](const LogRows& log) { return log.role == Role::validate; });
@@ -13,21 +13,20 @@ bool has_validation(const std::vector<LogRows>& logs) {
 
 }  // namespace
 
-std::vector<RowRange> make_blocks(const std::vector<LogRows>& logs) {
+std::vector<LogBlock> make_blocks(const std::vector<LogRows>& logs) {
   const int parts = has_validation(logs) || logs.size() > 1 ? 1 : blocks_of_one_log;
-  std::vector<RowRange> blocks;
+  std::vector<LogBlock> blocks;
   Eigen::Index first = 0;
   for (std::size_t l = 0; l < logs.size(); ++l) {
     const Eigen::Index count = logs[l].rows;
-    for (int part = 0; part < parts; ++part)
-      blocks.push_back(
-          {l, first + count * part / parts, first + count * (part + 1) / parts, logs[l].role == Role::train});
+    for (const RowRange& range : cut({first, count}, parts))
+      blocks.push_back({l, range.first, range.first + range.count, logs[l].role == Role::train});
     first += count;
   }
   return blocks;
 }
 
-Split make_split(const std::vector<LogRows>& logs, const std::vector<RowRange>& blocks) {
+Split make_split(const std::vector<LogRows>& logs, const std::vector<LogBlock>& blocks) {
   Split split;
   split.has_validation = has_validation(logs);
   split.kind = split.has_validation ? "validate logs"

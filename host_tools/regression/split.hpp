@@ -9,7 +9,7 @@
 namespace fxdyn {
 
 /// Consecutive rows [from, to) of one log that are fitted or judged together.
-struct RowRange {
+struct LogBlock {
   std::size_t log;
   Eigen::Index from, to;  ///< of the rows of all logs, stacked
   bool train;
@@ -29,8 +29,8 @@ struct LogRows {
   Eigen::Index rows;
 };
 /// One a log; five of a log that is alone and does not validate.
-std::vector<RowRange> make_blocks(const std::vector<LogRows>& logs);
+std::vector<LogBlock> make_blocks(const std::vector<LogRows>& logs);
 /// `blocks`: make_blocks() of these logs.
-Split make_split(const std::vector<LogRows>& logs, const std::vector<RowRange>& blocks);
+Split make_split(const std::vector<LogRows>& logs, const std::vector<LogBlock>& blocks);
 
 }  // namespace fxdyn

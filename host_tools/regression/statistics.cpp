@@ -80,7 +80,7 @@ NormalEquations Fitter::with_shapes(const Solution& solution, std::vector<Matrix
     const Index at = out.offset[j], count = shapes[j].cols(), first = data_->first_base[j];
     const Index own = linear.offset[j], own_count = linear.offset[j + 1] - own;
     for (const std::size_t b : train_blocks()) {
-      const RowRange& block = data_->blocks[b];
+      const LogBlock& block = data_->blocks[b];
       const auto cut = [&](const auto& m) { return m.middleRows(block.from, block.to - block.from); };
       const MatrixXd ws = (w * cut(row_weights_[j])).asDiagonal() * cut(shapes[j]);
       const auto x = cut(data_->base_rows[j]);
@@ -102,7 +102,7 @@ double Fitter::weighted_square(const Solution& solution) const {
   for (std::size_t j = 0; j < joints(); ++j) {
     const VectorXd e = residual(j, solution);
     for (const std::size_t b : train_blocks()) {
-      const RowRange& block = data_->blocks[b];
+      const LogBlock& block = data_->blocks[b];
       const Index count = block.to - block.from;
       sum += weights_[static_cast<Index>(j)] *
              row_weights_[j].segment(block.from, count).dot(e.segment(block.from, count).cwiseAbs2());
@@ -396,7 +396,7 @@ void Fitter::take_in(Index from, Index count, const std::vector<VectorXd>& row_w
 SquareRootInformation Fitter::information() const {
   SquareRootInformation out(offsets().back());
   for (const std::size_t b : train_blocks()) {
-    const RowRange& block = data_->blocks[b];
+    const LogBlock& block = data_->blocks[b];
     take_in(block.from, block.to - block.from, row_weights_, out);
   }
   return out;

@@ -54,13 +54,13 @@ void strike(Log& log) {
   }
 }
 
-TEST(DiagnosisVerdict, BlowsAboveTheTorquesBandAreSeen) {
-  const json report = diagnosed("blows", {.tamper = strike});
+TEST(DiagnosisVerdict, ImpactsAboveTheTorquesBandAreSeen) {
+  const json report = diagnosed("impacts", {.tamper = strike});
   EXPECT_EQ(report.at("joints").at(0).at("verdict"), "nothing_missing") << report.dump(1);
   const json& elbow = report.at("joints").at(1);
   EXPECT_EQ(elbow.at("verdict"), "unexplained");
   EXPECT_EQ(elbow.at("where").at(0).at("signal"), "t");
-  EXPECT_NE(report.at("notes").dump().find("1.9 blows a second"), std::string::npos) << report.at("notes");
+  EXPECT_NE(report.at("notes").dump().find("1.9 impacts a second"), std::string::npos) << report.at("notes");
 }
 
 TEST(DiagnosisVerdict, TestLogsDecideNothing) {

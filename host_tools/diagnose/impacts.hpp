@@ -9,8 +9,8 @@
 
 namespace fxdyn::diagnosis {
 
-/// Short blows in a joint's torque.
-struct Jolts {
+/// Short impacts in a joint's torque.
+struct Impacts {
   double per_second = 0, healthy = 0;  ///< today; in the healthy session
   double largest = 0;                  ///< above the band [N*m | N] ..
   std::string log;                     ///< .. and where it is
@@ -22,7 +22,8 @@ struct Jolts {
 /// beyond 6 standard deviations (of the log, from its median) counts once every 20 ms. Today's train logs and the
 /// validate logs, where there are any, must each have three times as many a second as the healthy session.
 /// @param healthy the model of `before` @returns by joint; nothing without a healthy session
-std::vector<std::optional<Jolts>> find_jolts(const IdentifiedModel& model, const std::vector<ProcessedLog>& now,
-                                             const IdentifiedModel& healthy, const std::vector<ProcessedLog>& before);
+std::vector<std::optional<Impacts>> find_impacts(const IdentifiedModel& model, const std::vector<ProcessedLog>& now,
+                                                 const IdentifiedModel& healthy,
+                                                 const std::vector<ProcessedLog>& before);
 
 }  // namespace fxdyn::diagnosis

@@ -1,6 +1,6 @@
-// Short blows in a joint's torque, beyond what the healthy session shows.
+// Short impacts in a joint's torque, beyond what the healthy session shows.
 
-#include "host_tools/diagnose/jolts.hpp"
+#include "host_tools/diagnose/impacts.hpp"
 
 #include <gtest/gtest.h>
 
@@ -14,22 +14,22 @@ using Eigen::Index;
 
 constexpr Index joint = 2;
 
-class JoltsTest : public testing::Test {
+class ImpactsTest : public testing::Test {
  protected:
   IdentifiedModel model_ = test::plant_of(read_urdf(test::puma560));
 
-  /// A log with a blow of `size` N*m, one sample long, on one joint every half second.
+  /// A log with an impact of `size` N*m, one sample long, on one joint every half second.
   ProcessedLog log(Role role, std::uint64_t seed, double size = 0) const {
     ProcessedLog out = test::small_log(model_, role, seed);
     for (Index k = 100; k < out.samples(); k += 125) out.tau(k, joint) += size;
     return out;
   }
   auto find(const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before) const {
-    return find_jolts(model_, now, model_, before);
+    return find_impacts(model_, now, model_, before);
   }
 };
 
-TEST_F(JoltsTest, AreFoundOnTheirJoint) {
+TEST_F(ImpactsTest, AreFoundOnTheirJoint) {
   const auto found = find({log(Role::train, 1, 2), log(Role::validate, 2, 2)}, {log(Role::baseline, 3)});
   ASSERT_EQ(found.size(), 6U);
   for (std::size_t j = 0; j < found.size(); ++j) EXPECT_EQ(found[j].has_value(), j == joint) << j;
@@ -38,20 +38,20 @@ TEST_F(JoltsTest, AreFoundOnTheirJoint) {
   EXPECT_NEAR(found[joint]->largest, 2, 0.5);
 }
 
-TEST_F(JoltsTest, AreNoneInNoise) {
+TEST_F(ImpactsTest, AreNoneInNoise) {
   for (const auto& found : find({log(Role::train, 1), log(Role::validate, 2)}, {log(Role::baseline, 3)}))
     EXPECT_FALSE(found.has_value());
 }
 
-TEST_F(JoltsTest, AreNoFindingWhereTheHealthySessionHasThem) {
+TEST_F(ImpactsTest, AreNoFindingWhereTheHealthySessionHasThem) {
   EXPECT_FALSE(find({log(Role::train, 1, 2), log(Role::validate, 2, 2)}, {log(Role::baseline, 3, 2)})[joint]);
 }
 
-TEST_F(JoltsTest, HaveToBeInEveryLogThatJudges) {
+TEST_F(ImpactsTest, HaveToBeInEveryLogThatJudges) {
   EXPECT_FALSE(find({log(Role::train, 1, 2), log(Role::validate, 2)}, {log(Role::baseline, 3)})[joint]);
 }
 
-TEST_F(JoltsTest, NeedAHealthySession) { EXPECT_FALSE(find({log(Role::train, 1, 2)}, {})[joint]); }
+TEST_F(ImpactsTest, NeedAHealthySession) { EXPECT_FALSE(find({log(Role::train, 1, 2)}, {})[joint]); }
 
 }  // namespace
 }  // namespace fxdyn::diagnosis

@@ -1,4 +1,4 @@
-#include "host_tools/diagnose/jolts.hpp"
+#include "host_tools/diagnose/impacts.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -18,12 +18,12 @@ constexpr double together_s = 0.02;
 constexpr double times = 3;       // as many as the healthy session ..
 constexpr double to_be_sure = 3;  // .. and of so many more than it had
 
-/// Blows of one joint in some logs.
+/// Impacts of one joint in some logs.
 struct Count {
-  double blows = 0, seconds = 0;
-  Jolts worst;
+  double impacts = 0, seconds = 0;
+  Impacts worst;
 
-  double per_second() const { return seconds > 0 ? blows / seconds : 0; }
+  double per_second() const { return seconds > 0 ? impacts / seconds : 0; }
 };
 
 void add(Count& to, const ProcessedLog& log, const VectorXd& error) {
@@ -46,17 +46,18 @@ void add(Count& to, const ProcessedLog& log, const VectorXd& error) {
       to.worst.log = log.name;
       to.worst.t = log.t[log.first + k];
     }
-    if (k - last > apart) to.blows += 1;
+    if (k - last > apart) to.impacts += 1;
     last = k;
   }
 }
 
 }  // namespace
 
-std::vector<std::optional<Jolts>> find_jolts(const IdentifiedModel& model, const std::vector<ProcessedLog>& now,
-                                             const IdentifiedModel& healthy, const std::vector<ProcessedLog>& before) {
+std::vector<std::optional<Impacts>> find_impacts(const IdentifiedModel& model, const std::vector<ProcessedLog>& now,
+                                                 const IdentifiedModel& healthy,
+                                                 const std::vector<ProcessedLog>& before) {
   const std::size_t n = model.joints.size();
-  std::vector<std::optional<Jolts>> out(n);
+  std::vector<std::optional<Impacts>> out(n);
   if (before.empty()) return out;
   std::vector<Count> train(n), judges(n), old(n);
   const auto count = [n](const IdentifiedModel& of, const std::vector<ProcessedLog>& logs, auto&& list_of) {
@@ -70,12 +71,12 @@ std::vector<std::optional<Jolts>> find_jolts(const IdentifiedModel& model, const
         [&](const ProcessedLog& log) -> std::vector<Count>& { return log.role == Role::validate ? judges : train; });
   count(healthy, before, [&](const ProcessedLog&) -> std::vector<Count>& { return old; });
   for (std::size_t j = 0; j < n; ++j) {
-    const double allowed = times * (old[j].blows + to_be_sure) / std::max(old[j].seconds, 1e-9);
+    const double allowed = times * (old[j].impacts + to_be_sure) / std::max(old[j].seconds, 1e-9);
     const bool judged = judges[j].seconds > 0;
     if (train[j].per_second() < allowed || (judged && judges[j].per_second() < allowed)) continue;
     const Count& worst = judged && judges[j].worst.largest > train[j].worst.largest ? judges[j] : train[j];
     out[j] = worst.worst;
-    out[j]->per_second = (train[j].blows + judges[j].blows) / (train[j].seconds + judges[j].seconds);
+    out[j]->per_second = (train[j].impacts + judges[j].impacts) / (train[j].seconds + judges[j].seconds);
     out[j]->healthy = old[j].per_second();
   }
   return out;

@@ -1,0 +1,64 @@
+#include "host_tools/diagnose/blocks.hpp"
+
+#include <algorithm>
+
+#include "host_tools/regression/row_ranges.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+std::vector<Fold> folds_of(const Blocks& blocks, bool validated) {
+  if (validated) {
+    Fold fold;
+    fold.fit = blocks.fit;
+    for (std::size_t b = 0; b < blocks.all.size(); ++b) {
+      if (!blocks.all[b].fits) fold.judge.push_back(b);
+    }
+    return {fold};
+  }
+  std::vector<Fold> out;
+  for (std::size_t b = 0; b < blocks.all.size(); ++b) {
+    if (blocks.all[b].healthy) continue;
+    Fold fold;
+    fold.judge = {b};
+    for (const std::size_t other : blocks.fit) {
+      if (other != b) fold.fit.push_back(other);
+    }
+    out.push_back(fold);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<std::size_t> Blocks::fit_of(bool healthy) const {
+  std::vector<std::size_t> out;
+  for (const std::size_t b : fit) {
+    if (all[b].healthy == healthy) out.push_back(b);
+  }
+  return out;
+}
+
+Blocks make_blocks(const std::vector<SessionLog>& logs) {
+  Blocks out;
+  const bool validated = std::any_of(logs.begin(), logs.end(), [](const SessionLog& entry) { return !entry.fits; });
+  const auto fitting =
+      std::count_if(logs.begin(), logs.end(), [](const SessionLog& entry) { return !entry.healthy && entry.fits; });
+  Eigen::Index first = 0;
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    const SessionLog& entry = logs[l];
+    const Eigen::Index count = entry.log.rows();
+    out.of_log.push_back({l, first, count, entry.healthy, entry.fits});
+    const int parts = !validated && fitting == 1 && !entry.healthy ? blocks_of_one_log : 1;
+    for (const RowRange& range : cut({first, count}, parts))
+      out.all.push_back({l, range.first, range.count, entry.healthy, entry.fits});
+    first += count;
+  }
+  for (std::size_t b = 0; b < out.all.size(); ++b) {
+    if (out.all[b].fits) out.fit.push_back(b);
+  }
+  out.folds = folds_of(out, validated);
+  return out;
+}
+
+}  // namespace fxdyn::diagnosis

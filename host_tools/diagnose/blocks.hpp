@@ -1,0 +1,38 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <vector>
+
+#include "host_tools/diagnose/session_log.hpp"
+
+namespace fxdyn::diagnosis {
+
+/// Rows that are used or left out together.
+struct Block {
+  std::size_t log = 0;
+  Eigen::Index first = 0, count = 0;
+  bool healthy = false, fits = true;
+};
+
+/// Places in Blocks::all.
+struct Fold {
+  std::vector<std::size_t> fit, judge;
+};
+
+/// The rows of all logs, one after the other, as blocks and folds. With validate logs there is one fold, which they
+/// judge; else every block of today's session is judged by a fit of all other blocks. A block is a log, but for a
+/// single train log without a validate log, which is cut.
+struct Blocks {
+  std::vector<Block> all;
+  std::vector<Block> of_log;     ///< by log: all of its rows
+  std::vector<std::size_t> fit;  ///< blocks that fit coefficients
+  std::vector<Fold> folds;
+
+  Eigen::Index rows() const { return of_log.back().first + of_log.back().count; }
+  /// Blocks of one session that fit.
+  std::vector<std::size_t> fit_of(bool healthy) const;
+};
+
+Blocks make_blocks(const std::vector<SessionLog>& logs);
+
+}  // namespace fxdyn::diagnosis

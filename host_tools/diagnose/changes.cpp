@@ -1,0 +1,59 @@
+#include "host_tools/diagnose/changes.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <set>
+
+#include "host_tools/effects/effects.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+bool is_changed(const Unknown& u) {
+  constexpr double beyond = 2;  // times what sessions differ by
+  return u.change && u.kind == Unknown::Kind::linear && std::fabs(u.value) >= beyond * u.prior_std;
+}
+
+}  // namespace
+
+std::vector<EffectCandidate> changed_effects(const Linearised& problem) {
+  std::vector<EffectCandidate> out;
+  for (const Unknown& u : problem.unknowns()) {
+    if (!is_changed(u)) continue;
+    const EffectFit& fit = problem.models().current.joints[u.joint].effects[u.effect];
+    // Of these, one that comes on top is the change: torques that add up, with shapes of their own.
+    if (find_effect(fit.effect)->changes_by_one_more) out.push_back({fit.effect, u.joint, fit.shape});
+  }
+  return out;
+}
+
+std::vector<std::string> changed_parameters(const Linearised& problem) {
+  std::vector<std::string> out;
+  const Models& models = problem.models();
+  std::set<std::size_t> joints;
+  for (const Unknown& u : problem.unknowns()) {
+    if (!is_changed(u)) continue;
+    joints.insert(u.joint);
+    const EffectFit& now = models.current.joints[u.joint].effects[u.effect];
+    const Joint& joint = models.current.robot.joints[u.joint];
+    const ParameterInfo& p = find_effect(now.effect)->linear[u.index];
+    const double today = now.linear[u.index];
+    const std::string_view unit = joint.type == JointType::revolute ? p.unit : p.unit_prismatic;
+    out.push_back(fmt::format(
+        "{}: {} ({}) is {:.4g}{}, {:.4g} in the baseline: more than {} differs from session to session, and part of "
+        "the nominal model",
+        joint.name, now.effect, p.name, today, unit == "-" ? "" : " " + std::string(unit), today - u.value,
+        find_effect(now.effect)->friction ? "friction" : "a healthy robot"));
+  }
+  const auto& body = models.current.body;
+  const bool load = std::any_of(body.begin(), body.end(), [](const EffectFit& fit) { return fit.named; });
+  if (load && 2 * joints.size() >= problem.joints()) {
+    out.push_back(
+        fmt::format("friction at {} of {} joints and the load or tilt changed at once: is the baseline of this robot?",
+                    joints.size(), problem.joints()));
+  }
+  return out;
+}
+
+}  // namespace fxdyn::diagnosis

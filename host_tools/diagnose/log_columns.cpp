@@ -1,0 +1,154 @@
+#include "host_tools/diagnose/log_columns.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "host_tools/effects/evaluator.hpp"
+#include "host_tools/support/parallel.hpp"
+#include "model/effects/rotor_inertia.hpp"
+
+namespace fxdyn::diagnosis {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+LogColumns::LogColumns(const Models& models, const std::vector<SessionLog>& logs)
+    : models_(models),
+      logs_(&logs),
+      chain_(to_dh(models_.current.robot)),
+      base_(base_of(models_.current)),
+      motions_(logs.size()),
+      slow_(logs.size()),
+      robot_(logs.size()) {
+  parallel_for(logs.size(), [&](std::size_t l) {
+    const ProcessedLog& log = logs[l].log;
+    MotionRows m = log.motion();
+    motions_[l] = std::make_unique<Motion>(
+        Motion{log.name, log.step_s, log.t, std::move(m.q), std::move(m.dq), std::move(m.ddq)});
+    if (const double cutoff = logs[l].bending_hz; cutoff > 0) {
+      const Motion& all = *motions_[l];
+      const ZeroPhaseFilter filter(cutoff, log.step_s);
+      slow_[l] = std::make_unique<Motion>(
+          Motion{all.name, all.step_s, all.t, filter.apply(all.q), filter.apply(all.dq), filter.apply(all.ddq)});
+    }
+    robot_[l] = std::make_shared<RobotColumns>(with_load_of(log, model(l)), *motions_[l]);
+  });
+}
+
+Index LogColumns::first_base(std::size_t joint) const {
+  const auto first = std::lower_bound(base_.columns.begin(), base_.columns.end(),
+                                      static_cast<Index>(joint) * static_cast<Index>(parameters_per_link));
+  return first - base_.columns.begin();
+}
+
+/// At full rate, by joint; empty for joints that are not asked for.
+std::vector<MatrixXd> LogColumns::base_columns(std::size_t log, const std::vector<std::size_t>& of) const {
+  const Motion& motion = *motions_[log];
+  const Index nb = base_parameters();
+  std::vector<MatrixXd> out(joints());
+  for (const std::size_t j : of) out[j].resize(motion.q.rows(), nb - first_base(j));
+  Regressor regressor(chain_);
+  for (Index k = 0; k < motion.q.rows(); ++k) {
+    const MatrixXd& y = regressor(motion.q.row(k), motion.dq.row(k), motion.ddq.row(k));
+    for (const std::size_t j : of) {
+      for (Index c = first_base(j), i = 0; c < nb; ++c, ++i)
+        out[j](k, i) = y(static_cast<Index>(j), base_.columns[static_cast<std::size_t>(c)]);
+    }
+  }
+  return out;
+}
+
+MatrixXd LogColumns::base_rows(std::size_t log, std::size_t joint) const {
+  const SessionLog& entry = (*logs_)[log];
+  RowCache& cache = *entry.cache;
+  std::call_once(cache.made, [&] {
+    std::vector<std::size_t> all(joints());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    for (const MatrixXd& full : base_columns(log, all))
+      cache.base.push_back(entry.log.decimate(entry.log.filter_columns(full)));
+    cache.features.resize(joints());
+  });
+  if (in_order(model(log).joints[joint], true).empty()) return cache.base[joint];
+  const MatrixXd columns = follow(log, joint, std::move(base_columns(log, {joint})[joint]));
+  return entry.log.decimate(entry.log.filter_columns(columns));
+}
+
+MatrixXd LogColumns::follow(std::size_t log, std::size_t joint, MatrixXd columns) const {
+  for (const EffectFit* effect : in_order(model(log).joints[joint], true)) {
+    const double share = effect->linear[0];
+    if (find_effect(effect->effect)->of_total == OfTotal::clips) {
+      const auto torque = robot_[log]->torque().col(static_cast<Index>(joint)).array().abs();
+      const Eigen::ArrayXd pass =
+          (torque < effect->shape[0] * (1 - 1e-9)).select(Eigen::ArrayXd::Ones(torque.size()), 1 - share);
+      columns = pass.matrix().asDiagonal() * columns;
+      continue;
+    }
+    for (Index c = 0; c < columns.cols(); ++c) {
+      JointSeries series{columns.col(c), columns.col(c), columns.col(c), {}, (*logs_)[log].log.step_s};
+      series.total = columns.col(c);
+      columns.col(c) += share * effect_columns(effect->effect, effect->shape, 1, series);
+    }
+  }
+  return columns;
+}
+
+EffectColumns LogColumns::of(std::size_t log, const EffectCandidate& candidate, const RobotColumns& columns) const {
+  const EffectInfo& info = *find_effect(candidate.effect);
+  if (info.acts_on != ActsOn::torque || info.needs_total) return columns(candidate);
+  EffectColumns out;
+  out.joints.resize(joints());
+  MatrixXd& own = out.joints[candidate.joint];
+  own = columns.phi(candidate);
+  if (info.drifts() && (*logs_)[log].age_s > 0) {
+    // w(t + age) = w(t) + (1 - w(t)) w(age)
+    const double w = -std::expm1(-(*logs_)[log].age_s / candidate.shape[0]);
+    MatrixXd warm(own.rows(), 2);
+    warm << columns.phi({std::string(info.warms_into[0]), candidate.joint, {}}),
+        columns.phi({std::string(info.warms_into[1]), candidate.joint, {}});
+    own = (1 - w) * own + w * warm;
+  }
+  own = follow(log, candidate.joint, std::move(own));
+  return out;
+}
+
+EffectColumns LogColumns::of(std::size_t log, const Group& group) const {
+  return of(log, group.candidate, *robot_with(log, group));
+}
+
+/// Around a model in which some of a joint's inertia is its rotor's: the same torque, but another load on the gear.
+/// What bends is of the motion that is not noise.
+std::shared_ptr<const RobotColumns> LogColumns::robot_with(std::size_t log, const Group& group) const {
+  const bool rotor = group.rotor && group.rotor_inertia != 0, slow = slow_[log] && bends(group.candidate.effect);
+  if (!rotor && !slow) return robot_[log];
+  const std::tuple key(log, rotor ? group.candidate.joint : 0, rotor ? group.rotor_inertia : 0.0, slow);
+  {
+    const std::lock_guard lock(for_group_mutex_);
+    if (const auto known = for_group_.find(key); known != for_group_.end()) return known->second;
+  }
+  IdentifiedModel model = models_.current;
+  if (rotor) {
+    EffectFit fit;
+    fit.effect = RotorInertia::name;
+    fit.linear = {group.rotor_inertia};
+    model.joints[group.candidate.joint].effects.push_back(std::move(fit));
+    take_from_base(model, group.rotor->in_base, group.rotor_inertia);
+  }
+  auto made = std::make_shared<const RobotColumns>(with_load_of((*logs_)[log].log, std::move(model)),
+                                                   slow ? *slow_[log] : *motions_[log]);
+  const std::lock_guard lock(for_group_mutex_);
+  return for_group_.emplace(key, std::move(made)).first->second;
+}
+
+MatrixXd LogColumns::torque_of(std::size_t log, IdentifiedModel model) const {
+  const auto torque = [&](const IdentifiedModel& m, const Motion& motion) {
+    return fxdyn::predict(m, motion.q, motion.dq, motion.ddq, motion.step_s);
+  };
+  model = with_load_of((*logs_)[log].log, std::move(model));
+  const auto stiff = slow_[log] ? stiffened(model) : std::nullopt;
+  if (!stiff) return torque(model, *motions_[log]);
+  return torque(*stiff, *motions_[log]) + torque(model, *slow_[log]) - torque(*stiff, *slow_[log]);
+}
+
+}  // namespace fxdyn::diagnosis

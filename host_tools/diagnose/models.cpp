@@ -1,0 +1,67 @@
+#include "host_tools/diagnose/models.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fxdyn::diagnosis {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+std::pair<double, double> shape_limits(const Models& models, std::size_t joint, const EffectInfo& info,
+                                       const ParameterInfo& shape) {
+  const FilterFit& filter = models.current.filter;
+  if (shape.values.seen_by_encoder && joint < filter.position_noise.size()) {
+    const double step = std::max(filter.encoder_step[joint], std::sqrt(12.0) * filter.position_noise[joint]);
+    return {std::clamp(step, shape.lower, 0.1 * shape.upper), shape.upper};
+  }
+  return {shape.lower, upper_bound(info, shape, models.smallest_step_s)};
+}
+
+BaseSet base_of(const IdentifiedModel& model) {
+  BaseSet base;
+  for (const BaseParameter& parameter : model.base) base.columns.push_back(static_cast<Index>(parameter.column));
+  return base;
+}
+
+bool separates_rotor(std::string_view effect) { return find_effect(effect)->separates_rotor(); }
+
+VectorXd hidden_rotor(const IdentifiedModel& model, std::size_t joint) {
+  if (rotor_of(model.joints[joint]) != nullptr) return {};
+  return rotor_in_base(to_dh(model.robot), base_of(model), static_cast<Index>(joint));
+}
+
+double least_inertia(const IdentifiedModel& model, std::size_t joint, const std::vector<const MatrixXd*>& logs) {
+  constexpr Index poses = 200;
+  const auto n = static_cast<Index>(model.joints.size());
+  const auto j = static_cast<Index>(joint);
+  Regressor regressor(to_dh(model.robot));
+  VectorXd values = VectorXd::Zero(n * static_cast<Index>(parameters_per_link));
+  for (const BaseParameter& parameter : model.base) values[static_cast<Index>(parameter.column)] = parameter.value;
+  const VectorXd still = VectorXd::Zero(n), unit = VectorXd::Unit(n, j);
+  double least = 1e300;
+  for (const MatrixXd* q : logs) {
+    for (Index k = 0; k < q->rows(); k += std::max<Index>(1, q->rows() / poses)) {
+      const double with = regressor(q->row(k), still, unit).row(j) * values;
+      least = std::min(least, with - regressor(q->row(k), still, still).row(j) * values);
+    }
+  }
+  return least < 1e300 ? std::max(0.0, least) : 0;
+}
+
+void add_to_base(IdentifiedModel& model, std::size_t parameter, double step) {
+  BaseParameter& base = model.base[parameter];
+  base.value += step;
+  LinkInertia<Real>& link = model.inertia[base.column / parameters_per_link];
+  auto values = to_array(link);
+  values[base.column % parameters_per_link] += step;
+  link = to_inertia(values);
+}
+
+void take_from_base(IdentifiedModel& model, const VectorXd& rotor_in_base, double inertia) {
+  for (std::size_t k = 0; k < model.base.size(); ++k)
+    add_to_base(model, k, -inertia * rotor_in_base[static_cast<Index>(k)]);
+}
+
+}  // namespace fxdyn::diagnosis

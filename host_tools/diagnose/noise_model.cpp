@@ -1,0 +1,96 @@
+#include "host_tools/diagnose/noise_model.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host_tools/diagnose/autoregression.hpp"
+#include "host_tools/diagnose/velocity_doubt.hpp"
+#include "host_tools/support/parallel.hpp"
+
+namespace fxdyn::diagnosis {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+/// Scale of a row whose doubt is as much as its noise.
+const double half_doubtful = std::sqrt(0.5);
+
+/// Standard deviation of normal noise from its median: what sticks may be far off without being noise.
+double robust_sigma(const Blocks& blocks, const VectorXd& residual) {
+  std::vector<double> magnitude;
+  for (const std::size_t b : blocks.fit) {
+    const Block& block = blocks.all[b];
+    for (Index i = 0; i < block.count; ++i) magnitude.push_back(std::fabs(residual[block.first + i]));
+  }
+  const auto middle = magnitude.begin() + static_cast<std::ptrdiff_t>(magnitude.size() / 2);
+  std::nth_element(magnitude.begin(), middle, magnitude.end());
+  return 1.4826 * *middle;
+}
+
+/// A whitened row is as doubtful as those that it is made of.
+VectorXd whitened_doubt(const Blocks& blocks, const VectorXd& doubt, const VectorXd& whitening) {
+  VectorXd sum = doubt;
+  for (const Block& b : blocks.of_log) {
+    for (Index lag = 1; lag <= whitening.size() && lag < b.count; ++lag)
+      sum.segment(b.first + lag, b.count - lag) +=
+          whitening[lag - 1] * whitening[lag - 1] * doubt.segment(b.first, b.count - lag);
+  }
+  return sum;
+}
+
+}  // namespace
+
+NoiseModel::NoiseModel(const Blocks& blocks, std::vector<VectorXd> whitening, const std::vector<VectorXd>& doubt)
+    : blocks_(blocks), whitening_(std::move(whitening)), row_scale_(doubt.size()) {
+  parallel_for(doubt.size(), [&](std::size_t j) {
+    row_scale_[j] = (1 + whitened_doubt(blocks_, doubt[j], whitening_[j]).array()).sqrt().inverse();
+  });
+}
+
+MatrixXd NoiseModel::apply(std::size_t log, std::size_t joint, const MatrixXd& rows) const {
+  const Block& b = blocks_.of_log[log];
+  return row_scale_[joint].segment(b.first, b.count).asDiagonal() * prewhitened(rows, whitening_[joint]);
+}
+
+bool NoiseModel::is_doubtful(std::size_t joint, Index row) const { return row_scale_[joint][row] < half_doubtful; }
+
+double NoiseModel::doubtful_share(std::size_t joint) const {
+  const auto doubtful = (row_scale_[joint].array() < half_doubtful).count();
+  return static_cast<double>(doubtful) / static_cast<double>(row_scale_[joint].size());
+}
+
+double NoiseModel::log_scale(std::size_t joint) const {
+  double sum = 0;
+  for (const std::size_t b : blocks_.fit)
+    sum += row_scale_[joint].segment(blocks_.all[b].first, blocks_.all[b].count).array().log().sum();
+  return sum;
+}
+
+NoiseModel estimate_noise(const LogColumns& columns, const BlockSolver& solver, const LinearFit& fit,
+                          std::vector<VectorXd> whitening) {
+  const Blocks& blocks = solver.blocks();
+  const std::size_t n = columns.joints();
+  std::vector<VectorXd> coefficients(n), doubts(n);
+  parallel_for(n, [&](std::size_t j) {
+    const auto k = static_cast<Index>(j);
+    const VectorXd e = solver.residual(j, fit);
+    const double sigma = std::max(robust_sigma(blocks, e), 1e-12 / std::sqrt(solver.weights()[k]));
+    doubts[j].resize(blocks.rows());
+    std::vector<VectorXd> parts;
+    for (std::size_t l = 0; l < columns.logs().size(); ++l) {
+      const Block& b = blocks.of_log[l];
+      const VectorXd u = velocity_doubt(columns.logs()[l].log, j, columns.model(l).joints[j],
+                                        columns.motion(l).dq.col(k), columns.robot(l).structural().col(k), sigma);
+      doubts[j].segment(b.first, b.count) = u;
+      const bool use = columns.models().has_baseline ? b.healthy : b.fits;
+      if (use) parts.emplace_back((e.segment(b.first, b.count).array() / (1 + u.array()).sqrt()).matrix());
+    }
+    coefficients[j] = autoregression(parts);
+  });
+  return {blocks, whitening.empty() ? std::move(coefficients) : std::move(whitening), doubts};
+}
+
+}  // namespace fxdyn::diagnosis

@@ -1,0 +1,137 @@
+#include "host_tools/diagnose/refine.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host_tools/diagnose/dictionary.hpp"
+#include "host_tools/diagnose/gain.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/regression/solver.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Tries shapes of one candidate beside the columns of a fit.
+class ShapeSearch {
+ public:
+  ShapeSearch(const Linearised& problem, const LinearFit& beside, const Group& start)
+      : group_(start), problem_(problem), columns_(beside.columns) {
+    MatrixXd gram;
+    problem_.solver().normal(columns_, problem_.blocks().fit, gram, projection_);
+    inverse_ = SymmetricSolver(gram).inverse();
+    best_ = gain(best_columns_);
+    first_ = best_;
+    // A column of an effect on the position costs a simulation.
+    rounds_ = find_effect(start.candidate.effect)->acts_on == ActsOn::torque ? 4 : 2;
+  }
+
+  /// @param value of group(), see below
+  void search(double& value, double ratio, double least, double most) {
+    std::vector<MatrixXd> made;
+    for (int round = 0; round < rounds_; ++round, ratio = std::sqrt(ratio)) {
+      const double centre = value;
+      double next = centre;
+      for (const double there : {std::max(least, centre / ratio), std::min(most, centre * ratio)}) {
+        value = there;
+        const double square = gain(made);
+        if (square <= best_) continue;
+        best_ = square;
+        next = there;
+        best_columns_ = made;
+      }
+      value = next;
+    }
+  }
+
+  /// The candidate as it is tried next.
+  Group& group() { return group_; }
+  std::optional<Refined> result() {
+    if (best_ <= first_) return std::nullopt;
+    return Refined{group_, std::move(best_columns_)};
+  }
+
+ private:
+  /// @param made its columns
+  double gain(std::vector<MatrixXd>& made) const {
+    made = problem_.make(group_);
+    Reduced reduced;
+    reduced.gram = MatrixXd::Zero(group_.count, group_.count);
+    reduced.projection = VectorXd::Zero(group_.count);
+    MatrixXd cross = MatrixXd::Zero(static_cast<Index>(columns_.size()), group_.count);
+    for (std::size_t j = 0; j < problem_.joints(); ++j) {
+      if (made[j].size() > 0) add_products(j, made[j], reduced, cross);
+    }
+    reduced.size = reduced.gram.diagonal();
+    const MatrixXd z = inverse_ * cross;
+    reduced.gram -= cross.transpose() * z;
+    reduced.projection -= z.transpose() * projection_;
+    return gain_of(reduced, group_.lower, is_share(group_)).square;
+  }
+
+  /// @param cross between the fit's columns and the candidate's
+  void add_products(std::size_t joint, const MatrixXd& made, Reduced& reduced, MatrixXd& cross) const {
+    const JointRows& rows = problem_.solver().rows(joint);
+    const double w = problem_.solver().weights()[static_cast<Index>(joint)];
+    for (const std::size_t b : problem_.blocks().fit) {
+      const Block& block = problem_.blocks().all[b];
+      if (block.healthy) continue;
+      const auto c = made.middleRows(block.first, block.count);
+      reduced.gram += w * c.transpose() * c;
+      reduced.projection += w * c.transpose() * rows.y.segment(block.first, block.count);
+      for (std::size_t i = 0; i < columns_.size(); ++i) {
+        const Index local = rows.place(columns_[i]);
+        if (local >= 0)
+          cross.row(static_cast<Index>(i)) += w * rows.x.col(local).segment(block.first, block.count).transpose() * c;
+      }
+    }
+    const auto extra = made.bottomRows(rows.extra_y.size());
+    reduced.gram += w * extra.transpose() * extra;
+    reduced.projection += w * extra.transpose() * rows.extra_y;
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      const Index local = rows.place(columns_[i]);
+      if (local >= 0 && extra.rows() > 0)
+        cross.row(static_cast<Index>(i)) += w * rows.extra_x.col(local).transpose() * extra;
+    }
+  }
+
+  Group group_;
+  const Linearised& problem_;
+  const std::vector<Index>& columns_;
+  MatrixXd inverse_;
+  VectorXd projection_;
+  std::vector<MatrixXd> best_columns_;
+  double best_ = 0, first_ = 0;
+  int rounds_ = 0;
+};
+
+/// First step of the search: a cell of a ripple's grid, else half as much again.
+double first_ratio(const Linearised& problem, const EffectCandidate& candidate, std::size_t shape) {
+  if (!find_effect(candidate.effect)->of_spectrum()) return 1.5;
+  double range = 1e-9;
+  for (const SessionLog& entry : problem.logs())
+    range = std::max(range, entry.log.q_range[static_cast<Index>(candidate.joint)]);
+  return 1 + 1.0 / (range * candidate.shape[shape]);
+}
+
+}  // namespace
+
+std::optional<Refined> refined(const Linearised& problem, const LinearFit& beside, const Group& start) {
+  const int searched = searched_shape(start.candidate);
+  if (searched < 0 && !start.rotor) return std::nullopt;
+  ShapeSearch search(problem, beside, start);
+  if (searched >= 0) {
+    const auto index = static_cast<std::size_t>(searched);
+    const EffectInfo& info = *find_effect(start.candidate.effect);
+    const auto [least, most] = shape_limits(problem.models(), start.candidate.joint, info, info.shape[index]);
+    search.search(search.group().candidate.shape[index], first_ratio(problem, start.candidate, index), least, most);
+  }
+  double& inertia = search.group().rotor_inertia;
+  if (inertia > 0) search.search(inertia, 1.25, 0, 1.1 * inertia);
+  return search.result();
+}
+
+}  // namespace fxdyn::diagnosis

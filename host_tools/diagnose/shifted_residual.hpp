@@ -1,0 +1,19 @@
+#pragma once
+
+#include <Eigen/Dense>
+
+#include "host_tools/diagnose/blocks.hpp"
+#include "host_tools/support/random.hpp"
+
+namespace fxdyn::diagnosis {
+
+/// The residual of a block at other times, its end followed by its beginning: the same noise, which has nothing to do
+/// with the motion. Moved by a random part of the block, not by less than 8 % either way.
+inline void shift(Random& random, const Eigen::VectorXd& residual, const Block& block,
+                  Eigen::Ref<Eigen::VectorXd> out) {
+  const auto by = static_cast<Eigen::Index>(random.uniform(0.08, 0.92) * static_cast<double>(block.count));
+  out.segment(block.first, block.count - by) = residual.segment(block.first + by, block.count - by);
+  out.segment(block.first + block.count - by, by) = residual.segment(block.first, by);
+}
+
+}  // namespace fxdyn::diagnosis

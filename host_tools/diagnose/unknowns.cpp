@@ -1,0 +1,284 @@
+#include "host_tools/diagnose/unknowns.hpp"
+#include "model/effects/coulomb.hpp"
+#include "model/effects/offset.hpp"
+#include "model/effects/payload.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::Index;
+
+/// Friction differs from session to session by this share of itself (standard deviation) without anything being wrong.
+constexpr double friction_change = 0.3;
+/// Likewise the offset, as a share of Coulomb friction.
+constexpr double offset_change = 0.05;
+/// What a parameter that is zero may change by, of rated torque.
+constexpr double smallest_change = 1e-3;
+/// What a rotor may have of the inertia that rated torque and largest acceleration stand for (standard deviation).
+constexpr double rotor_share = 0.3;
+/// A share that is 1 by definition.
+constexpr double share_std = 1e-3;
+
+bool is_shape_free(const EffectInfo& info, std::size_t i) {
+  // A time constant from one session's start is a guess by its end: the gate chooses it.
+  return info.shape[i].name != "joint" && info.shape[i].name != "ratio" && info.shape[i].name != "time_constant";
+}
+
+EffectFit& effect_of(IdentifiedModel& model, const Unknown& u) {
+  return u.body ? model.body[u.effect] : model.joints[u.joint].effects[u.effect];
+}
+
+double& value_of(IdentifiedModel& model, const Unknown& u) {
+  EffectFit& fit = effect_of(model, u);
+  return u.kind == Unknown::Kind::shape ? fit.shape[u.index] : fit.linear[u.index];
+}
+
+bool is_moment(const EffectFit& fit, const Unknown& u) {
+  return fit.effect == Payload::name && u.kind == Unknown::Kind::linear && u.index > 0;
+}
+
+/// Value of an unknown in a model: payload's centre counts as first moment.
+double read(const IdentifiedModel& model, const Unknown& u) {
+  const EffectFit& fit = effect_of(model, u);
+  return is_moment(fit, u) ? fit.linear[0] * fit.linear[u.index] : fit.linear[u.index];
+}
+
+/// The list of unknowns as it grows.
+class Builder {
+ public:
+  explicit Builder(const Models& models)
+      : models_(models), now_(models.current), common_(models.of(models.has_baseline)) {}
+
+  Unknowns build() {
+    add_base();
+    for (std::size_t j = 0; j < now_.joints.size(); ++j) {
+      add_width(j);
+      add_nominal_effects(j);
+    }
+    for (Index i = 0; i < size(); ++i) out_.nuisance.push_back(i);
+    for (std::size_t j = 0; j < now_.joints.size(); ++j) {
+      const std::vector<EffectFit>& effects = now_.joints[j].effects;
+      for (std::size_t e = 0; e < effects.size(); ++e) {
+        if (effects[e].named && !is_in(models_.fixed, j, effects[e])) add_named(effects[e], {false, j, e});
+      }
+    }
+    for (std::size_t e = 0; e < now_.body.size(); ++e) {
+      if (now_.body[e].named) add_named(now_.body[e], {true, 0, e});
+    }
+    return std::move(out_);
+  }
+
+ private:
+  static bool is_in(const std::vector<EffectCandidate>& list, std::size_t joint, const EffectFit& fit) {
+    return std::any_of(list.begin(), list.end(),
+                       [&](const EffectCandidate& c) { return c.joint == joint && c.effect == fit.effect; });
+  }
+  Index size() const { return static_cast<Index>(out_.all.size()); }
+
+  void add_base() {
+    for (std::size_t k = 0; k < now_.base.size(); ++k) {
+      Unknown u;
+      u.index = k;
+      u.value = now_.base[k].value;
+      out_.all.push_back(u);
+    }
+  }
+
+  void add_width(std::size_t joint) {
+    const std::vector<EffectFit>& effects = now_.joints[joint].effects;
+    const bool signs = std::any_of(effects.begin(), effects.end(), [](const EffectFit& fit) {
+      return !fit.named && find_effect(fit.effect)->uses_sign;
+    });
+    if (!signs) return;
+    Unknown u;
+    u.kind = Unknown::Kind::width;
+    u.joint = joint;
+    out_.all.push_back(u);
+  }
+
+  void add_nominal_effects(std::size_t joint) {
+    const std::vector<EffectFit>& effects = now_.joints[joint].effects;
+    std::size_t unnamed = 0;  // both models have the unnamed ones in one order
+    for (std::size_t e = 0; e < effects.size(); ++e) {
+      if (effects[e].named) continue;
+      Unknown u;
+      u.joint = joint;
+      u.effect = e;
+      u.healthy_effect = models_.has_baseline ? unnamed++ : e;
+      if (is_in(models_.fixed, joint, effects[e]) || is_in(models_.held, joint, effects[e])) continue;
+      add_coefficients(u);
+      add_shapes(u);
+    }
+  }
+
+  void add_coefficients(Unknown u) {
+    const JointFit& joint = now_.joints[u.joint];
+    const EffectFit& fit = joint.effects[u.effect];
+    const EffectInfo& info = *find_effect(fit.effect);
+    for (u.index = 0; u.index < info.linear.size(); ++u.index) {
+      Unknown shared = u;
+      shared.kind = Unknown::Kind::linear;
+      shared.value = common_.joints[u.joint].effects[u.healthy_effect].linear[u.index];
+      if (in_base(fit.effect)) make_rotor(shared);
+      out_.all.push_back(shared);
+      if (!models_.has_baseline || in_base(fit.effect)) continue;
+      Unknown change = u;
+      change.kind = Unknown::Kind::linear;
+      change.change = true;
+      change.prior_std = usual_change(shared, info.linear[u.index]);
+      change.value = fit.linear[u.index] - shared.value;
+      out_.all.push_back(change);
+    }
+  }
+
+  /// An inertia that the base parameters have as well. Where the load is inertia alone nothing separates them.
+  void make_rotor(Unknown& u) const {
+    const auto rotor =
+        std::find_if(models_.rotors.begin(), models_.rotors.end(), [&](const Rotor& r) { return r.joint == u.joint; });
+    if (rotor == models_.rotors.end()) return;
+    const JointFit& joint = now_.joints[u.joint];
+    u.kind = Unknown::Kind::rotor;
+    u.in_base = rotor->in_base;
+    u.prior = rotor->inertia;
+    u.prior_std = rotor->std > 0 ? rotor->std : rotor_share * joint.rated_torque / std::max(joint.ddq_limit, 1e-9);
+  }
+
+  /// Standard deviation of a coefficient from one healthy session to the next.
+  double usual_change(const Unknown& shared, const ParameterInfo& parameter) const {
+    const JointFit& joint = now_.joints[shared.joint];
+    const EffectFit* coulomb = common_.joints[shared.joint].find(Coulomb::name);
+    // Of motions of unit size: a coefficient's own scale.
+    double scale = friction_change * std::fabs(shared.value);
+    if (joint.effects[shared.effect].effect == Offset::name && coulomb != nullptr)
+      scale += offset_change * std::fabs(coulomb->linear[0]);
+    const double motion = parameter.quantity == Quantity::velocity ? joint.dq_limit : 1.0;
+    return std::hypot(scale, smallest_change * joint.rated_torque / std::max(motion, 1e-9));
+  }
+
+  /// @returns how many
+  int add_shapes(Unknown u) {
+    const EffectInfo& info = *find_effect(diagnosis::effect_of(now_, u).effect);
+    int count = 0;
+    u.kind = Unknown::Kind::shape;
+    for (u.index = 0; u.index < info.shape.size(); ++u.index) {
+      if (!is_shape_free(info, u.index)) continue;
+      std::tie(u.lower, u.upper) = shape_limits(models_, u.joint, info, info.shape[u.index]);
+      out_.all.push_back(u);
+      ++count;
+    }
+    return count;
+  }
+
+  void add_named(const EffectFit& fit, const EffectId& id) {
+    const EffectInfo& info = *find_effect(fit.effect);
+    Group group;
+    group.candidate = {fit.effect, id.joint, fit.shape};
+    group.on_body = id.body;
+    group.in_model = true;
+    group.id = id;
+    group.first = size();
+    Unknown effect;
+    effect.joint = id.joint;
+    effect.effect = id.effect;
+    effect.body = id.body;
+    for (std::size_t i = 0; i < info.linear.size(); ++i) {
+      Unknown u = effect;
+      u.kind = Unknown::Kind::linear;
+      u.index = i;
+      u.value = read(now_, u);
+      if (info.linear[i].name == "share") {
+        u.prior = 1;
+        u.prior_std = share_std;
+      }
+      out_.all.push_back(u);
+      group.lower.push_back(info.linear[i].lower);
+    }
+    group.nonlinear = add_shapes(effect);
+    group.lower.resize(group.lower.size() + static_cast<std::size_t>(group.nonlinear), -1e300);
+    group.count = size() - group.first;
+    out_.named.push_back(std::move(group));
+  }
+
+  const Models& models_;
+  const IdentifiedModel &now_, &common_;
+  Unknowns out_;
+};
+
+}  // namespace
+
+std::vector<Prior> Unknowns::priors() const {
+  std::vector<Prior> out;
+  for (const Unknown& u : all) out.push_back({u.prior, u.prior_std});
+  return out;
+}
+
+Unknowns make_unknowns(const Models& models) { return Builder(models).build(); }
+
+const EffectFit& effect_of(const IdentifiedModel& model, const Unknown& u) {
+  return u.body ? model.body[u.effect] : model.joints[u.joint].effects[u.effect];
+}
+
+Unknown in_healthy(Unknown u) {
+  u.effect = u.healthy_effect;
+  return u;
+}
+
+void add_to(IdentifiedModel& model, const Unknown& u, double step) {
+  switch (u.kind) {
+    case Unknown::Kind::base:
+      add_to_base(model, u.index, step);
+      return;
+    case Unknown::Kind::rotor:
+      value_of(model, u) += step;
+      take_from_base(model, u.in_base, step);
+      return;
+    case Unknown::Kind::width:
+      model.joints[u.joint].sign_width *= std::exp(step);
+      return;
+    case Unknown::Kind::shape: {
+      const ParameterInfo& info = find_effect(effect_of(model, u).effect)->shape[u.index];
+      double& value = value_of(model, u);
+      value = std::clamp(value * std::exp(step), std::max(info.lower, u.lower), std::min(info.upper, u.upper));
+      return;
+    }
+    case Unknown::Kind::linear: {
+      const EffectFit& fit = effect_of(model, u);
+      if (is_moment(fit, u)) {
+        value_of(model, u) += step / fit.linear[0];
+      } else {
+        value_of(model, u) += step;
+      }
+      return;
+    }
+  }
+}
+
+void update(Models& models, const std::vector<Unknown>& unknowns, const LinearFit& fit, double share) {
+  constexpr double longest_step = 0.4;  // of a logarithm
+  for (std::size_t i = 0; i < fit.columns.size(); ++i) {
+    const auto c = static_cast<std::size_t>(fit.columns[i]);
+    if (c >= unknowns.size()) continue;
+    const Unknown& u = unknowns[c];
+    double step = share * (fit.x[static_cast<Index>(i)] - u.value);
+    if (u.is_logarithm()) step = std::clamp(step, -longest_step, longest_step);
+    // Payload's mass first: its centre is first moment over mass.
+    if (!u.change && u.kind == Unknown::Kind::linear && u.body && u.index == 0 &&
+        effect_of(models.current, u).effect == Payload::name) {
+      EffectFit& load = models.current.body[u.effect];
+      const double mass = std::max(least_mass, load.linear[0] + step);
+      for (std::size_t k = 1; k < load.linear.size(); ++k) load.linear[k] *= load.linear[0] / mass;
+      load.linear[0] = mass;
+      continue;
+    }
+    add_to(models.current, u, step);
+    const bool named =
+        u.kind != Unknown::Kind::base && u.kind != Unknown::Kind::width && effect_of(models.current, u).named;
+    if (models.has_baseline && !u.change && !named) add_to(models.healthy, in_healthy(u), step);
+  }
+}
+
+}  // namespace fxdyn::diagnosis

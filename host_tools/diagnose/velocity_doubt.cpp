@@ -1,0 +1,82 @@
+#include "host_tools/diagnose/velocity_doubt.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/regression/encoder_noise.hpp"
+#include "model/effects/coulomb.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// Times white noise's: an encoder at standstill repeats its error.
+constexpr double repeats = 2;
+
+/// All friction that turns with the sign, some of it in proportion to the load.
+struct SignFriction {
+  double amplitude = 0, of_load = 0;
+};
+
+SignFriction sign_friction(const JointFit& fit, const EffectFit& coulomb) {
+  SignFriction out{std::fabs(coulomb.linear[0]), 0};
+  for (const EffectInfo& info : effect_infos()) {
+    const EffectFit* more = info.nominal ? nullptr : fit.find(info.name);
+    if (more == nullptr || info.turns_with_sign == TurnsWithSign::no) continue;
+    (info.turns_with_sign == TurnsWithSign::load ? out.of_load : out.amplitude) += std::fabs(more->linear[0]);
+  }
+  return out;
+}
+
+/// RMS error of the velocity by how fast the joint moves.
+struct VelocityError {
+  double white = 0;  ///< whatever the velocity is
+  double slow = 0;   ///< steps come more slowly than the filter below this
+
+  double operator()(double dq) const {
+    const double stairs = slow > 0 ? slow * std::exp(-0.125 * dq * dq / (slow * slow)) : 0;
+    return std::sqrt(white * white + 2 * stairs * stairs);
+  }
+};
+
+}  // namespace
+
+VectorXd velocity_doubt(const ProcessedLog& log, std::size_t joint, const JointFit& friction,
+                        const Eigen::Ref<const VectorXd>& velocity, const Eigen::Ref<const VectorXd>& load,
+                        double sigma) {
+  const EffectFit* coulomb = friction.find(Coulomb::name);
+  if (coulomb == nullptr || log.measured_dq.size() > 0 || !(position_noise(log.filter, joint) > 0))
+    return VectorXd::Zero(log.rows());
+  const VelocityError error{repeats * velocity_noise(log.filter, joint, log.step_s),
+                            position_band(log.filter, log.step_s) * log.filter.encoder_step[joint]};
+  const double width = friction.sign_width;
+  const auto [amplitude, of_load] = sign_friction(friction, *coulomb);
+  VectorXd uncertain(log.samples());
+  Index still = 0;  // samples so far
+  const auto come_loose = [&](Index k) {
+    if (still > log.decimation)
+      uncertain.segment(k - still, still) *= static_cast<double>(still) / static_cast<double>(log.decimation);
+    still = 0;
+  };
+  for (Index k = 0; k < log.samples(); ++k) {
+    const double dq = std::fabs(velocity[k]), s = error(dq);
+    // the mean slope over what the velocity may be
+    const double slope = 0.5 * (std::tanh((dq + s) / width) - std::tanh((dq - s) / width));
+    const double wrong = std::min(1.0, s * s / (width * width)) * 2 * std::erfc(dq / (s * std::numbers::sqrt2));
+    const double torque = (amplitude + of_load * std::fabs(load[k])) / sigma;
+    uncertain[k] = torque * torque * std::max(slope * slope, wrong);
+    if (dq < s) {
+      ++still;
+    } else {
+      come_loose(k);
+    }
+  }
+  come_loose(log.samples());
+  return log.decimate(log.filter_columns(uncertain)).col(0).cwiseMax(0);
+}
+
+}  // namespace fxdyn::diagnosis

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <Eigen/Dense>
+
+#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/regression/dataset.hpp"
+
+namespace fxdyn::diagnosis {
+
+/// Variance of the friction torque that an uncertain velocity makes, in units of the noise's variance:
+///   u = E[(tau(dq + sigma_dq n) - tau(dq))^2] / sigma^2, n of variance 1.
+/// While sigma_dq is small beside the sign's width its slope counts; else the chance of the wrong sign,
+///   4 F^2 Phi(-|dq| / sigma_dq), F the friction that turns with it.
+/// A joint that stands still (|dq| < sigma_dq) bears any friction up to F, and for as long: its rows have one error
+/// between them, so that of N rows each counts like one of N times the variance.
+/// sigma_dq is what the position filter leaves of the encoder's noise. An encoder that steps more slowly than the
+/// filter is a staircase, no white noise: its velocity is wrong by sqrt(2) cutoff step.
+/// @param joint its friction @param dq, load of the joint at full rate @param sigma RMS of the residual's noise
+/// @returns filtered and decimated; zeros where the velocity is measured or the joint has no friction
+Eigen::VectorXd velocity_doubt(const ProcessedLog& log, std::size_t joint, const JointFit& friction,
+                               const Eigen::Ref<const Eigen::VectorXd>& dq,
+                               const Eigen::Ref<const Eigen::VectorXd>& load, double sigma);
+
+}  // namespace fxdyn::diagnosis

@@ -1,0 +1,64 @@
+// The rows of logs as blocks and folds.
+
+#include "host_tools/diagnose/blocks.hpp"
+
+#include <gtest/gtest.h>
+
+#include "host_tools/regression/row_ranges.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Places = std::vector<std::size_t>;
+
+SessionLog log(bool healthy, bool fits, Eigen::Index rows = 50) {
+  SessionLog out;
+  out.log.first = 10;
+  out.log.last = 10 + rows;
+  out.healthy = healthy;
+  out.fits = fits;
+  return out;
+}
+
+TEST(RowRanges, AreCutWithoutAGap) {
+  const std::vector<RowRange> parts = cut({100, 52}, 5);
+  ASSERT_EQ(parts.size(), 5U);
+  Eigen::Index next = 100;
+  for (const RowRange& part : parts) {
+    EXPECT_EQ(part.first, next);
+    EXPECT_NEAR(static_cast<double>(part.count), 10.4, 1);
+    next += part.count;
+  }
+  EXPECT_EQ(next, 152);
+}
+
+TEST(BlocksOfLogs, ValidateLogsJudgeAll) {
+  const Blocks blocks = make_blocks({log(false, true), log(false, false), log(true, true)});
+  ASSERT_EQ(blocks.all.size(), 3U);
+  EXPECT_EQ(blocks.rows(), 150);
+  EXPECT_EQ(blocks.fit, (Places{0, 2}));
+  ASSERT_EQ(blocks.folds.size(), 1U);
+  EXPECT_EQ(blocks.folds[0].fit, (Places{0, 2}));
+  EXPECT_EQ(blocks.folds[0].judge, (Places{1}));
+  EXPECT_EQ(blocks.fit_of(true), (Places{2}));
+  EXPECT_EQ(blocks.fit_of(false), (Places{0}));
+}
+
+TEST(BlocksOfLogs, SeveralTrainLogsJudgeOneAnother) {
+  const Blocks blocks = make_blocks({log(false, true), log(false, true), log(true, true)});
+  ASSERT_EQ(blocks.folds.size(), 2U);  // the healthy session never judges
+  EXPECT_EQ(blocks.folds[1].fit, (Places{0, 2}));
+  EXPECT_EQ(blocks.folds[1].judge, (Places{1}));
+}
+
+TEST(BlocksOfLogs, ASingleTrainLogIsCut) {
+  const Blocks blocks = make_blocks({log(false, true)});
+  EXPECT_EQ(blocks.all.size(), 5U);
+  EXPECT_EQ(blocks.of_log.size(), 1U);
+  ASSERT_EQ(blocks.folds.size(), 5U);
+  EXPECT_EQ(blocks.folds[2].fit, (Places{0, 1, 3, 4}));
+  EXPECT_EQ(blocks.folds[2].judge, (Places{2}));
+}
+
+}  // namespace
+}  // namespace fxdyn::diagnosis

@@ -1,0 +1,90 @@
+// What a link encoder shows between motor and link.
+
+#include "host_tools/diagnose/deflection.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/diagnose/small_problem.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index joint = 1;  // the shoulder bears most of the arm
+
+class DeflectionOfAGear : public testing::Test {
+ protected:
+  DeflectionOfAGear() : model_(test::fitted_puma()) {
+    for (JointFit& fit : model_.joints) fit.effects.clear();
+  }
+  /// A log with a link encoder at one joint, q - qlink = f(q, load) + noise of 1e-5 rad.
+  template <class F>
+  ProcessedLog log(Role role, std::uint64_t seed, F f) const {
+    ProcessedLog out = test::small_session_log(model_, role, seed).log;
+    const VectorXd load = predict(model_, out).col(joint);
+    out.qlink = out.q;
+    out.has_link.assign(6, false);
+    out.has_link[joint] = true;
+    Random random(seed + 50);
+    for (Index k = 0; k < out.samples(); ++k)
+      out.qlink(k, joint) -= 0.01 + f(out.q(k, joint), load[k]) + 1e-5 * random.normal();
+    return out;
+  }
+  /// The load as the model has it.
+  Deflections find(const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before = {}) {
+    return find_deflections(model_, MatrixXd(), now, before, background_);
+  }
+
+  IdentifiedModel model_;
+  std::vector<DeflectionEffect> background_;
+};
+
+double bent(double, double load) { return 1e-4 * load; }
+double straight(double, double) { return 0; }
+
+TEST_F(DeflectionOfAGear, InProportionToTheLoadIsAnElasticity) {
+  const Deflections found = find({log(Role::train, 1, bent), log(Role::validate, 2, bent)});
+  ASSERT_EQ(found.found.size(), 1U);
+  const DeflectionEffect& effect = found.found[0];
+  EXPECT_EQ(effect.joint, 1U);
+  EXPECT_EQ(effect.fit.effect, "elasticity");
+  EXPECT_NEAR(effect.fit.linear[0], 1e-4, 2e-6);
+  EXPECT_GT(effect.closure, 0.95);
+  EXPECT_TRUE(effect.held_out);
+  EXPECT_TRUE(background_.empty());
+}
+
+TEST_F(DeflectionOfAGear, OnceATurnIsAnEccentricity) {
+  const auto wheel = [](double q, double) { return 3e-4 * std::cos(q) - 2e-4 * std::sin(q); };
+  const Deflections found = find({log(Role::train, 1, wheel), log(Role::validate, 2, wheel)});
+  ASSERT_EQ(found.found.size(), 1U);
+  EXPECT_EQ(found.found[0].fit.effect, "eccentricity");
+  std::vector<double> size = found.found[0].fit.linear;
+  EXPECT_NEAR(std::hypot(size[0], size[1]), std::hypot(3e-4, 2e-4), 1e-5);
+}
+
+TEST_F(DeflectionOfAGear, ThatBentBeforeIsTheBackground) {
+  const Deflections found =
+      find({log(Role::train, 1, bent), log(Role::validate, 2, bent)}, {log(Role::baseline, 3, bent)});
+  EXPECT_TRUE(found.found.empty());
+  ASSERT_EQ(background_.size(), 1U);
+  EXPECT_EQ(background_[0].fit.effect, "elasticity");
+}
+
+TEST_F(DeflectionOfAGear, IsNoneInTheNoiseOfTheEncoders) {
+  const Deflections found = find({log(Role::train, 1, straight), log(Role::validate, 2, straight)});
+  EXPECT_TRUE(found.found.empty());
+  EXPECT_TRUE(found.notes.empty());
+}
+
+TEST_F(DeflectionOfAGear, AloneIsJudgedByItsOwnRows) {
+  const Deflections found = find({log(Role::train, 1, bent)});
+  ASSERT_EQ(found.found.size(), 1U);
+  EXPECT_FALSE(found.found[0].held_out);
+}
+
+}  // namespace
+}  // namespace fxdyn::diagnosis

@@ -1,0 +1,82 @@
+// Names on data that fitted no coefficient, and what diagnosis.json says of them.
+
+#include "host_tools/diagnose/gate.hpp"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "host_tools/diagnose/verdict.hpp"
+#include "tests/diagnose/small_problem.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using nlohmann::json;
+
+/// A PUMA 560 that has a ripple at joint 2, and a model with that and a spring at joint 3, which it does not have.
+class NamesAtTheGate : public testing::Test {
+ protected:
+  NamesAtTheGate() : nominal_(test::fitted_puma()) {
+    IdentifiedModel robot = nominal_;
+    robot.joints[1].effects.push_back(test::effect("ripple", {14}, {0.5, 0.2}));
+    for (const auto& [role, seed] : {std::pair{Role::train, 1}, std::pair{Role::validate, 2}}) {
+      logs_.push_back(test::small_session_log(robot, role, static_cast<std::uint64_t>(seed)));
+      processed_.push_back(logs_.back().log);
+    }
+    outcome_.models = test::around(nominal_);
+    auto& joints = outcome_.models.current.joints;
+    joints[1].effects.push_back(test::named_effect("ripple", {14}, {0.5, 0.2}));
+    joints[2].effects.push_back(test::named_effect("spring", {}, {0.01, 0}));
+    outcome_.found = {{{false, 1, joints[1].effects.size() - 1}, 100, {}},
+                      {{false, 2, joints[2].effects.size() - 1}, 10, {}}};
+    outcome_.whitening = test::no_whitening();
+    outcome_.not_identifiable.resize(7);
+    outcome_.look_again(logs_);
+  }
+
+  IdentifiedModel nominal_;
+  std::vector<SessionLog> logs_;
+  std::vector<ProcessedLog> processed_;
+  Outcome outcome_;
+  const std::vector<bool> still_ = std::vector<bool>(6, false);
+};
+
+TEST_F(NamesAtTheGate, OnlyWhatBringsSomethingStays) {
+  const Gate gate = pass(outcome_, nominal_, logs_, still_);
+  ASSERT_EQ(gate.groups.size(), 1U);
+  ASSERT_EQ(outcome_.found.size(), 1U);
+  EXPECT_EQ(outcome_.problem->groups()[gate.groups[0]].candidate.effect, "ripple");
+  EXPECT_EQ(outcome_.models.current.joints[2].find("spring"), nullptr);
+  EXPECT_GT(gate.closure[1], 0.9);
+  EXPECT_TRUE(gate.accepted[1]);
+  EXPECT_FALSE(gate.remains[1]);
+  EXPECT_GT(gate.held.before[1], 1.5 * gate.held.after[1]);
+  EXPECT_NEAR(gate.held.alone[0][1], gate.held.before[1] - gate.held.after[1], 0.1 * gate.held.before[1]);
+  EXPECT_EQ(gate.place(*outcome_.problem, outcome_.found[0].id), 0U);
+
+  const Deflections no_deflections;
+  const std::vector<std::optional<Impacts>> no_impacts(6);
+  const std::vector<ProcessedLog> no_test;
+  const json report = verdicts(
+      {nominal_, outcome_.models.current, outcome_, gate, no_deflections, no_impacts, still_, processed_, no_test});
+  EXPECT_EQ(report.at("verdict"), "effects_found") << report.dump(1);
+  EXPECT_EQ(report.at("gate"), "validate logs");
+  const json& joint = report.at("joints").at(1);
+  EXPECT_EQ(joint.at("verdict"), "effects_found");
+  ASSERT_EQ(joint.at("effects").size(), 1U);
+  EXPECT_EQ(joint.at("effects").at(0).at("effect"), "ripple");
+  EXPECT_LT(joint.at("gap_after"), 0.3 * joint.at("gap_before").get<double>());
+  EXPECT_EQ(report.at("joints").at(2).at("verdict"), "nothing_missing");
+}
+
+TEST(WhatJudges, IsNamed) {
+  ProcessedLog train, validate;
+  validate.role = Role::validate;
+  EXPECT_EQ(gate_of({train, validate}), "validate logs");
+  EXPECT_EQ(gate_of({train, train}), "train logs, each judged by coefficients fitted to the others");
+  EXPECT_EQ(gate_of({train}), "blocks of the train log, each judged by coefficients fitted to the others");
+}
+
+}  // namespace
+}  // namespace fxdyn::diagnosis

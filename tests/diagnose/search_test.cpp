@@ -1,0 +1,96 @@
+// The search on one log of a PUMA 560: what it finds, and that noise alone is nothing.
+
+#include "host_tools/diagnose/search.hpp"
+
+#include <fmt/ranges.h>
+#include <gtest/gtest.h>
+
+#include "tests/diagnose/small_problem.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+class SearchOfEffects : public testing::Test {
+ protected:
+  SearchOfEffects() : model_(test::fitted_puma()) {}
+
+  /// Searches logs of a robot with `more` at a joint; candidates: the shapes that are given, and ripples.
+  Choice run(std::size_t joint, const std::vector<EffectFit>& more, const std::vector<EffectCandidate>& candidates) {
+    IdentifiedModel robot = model_;
+    for (const EffectFit& fit : more) robot.joints[joint].effects.push_back(fit);
+    logs_ = {test::small_session_log(robot, Role::train, 1), test::small_session_log(robot, Role::train, 2)};
+    problem_ = std::make_unique<Linearised>(test::around(model_), logs_, test::no_whitening());
+    std::vector<Group> groups;
+    for (const EffectCandidate& candidate : candidates) {
+      Group group;
+      group.candidate = candidate;
+      group.nonlinear = 1;
+      for (const ParameterInfo& p : find_effect(candidate.effect)->linear) group.lower.push_back(p.lower);
+      groups.push_back(group);
+    }
+    problem_->add_all(groups);
+    Search search(*problem_, {});
+    Choice choice = search.run({}, progress_);
+    if (!choice.groups.empty()) found_ = search.explain(choice);
+    return choice;
+  }
+  const EffectCandidate& candidate(const Choice& choice, std::size_t i) const {
+    return problem_->groups()[choice.groups[i]].candidate;
+  }
+
+  /// What was found, as `ripple 14 at joint 2`.
+  std::string names(const Choice& choice) const {
+    std::string out;
+    for (std::size_t i = 0; i < choice.groups.size(); ++i) {
+      const EffectCandidate& one = candidate(choice, i);
+      out += fmt::format("{} {} at joint {}; ", one.effect, fmt::join(one.shape, ","), one.joint + 1);
+    }
+    return out;
+  }
+
+  IdentifiedModel model_;
+  std::vector<SessionLog> logs_;
+  std::unique_ptr<Linearised> problem_;
+  std::vector<Found> found_;
+  Progress progress_;
+};
+
+const std::vector<EffectCandidate> stribeck_grid{{"stribeck", 1, {0.05}},
+                                                 {"stribeck", 1, {0.1}},
+                                                 {"stribeck", 1, {0.4}},
+                                                 {"stribeck", 2, {0.1}},
+                                                 {"viscous_cubic", 1, {}}};
+
+TEST_F(SearchOfEffects, FindsNothingInNoise) { EXPECT_EQ(names(run(0, {}, stribeck_grid)), ""); }
+
+TEST_F(SearchOfEffects, FindsARippleWithItsWavenumber) {
+  const Choice choice = run(1, {test::effect("ripple", {14}, {0.3, 0.2})}, stribeck_grid);
+  ASSERT_EQ(choice.groups.size(), 1U) << names(choice);
+  EXPECT_EQ(candidate(choice, 0).effect, "ripple");
+  EXPECT_EQ(candidate(choice, 0).joint, 1U);
+  EXPECT_NEAR(candidate(choice, 0).shape[0], 14, 0.2);
+  const Index first = first_of_groups(*problem_, choice);
+  EXPECT_NEAR(choice.fit.x[first], 0.3, 0.05);
+  EXPECT_NEAR(choice.fit.x[first + 1], 0.2, 0.05);
+}
+
+TEST_F(SearchOfEffects, RefinesAShapeBetweenThoseOfTheGrid) {
+  const Choice choice = run(1, {test::effect("stribeck", {0.2}, {1.5})}, stribeck_grid);
+  ASSERT_EQ(choice.groups.size(), 1U) << names(choice);
+  EXPECT_EQ(candidate(choice, 0).effect, "stribeck");
+  EXPECT_NEAR(candidate(choice, 0).shape[0], 0.2, 0.05);
+  ASSERT_EQ(found_.size(), 1U);
+  EXPECT_GT(found_[0].score, 25);
+}
+
+TEST_F(SearchOfEffects, NeedsLongerSetsToBringMore) {
+  const Choice choice =
+      run(1, {test::effect("ripple", {14}, {0.3, 0.2}), test::effect("stribeck", {0.1}, {1.5})}, stribeck_grid);
+  EXPECT_EQ(choice.groups.size(), 2U) << names(choice);
+}
+
+}  // namespace
+}  // namespace fxdyn::diagnosis

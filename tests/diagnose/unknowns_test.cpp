@@ -1,0 +1,96 @@
+// The scalars that are fitted, their priors, and what a fit makes of the models.
+
+#include "host_tools/diagnose/unknowns.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/diagnose/small_problem.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Kind = Unknown::Kind;
+
+std::size_t count(const Unknowns& unknowns, Kind kind) {
+  return static_cast<std::size_t>(
+      std::count_if(unknowns.all.begin(), unknowns.all.end(), [&](const Unknown& u) { return u.kind == kind; }));
+}
+
+/// A fit that says `value` of one unknown and leaves the others where they are.
+LinearFit only(const Unknowns& unknowns, std::size_t of, double value) {
+  LinearFit fit;
+  fit.x.resize(static_cast<Index>(unknowns.all.size()));
+  for (std::size_t i = 0; i < unknowns.all.size(); ++i) {
+    fit.columns.push_back(static_cast<Index>(i));
+    fit.x[static_cast<Index>(i)] = i == of ? value : unknowns.all[i].value;
+  }
+  return fit;
+}
+
+class UnknownsOfAModel : public testing::Test {
+ protected:
+  UnknownsOfAModel() { models_ = test::around(test::fitted_puma()); }
+  Models models_;
+};
+
+TEST_F(UnknownsOfAModel, AreBaseParametersThenFrictionThenNames) {
+  models_.current.joints[1].effects.push_back(test::named_effect("ripple", {12}, {0.3, 0.4}));
+  const Unknowns unknowns = make_unknowns(models_);
+  EXPECT_EQ(count(unknowns, Kind::base), models_.current.base.size());
+  EXPECT_EQ(count(unknowns, Kind::width), 6U);
+  EXPECT_EQ(count(unknowns, Kind::shape), 1U);
+  EXPECT_EQ(count(unknowns, Kind::linear), 6U * 3 + 2);
+  ASSERT_EQ(unknowns.named.size(), 1U);
+  const Group& ripple = unknowns.named[0];
+  EXPECT_EQ(ripple.count, 3);
+  EXPECT_EQ(ripple.first, static_cast<Index>(unknowns.nuisance.size()));
+  EXPECT_EQ(unknowns.all[static_cast<std::size_t>(ripple.first)].value, 0.3);
+}
+
+TEST_F(UnknownsOfAModel, FrictionMayChangeALittleFromSessionToSession) {
+  models_.has_baseline = true;
+  models_.healthy = models_.current;
+  models_.current.joints[0].effects[1].linear[0] = 2.5;  // Coulomb: 2 before
+  const Unknowns unknowns = make_unknowns(models_);
+  const auto change = std::find_if(unknowns.all.begin(), unknowns.all.end(),
+                                   [](const Unknown& u) { return u.change && u.joint == 0 && u.effect == 1; });
+  ASSERT_NE(change, unknowns.all.end());
+  EXPECT_NEAR(change->value, 0.5, 1e-12);
+  EXPECT_NEAR(change->prior_std, std::hypot(0.3 * 2, 1e-3 * 100), 1e-12);
+  EXPECT_EQ(change->prior, 0);
+}
+
+TEST_F(UnknownsOfAModel, AFitMovesTheModel) {
+  const Unknowns unknowns = make_unknowns(models_);
+  const std::size_t coulomb = models_.current.base.size() + 2;  // behind width and viscous
+  Models moved = models_;
+  update(moved, unknowns.all, only(unknowns, coulomb, 3), 0.5);
+  EXPECT_NEAR(moved.current.joints[0].effects[1].linear[0], 2.5, 1e-12);
+  EXPECT_EQ(moved.current.joints[0].effects[0].linear[0], 1);
+  // The logarithm of a width, by 0.4 at most.
+  update(moved, unknowns.all, only(unknowns, models_.current.base.size(), 5), 1);
+  EXPECT_NEAR(moved.current.joints[0].sign_width, 0.02 * std::exp(0.4), 1e-12);
+  // A base parameter, with the inertia that stands for it.
+  update(moved, unknowns.all, only(unknowns, 3, models_.current.base[3].value + 0.25), 1);
+  const std::size_t column = models_.current.base[3].column;
+  const auto inertia = [&](const IdentifiedModel& model) {
+    return to_array(model.inertia[column / parameters_per_link])[column % parameters_per_link];
+  };
+  EXPECT_NEAR(moved.current.base[3].value, models_.current.base[3].value + 0.25, 1e-12);
+  EXPECT_NEAR(inertia(moved.current), inertia(models_.current) + 0.25, 1e-12);
+}
+
+TEST_F(UnknownsOfAModel, APayloadIsMassAndFirstMoment) {
+  models_.current.body = {test::named_effect("payload", {}, {2, 0.1, 0, 0.05})};
+  const Unknowns unknowns = make_unknowns(models_);
+  const auto mass = static_cast<std::size_t>(unknowns.named[0].first);
+  EXPECT_NEAR(unknowns.all[mass + 1].value, 0.2, 1e-12);
+  update(models_, unknowns.all, only(unknowns, mass, 4), 1);
+  const std::vector<double>& load = models_.current.body[0].linear;
+  EXPECT_EQ(load[0], 4);
+  EXPECT_NEAR(load[0] * load[1], 0.2, 1e-12);  // the first moment stays
+}
+
+}  // namespace
+}  // namespace fxdyn::diagnosis

@@ -1,0 +1,94 @@
+// Rows whose friction is in doubt, as the encoder does not show which way the joint moves.
+
+#include "host_tools/diagnose/velocity_doubt.hpp"
+
+#include <gtest/gtest.h>
+
+#include "host_tools/regression/encoder_noise.hpp"
+#include "host_tools/support/random.hpp"
+#include "tests/simulate/support.hpp"
+#include "tests/support/filter.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+TEST(EncoderNoise, IsAtLeastThatOfItsStep) {
+  FilterFit filter = test::filter_of(10, 10, 0.3);
+  filter.position_noise = {1e-5, 1e-5};
+  filter.encoder_step = {0, 1e-3};
+  EXPECT_EQ(position_noise(filter, 0), 1e-5);
+  EXPECT_NEAR(position_noise(filter, 1), 1e-3 / std::sqrt(12), 1e-12);
+}
+
+TEST(EncoderNoise, InTheVelocityIsThatOfDifferentiatedWhiteNoise) {
+  constexpr double step_s = 0.001, cutoff_hz = 20, sigma = 1e-4;
+  FilterFit filter = test::filter_of(cutoff_hz, 10, 0.3);
+  filter.position_noise = {sigma};
+  filter.encoder_step = {0};
+  // White noise as a sum of sines, each differentiated, up to the cut-off.
+  constexpr double duration_s = 20;
+  double square = 0;
+  for (int k = 1; k <= static_cast<int>(cutoff_hz * duration_s); ++k) {
+    const double w = 2 * 3.14159265358979 * k / duration_s, power = 2 * step_s * sigma * sigma / duration_s;
+    square += w * w * power;
+  }
+  EXPECT_NEAR(velocity_noise(filter, 0, step_s), std::sqrt(square), 0.005 * std::sqrt(square));
+}
+
+/// 10 s at 250 samples a second: at rest, then at 0.5 rad/s.
+class Doubt : public testing::Test {
+ protected:
+  static constexpr Index samples = 2500;
+
+  Doubt() {
+    log_.step_s = 0.004;
+    log_.q = Eigen::MatrixXd::Zero(samples, 1);
+    log_.first = 100;
+    log_.last = samples - 100;
+    log_.decimation = 10;
+    log_.filter = test::filter_of(20, 10, 0.3);
+    log_.filter.position_noise = {1e-4};
+    log_.filter.encoder_step = {0};
+    joint_.sign_width = 0.01;
+    joint_.effects = {test::effect("coulomb", {}, {2})};
+    dq_.tail(samples / 2).setConstant(0.5);
+  }
+  VectorXd doubt(double sigma = 0.1) const { return velocity_doubt(log_, 0, joint_, dq_, load_, sigma); }
+
+  ProcessedLog log_;
+  JointFit joint_;
+  VectorXd dq_ = VectorXd::Zero(samples), load_ = VectorXd::Constant(samples, 10);
+};
+
+TEST_F(Doubt, IsWhereTheJointStandsStill) {
+  const VectorXd u = doubt();
+  ASSERT_EQ(u.size(), log_.rows());
+  // Whatever the sign: (4 / 2 F / sigma)^2 of a row, and all rows at rest have one error between them.
+  EXPECT_GT(u.head(80).minCoeff(), 400);
+  EXPECT_LT(u.tail(80).maxCoeff(), 1e-3);
+}
+
+TEST_F(Doubt, GrowsWithTheSquareOfFrictionOverNoise) {
+  EXPECT_NEAR(doubt(0.05)[50] / doubt(0.1)[50], 4, 1e-9);
+  const double before = doubt()[50];
+  joint_.effects.push_back(test::effect("load_friction", {}, {0.2}));  // 2 N*m more at this load
+  EXPECT_NEAR(doubt()[50] / before, 4, 1e-9);
+}
+
+TEST_F(Doubt, IsNoneWithoutFrictionOrNoiseOrWithAMeasuredVelocity) {
+  const VectorXd none = VectorXd::Zero(log_.rows());
+  ProcessedLog measured = log_;
+  measured.measured_dq = dq_;
+  EXPECT_EQ(velocity_doubt(measured, 0, joint_, dq_, load_, 0.1), none);
+  ProcessedLog exact = log_;
+  exact.filter.position_noise = {0};
+  EXPECT_EQ(velocity_doubt(exact, 0, joint_, dq_, load_, 0.1), none);
+  joint_.effects.clear();
+  EXPECT_EQ(doubt(), none);
+}
+
+}  // namespace
+}  // namespace fxdyn::diagnosis
