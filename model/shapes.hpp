@@ -24,148 +24,114 @@ inline ValueList shares_of(double scale, std::initializer_list<double> shares) {
   return values;
 }
 
-/// A velocity below which friction is another one. Narrower than the sign is the sign; wider is viscous friction.
-inline constexpr ShapeValues velocity{.tried =
-                                          [](const MotionScales& s) {
-                                            const double from = std::max(3e-3 * s.speed, 1.5 * s.sign_width);
-                                            return geometric(std::min(from, 0.1 * s.speed), 0.2 * s.speed, 9);
-                                          },
-                                      .judged =
-                                          [](const MotionScales& s) {
-                                            return shares_of(s.speed, {0.025, 0.01, 0.05});
-                                          },
-                                      .fitted =
-                                          [](const MotionScales& s) {
-                                            return ShapeRange{3e-3 * s.speed, 0.15 * s.speed};
-                                          }};
+namespace detail {
+using Scales = const MotionScales&;
 
+// velocity
+inline ValueList low_speeds(Scales s) {
+  const double from = std::max(3e-3 * s.speed, 1.5 * s.sign_width);
+  return geometric(std::min(from, 0.1 * s.speed), 0.2 * s.speed, 9);
+}
+inline ValueList usual_speeds(Scales s) { return shares_of(s.speed, {0.025, 0.01, 0.05}); }
+inline ShapeRange low_speed_range(Scales s) { return {3e-3 * s.speed, 0.15 * s.speed}; }
+
+// distance
+inline ValueList paths(Scales s) { return s.turns ? geometric(2e-4, 2e-2, 10) : geometric(1e-5, 1e-3, 10); }
+inline ValueList usual_paths(Scales s) {
+  if (s.turns) return {3e-3, 1e-3, 9e-3};
+  return {1e-4, 3e-5, 3e-4};
+}
+inline ShapeRange path_range(Scales s) { return {1e-6 * s.range, 0.1 * s.range}; }
+
+// wavenumber
+inline ValueList usual_wavenumbers(Scales s) {
+  if (s.turns) return {20, 4, 100};
+  return {600, 120, 3000};
+}
+
+// time constant, torque limit, delay
+inline ValueList times_of_session(Scales s) { return geometric(0.1 * s.seconds, 4 * s.seconds, 5); }
+inline ValueList usual_times_of_session(Scales s) { return shares_of(s.seconds, {1, 0.3, 3}); }
+inline ValueList limits(Scales s) { return shares_of(s.torque, {0.45, 0.55, 0.63, 0.7, 0.76, 0.82, 0.87, 0.91, 0.95}); }
+inline ValueList usual_limits(Scales s) { return shares_of(s.torque, {0.85, 0.7, 0.95}); }
+inline ValueList delays(Scales s) { return geometric(5e-4, s.upper, 5); }
+inline ValueList usual_delays(Scales) { return {2e-3, 1e-3, 4e-3}; }
+
+// relaxation, small load
+inline ValueList relaxations(Scales) { return {1e-3, 8e-3}; }
+inline ValueList usual_relaxations(Scales) { return {1e-3, 5e-3}; }
+inline ValueList link_relaxations(Scales) { return {1e-3, 0, 1e-3, 3e-3, 8e-3, 2e-2}; }
+inline ValueList loads(Scales s) { return geometric(0.015 * s.structural, 0.25 * s.structural, 4); }
+inline ValueList usual_loads(Scales s) { return shares_of(s.structural, {0.05, 0.02, 0.1}); }
+inline ValueList link_loads(Scales s) { return shares_of(s.structural, {0.03, 0.01, 0.025, 0.06, 0.15}); }
+
+// direction, width
+inline ValueList both_directions(Scales) { return {1, -1}; }
+inline ValueList widths(Scales s) {
+  return geometric(std::max(0.3 * s.sign_width, 1e-3 * s.speed), std::max(3 * s.sign_width, 0.03 * s.speed), 3);
+}
+inline ValueList usual_widths(Scales s) { return shares_of(s.speed, {0.01}); }
+inline ShapeRange width_range(Scales s) { return {1e-4 * s.speed, 0.3 * s.speed}; }
+
+// other joints: indices from 1
+inline ValueList others_in_order(Scales s) {
+  ValueList others;
+  for (unsigned k = 0; k < s.joints; ++k) {
+    if (k != s.joint) others.add(k + 1);
+  }
+  return others;
+}
+inline ValueList others_before_first(Scales s) {
+  ValueList others;
+  for (unsigned k = s.joint; k-- > 0;) others.add(k + 1);
+  for (unsigned k = s.joint + 1; k < s.joints; ++k) others.add(k + 1);
+  return others;
+}
+inline ValueList mates(Scales s) {
+  ValueList found;
+  if (s.like_previous) found.add(s.joint);
+  if (s.like_next) found.add(s.joint + 2);
+  return found;
+}
+inline ValueList neighbours(Scales s) {
+  ValueList found;
+  if (s.joint > 0) found.add(s.joint);
+  if (s.joint + 1 < s.joints) found.add(s.joint + 2);
+  return found;
+}
+}  // namespace detail
+
+/// A velocity below which friction is another one. Narrower than the sign is the sign; wider is viscous friction.
+inline constexpr ShapeValues velocity{
+    .tried = detail::low_speeds, .judged = detail::usual_speeds, .fitted = detail::low_speed_range};
 /// A path over which a contact bends before it slides.
 inline constexpr ShapeValues distance{
-    .tried = [](const MotionScales& s) { return s.turns ? geometric(2e-4, 2e-2, 10) : geometric(1e-5, 1e-3, 10); },
-    .judged =
-        [](const MotionScales& s) {
-          return s.turns ? ValueList{3e-3, 1e-3, 9e-3} : ValueList{1e-4, 3e-5, 3e-4};
-        },
-    .fitted =
-        [](const MotionScales& s) {
-          return ShapeRange{1e-6 * s.range, 0.1 * s.range};
-        },
-    .seen_by_encoder = true};
-
+    .tried = detail::paths, .judged = detail::usual_paths, .fitted = detail::path_range, .seen_by_encoder = true};
 /// What repeats with the position; 20 rad^-1 is a gear's tooth.
-inline constexpr ShapeValues wavenumber{
-    .judged =
-        [](const MotionScales& s) {
-          return s.turns ? ValueList{20.0, 4.0, 100.0} : ValueList{600.0, 120.0, 3000.0};
-        },
-    .search = ShapeSearch::spectrum};
-
+inline constexpr ShapeValues wavenumber{.judged = detail::usual_wavenumbers, .search = ShapeSearch::spectrum};
 /// Of warming up.
-inline constexpr ShapeValues time_constant{
-    .tried = [](const MotionScales& s) { return geometric(0.1 * s.seconds, 4 * s.seconds, 5); },
-    .judged =
-        [](const MotionScales& s) {
-          return shares_of(s.seconds, {1, 0.3, 3});
-        }};
-
+inline constexpr ShapeValues time_constant{.tried = detail::times_of_session, .judged = detail::usual_times_of_session};
 /// A torque that cuts the largest ones.
-inline constexpr ShapeValues torque_limit{
-    .tried =
-        [](const MotionScales& s) {
-          return shares_of(s.torque, {0.45, 0.55, 0.63, 0.7, 0.76, 0.82, 0.87, 0.91, 0.95});
-        },
-    .judged =
-        [](const MotionScales& s) {
-          return shares_of(s.torque, {0.85, 0.7, 0.95});
-        }};
-
+inline constexpr ShapeValues torque_limit{.tried = detail::limits, .judged = detail::usual_limits};
 /// Of a bus and a current loop [s].
-inline constexpr ShapeValues delay{.tried = [](const MotionScales& s) { return geometric(5e-4, s.upper, 5); },
-                                   .judged =
-                                       [](const MotionScales&) {
-                                         return ValueList{2e-3, 1e-3, 4e-3};
-                                       }};
-
+inline constexpr ShapeValues delay{.tried = detail::delays, .judged = detail::usual_delays};
 /// Damping over stiffness of a gear [s].
 inline constexpr ShapeValues relaxation{
-    .tried =
-        [](const MotionScales&) {
-          return ValueList{1e-3, 8e-3};
-        },
-    .judged =
-        [](const MotionScales&) {
-          return ValueList{1e-3, 5e-3};
-        },
-    .of_link = [](const MotionScales&) { return ValueList{1e-3, 0, 1e-3, 3e-3, 8e-3, 2e-2}; }};
-
+    .tried = detail::relaxations, .judged = detail::usual_relaxations, .of_link = detail::link_relaxations};
 /// A small load that decides which flank of a gear is in touch.
 inline constexpr ShapeValues small_load{
-    .tried = [](const MotionScales& s) { return geometric(0.015 * s.structural, 0.25 * s.structural, 4); },
-    .judged =
-        [](const MotionScales& s) {
-          return shares_of(s.structural, {0.05, 0.02, 0.1});
-        },
-    .of_link =
-        [](const MotionScales& s) {
-          return shares_of(s.structural, {0.03, 0.01, 0.025, 0.06, 0.15});
-        }};
-
-/// A direction: same or opposite.
-inline constexpr ShapeValues direction{.tried =
-                                           [](const MotionScales&) {
-                                             return ValueList{1, -1};
-                                           },
-                                       .judged =
-                                           [](const MotionScales&) {
-                                             return ValueList{1, -1};
-                                           },
-                                       .search = ShapeSearch::list};
-
+    .tried = detail::loads, .judged = detail::usual_loads, .of_link = detail::link_loads};
+/// Same or opposite.
+inline constexpr ShapeValues direction{
+    .tried = detail::both_directions, .judged = detail::both_directions, .search = ShapeSearch::list};
 /// Width of a sign of its own.
-inline constexpr ShapeValues width{.tried =
-                                       [](const MotionScales& s) {
-                                         return geometric(std::max(0.3 * s.sign_width, 1e-3 * s.speed),
-                                                          std::max(3 * s.sign_width, 0.03 * s.speed), 3);
-                                       },
-                                   .judged = [](const MotionScales& s) { return shares_of(s.speed, {0.01}); },
-                                   .fitted =
-                                       [](const MotionScales& s) {
-                                         return ShapeRange{1e-4 * s.speed, 0.3 * s.speed};
-                                       }};
-
+inline constexpr ShapeValues width{
+    .tried = detail::widths, .judged = detail::usual_widths, .fitted = detail::width_range};
 /// Any other joint of the robot; its index from 1.
-inline constexpr ShapeValues other_joint{.tried =
-                                             [](const MotionScales& s) {
-                                               ValueList others;
-                                               for (unsigned k = 0; k < s.joints; ++k) {
-                                                 if (k != s.joint) others.add(k + 1);
-                                               }
-                                               return others;
-                                             },
-                                         .judged =
-                                             [](const MotionScales& s) {
-                                               ValueList others;
-                                               for (unsigned k = s.joint; k-- > 0;) others.add(k + 1);
-                                               for (unsigned k = s.joint + 1; k < s.joints; ++k) others.add(k + 1);
-                                               return others;
-                                             },
-                                         .search = ShapeSearch::list};
-
+inline constexpr ShapeValues other_joint{
+    .tried = detail::others_in_order, .judged = detail::others_before_first, .search = ShapeSearch::list};
 /// The joint before or after; its index from 1. Motors that share a gear turn joints of one type.
-inline constexpr ShapeValues neighbour{.tried =
-                                           [](const MotionScales& s) {
-                                             ValueList mates;
-                                             if (s.like_previous) mates.add(s.joint);
-                                             if (s.like_next) mates.add(s.joint + 2);
-                                             return mates;
-                                           },
-                                       .judged =
-                                           [](const MotionScales& s) {
-                                             ValueList mates;
-                                             if (s.joint > 0) mates.add(s.joint);
-                                             if (s.joint + 1 < s.joints) mates.add(s.joint + 2);
-                                             return mates;
-                                           },
-                                       .search = ShapeSearch::list};
+inline constexpr ShapeValues neighbour{
+    .tried = detail::mates, .judged = detail::neighbours, .search = ShapeSearch::list};
 
 }  // namespace fxdyn::shapes
