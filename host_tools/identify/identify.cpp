@@ -162,7 +162,7 @@ class Identification {
       const std::size_t before = effect_count();
       for (const std::string_view effect : optional_) {
         if (joints_ == 1 && find_effect(effect)->needs_peers) continue;
-        improve("is there " + effect + "?", false, [&](std::size_t j) {
+        improve("is there " + std::string(effect) + "?", false, [&](std::size_t j) {
           return fitter_->design(j).find(effect) != nullptr ? Candidate{fitter_->design(j), {}}
                                                             : search_effect(*fitter_, j, effect, scales_[j]);
         });
@@ -179,7 +179,7 @@ class Identification {
     for (std::size_t j = 0; j < joints_; ++j) {
       std::vector<std::string> found;
       for (const std::string_view effect : optional_) {
-        if (fitter_->design(j).find(effect) != nullptr) found.push_back(effect);
+        if (fitter_->design(j).find(effect) != nullptr) found.emplace_back(effect);
       }
       if (!found.empty()) data_.notes.push_back(fmt::format("joint {} ({}): found {}", j + 1, name(j), joined(found)));
     }

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/forward/forward.hpp"
 #include "host_tools/page/plot.hpp"
 #include "host_tools/pipeline/one_log.hpp"

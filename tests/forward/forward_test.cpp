@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "host_tools/effects/evaluator.hpp"
 #include "host_tools/simulate/mujoco_plant.hpp"
 #include "tests/simulate/support.hpp"
 #include "tests/support/filter.hpp"
@@ -92,7 +93,7 @@ TEST(Forward, ARobotOfMuJoCoIsFollowedForASecond) {
   plant.filter = test::filter_of(40, 40, 0.1);
   Reference reference = test::motion_of(plant.robot, 0.0005, 1);
   reference.feedforward = predict(plant, reference.q, reference.dq, reference.ddq, reference.step_s);
-  const ClosedLoopRun run = closed_loop_on_mujoco(plant, reference, {});
+  const auto run = closed_loop_on_mujoco(plant, reference, {});
   Log log;
   log.file = "mujoco.csv";
   log.role = Role::test;
