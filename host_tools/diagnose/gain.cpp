@@ -60,8 +60,6 @@ Gain gain_of(const Reduced& reduced, const std::vector<double>& lower, bool shar
   return out;
 }
 
-bool is_share(const Group& group) {
-  return !group.in_model && find_effect(group.candidate.effect)->share;
-}
+bool is_share(const Group& group) { return !group.in_model && find_effect(group.candidate.effect)->share; }
 
 }  // namespace fxdyn::diagnosis

@@ -1,4 +1,5 @@
 #include "host_tools/diagnose/search.hpp"
+#include "host_tools/diagnose/ripples.hpp"
 
 #include <algorithm>
 #include <cmath>

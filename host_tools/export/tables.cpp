@@ -23,17 +23,13 @@ Evaluator<RunTimeNumbers> make_evaluator(const IdentifiedModel& model, const For
   return evaluator;
 }
 
+/// stribeck -> Stribeck, rotor_inertia -> RotorInertia: the class names of model/effects.
 std::string type_name(std::string_view effect) {
-  // stribeck -> Stribeck, rotor_inertia -> RotorInertia: the class names of model/effects
   std::string name;
   bool upper = true;
   for (const char c : effect) {
-    if (c == '_') {
-      upper = true;
-    } else {
-      name += upper ? static_cast<char>(std::toupper(static_cast<unsigned char>(c))) : c;
-      upper = false;
-    }
+    if (c != '_') name += upper ? static_cast<char>(std::toupper(static_cast<unsigned char>(c))) : c;
+    upper = c == '_';
   }
   return name;
 }

@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
+#include "host_tools/diagnose/ripples.hpp"
 #include "tests/diagnose/small_problem.hpp"
 
 namespace fxdyn::diagnosis {
@@ -75,6 +76,16 @@ TEST_F(SearchOfEffects, FindsARippleWithItsWavenumber) {
   const Index first = first_of_groups(*problem_, choice);
   EXPECT_NEAR(choice.fit.x[first], 0.3, 0.05);
   EXPECT_NEAR(choice.fit.x[first + 1], 0.2, 0.05);
+}
+
+TEST_F(SearchOfEffects, TheSpectrumOverTheAngleHasTheStrongerRippleFirst) {
+  run(1, {test::effect("ripple", {14}, {0.3, 0.2}), test::effect("ripple", {25}, {0.1, 0.1})}, {});
+  const LinearFit nuisance = problem_->solver().solve(problem_->nuisance());
+  const std::vector<Group> peaks = ripples(*problem_, 1, problem_->solver().residual(1, nuisance), 2);
+  ASSERT_EQ(peaks.size(), 2U);
+  EXPECT_NEAR(peaks[0].candidate.shape[0], 14, 0.5);
+  EXPECT_NEAR(peaks[1].candidate.shape[0], 25, 0.5);
+  EXPECT_EQ(peaks[0].candidate.joint, 1U);
 }
 
 TEST_F(SearchOfEffects, RefinesAShapeBetweenThoseOfTheGrid) {

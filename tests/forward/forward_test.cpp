@@ -64,8 +64,10 @@ TEST(Forward, TheRightModelFollowsTheClosedForm) {
   const Forward forward = of(slide(), log);
   ASSERT_EQ(forward.open.why_failed, "");
   ASSERT_EQ(forward.closed.why_failed, "");
-  // The motion covers 1.2 m.
-  EXPECT_LT(forward.open.rmse[0], 1e-4);
+  // A parabola through a motion with a jerk J misses its speed at the end by J T^2 / 10, and the slide rolls on by that
+  // times m / d. The motion covers 1.2 m.
+  const double jerk = force * frequency / mass, start_s = step_s * static_cast<double>(given);
+  EXPECT_LT(forward.open.rmse[0], 1.1 * jerk * start_s * start_s / 10 * mass / damping);
   EXPECT_LT(forward.closed.rmse[0], 1e-4);
   EXPECT_EQ(forward.open.q.topRows(given), log.q.topRows(given));
 }

@@ -25,7 +25,7 @@ log() { printf '[[log]]\nname = "%s"\nduration_s = 10\nperiod_s = 5\nspeed = %s\
   printf 'seed = 4\n[sensors]\nencoder_bits = 22\ntorque_noise = 0.002\n[robot]\nurdf = "arm.urdf"\nrated_torque = [60, 20]\nacceleration = [8, 8]\n'
   effect viscous '"all"' 'coefficient = [1.5, 0.6]'
   effect coulomb '"all"' 'amplitude = [3.0, 1.2], width = 0.01'
-  effect $effect 2 'velocity = 0.2, amplitude = 1.5'
+  effect $effect 2 'velocity = 0.5, amplitude = 1.5'
   log a 0.7 1 && log b 0.3 2 && log judge 0.5 3 && log test 0.6 5
 } >arm.toml
 # project NAME EFFECTS
@@ -57,7 +57,7 @@ of_joint_2="[p['value'] for e in d['joints'][1]['effects'] if e['effect'] == '$e
 
 step "identify"
 must identify known.toml --out out/known
-near "identified velocity" "$(value out/known/model.json "$of_joint_2[0]")" 0.2 0.1
+near "identified velocity" "$(value out/known/model.json "$of_joint_2[0]")" 0.5 0.1
 near "identified amplitude" "$(value out/known/model.json "$of_joint_2[1]")" 1.5 0.05
 
 step "diagnose"
@@ -84,7 +84,7 @@ step "image for a Cortex-M4"
 
 step "replay in QEMU"
 must replay hidden.toml --out out/hidden --image image/fxdyn-mps2-an386.elf --ticks 500
-[ "$(value out/hidden/replay.json "all(l['bit_exact'] for l in d['logs'])" 2>&1)" = True ] || fail "replay: not bit for bit"
+[ "$(value out/hidden/replay.json "d['bit_exact']")" = True ] || fail "replay: not bit for bit"
 
 step "done"
 exit $((failures > 0))
