@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
@@ -58,19 +59,34 @@ enum class ShapeSearch : std::uint8_t {
   spectrum,  ///< a wavenumber n whose phi are cos(n q) and sin(n q): from the residual's spectrum over the position
 };
 
+/// A function of the scales, or none. Whether there is one is known at compile time: comparing its address with null is
+/// not, where sanitizers look at addresses.
+template <class Result>
+class OfScales {
+ public:
+  constexpr OfScales() = default;
+  template <class F>
+  requires std::convertible_to<F, Result (*)(const MotionScales&)>
+  constexpr OfScales(F function) : call_(function), given_(true) {}
+  constexpr bool given() const { return given_; }
+  Result operator()(const MotionScales& scales) const { return call_(scales); }
+
+ private:
+  Result (*call_)(const MotionScales&) = nullptr;
+  bool given_ = false;
+};
+
 /// Which values of a shape parameter to try. model/shapes.hpp has the usual ones.
 struct ShapeValues {
-  using List = ValueList (*)(const MotionScales&);
-  List tried = nullptr;   ///< by `diagnose`; not for ShapeSearch::spectrum
-  List judged = nullptr;  ///< by `excite`, the typical one first
-  /// Searched by `identify`; null: it can't fit the effect.
-  ShapeRange (*fitted)(const MotionScales&) = nullptr;
+  OfScales<ValueList> tried{};    ///< by `diagnose`; not for ShapeSearch::spectrum
+  OfScales<ValueList> judged{};   ///< by `excite`, the typical one first
+  OfScales<ShapeRange> fitted{};  ///< searched by `identify`; none: it can't fit the effect
   ShapeSearch search = ShapeSearch::refine;
   bool seen_by_encoder = false;  ///< a path: what is shorter than the encoder's step does not show
   /// For deflections that a link encoder shows: where the fit begins, then what it tries.
-  List of_link = nullptr;
+  OfScales<ValueList> of_link{};
 
-  constexpr bool declared() const { return judged != nullptr && (tried != nullptr || search == ShapeSearch::spectrum); }
+  constexpr bool declared() const { return judged.given() && (tried.given() || search == ShapeSearch::spectrum); }
 };
 
 /// One parameter of an effect, as the user sees it (SI, joint side of the gearbox).

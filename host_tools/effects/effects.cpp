@@ -217,7 +217,7 @@ std::string why_not_identified(const EffectInfo& info) {
   if (info.needs_structural) return reason("needs the rigid-body torque");
   if (info.needs_peers) return {};  // the neighbours are tried
   for (const ParameterInfo& shape : info.shape) {
-    if (shape.values.fitted == nullptr)
+    if (!shape.values.fitted.given())
       return fmt::format("effect '{}': the search of its {} is not built yet", info.name, shape.name);
   }
   if (info.shape.size() > 1) return reason("has several shape parameters");

@@ -159,6 +159,8 @@ TEST_F(SlcanLimits, WhatAClosedChannelRefusesIsNotLost) {
   EXPECT_EQ(received(), 0);
   EXPECT_EQ(said(), "\r\a\r");
   EXPECT_EQ(bus.errors().lost, 0U);
+  EXPECT_EQ(bus.errors().transmit, 0);
+  EXPECT_EQ(bus.errors().receive, 0);
   EXPECT_EQ(bus.errors().state, CanState::active);
   EXPECT_EQ(bus.restart(), Status::ok);
 }

@@ -38,7 +38,7 @@ TEST(EffectDeclarations, WhatIsNamedElsewhereIsInTheCatalogue) {
     for (const std::string_view other : {info.replaces, info.warms_into[0], info.warms_into[1]})
       EXPECT_TRUE(other.empty() || find_effect(other) != nullptr) << info.name << ": " << other;
     if (info.acts_on == ActsOn::position) {
-      for (const ParameterInfo& shape : info.shape) EXPECT_NE(shape.values.of_link, nullptr) << info.name;
+      for (const ParameterInfo& shape : info.shape) EXPECT_TRUE(shape.values.of_link.given()) << info.name;
     }
   }
 }
