@@ -276,7 +276,7 @@ void Search::find_ripples(const Choice& state, std::optional<std::size_t> joint)
   problem_.add_all(std::move(fresh));
 }
 
-Choice Search::run(std::vector<std::size_t> start, Progress& progress) {
+Choice Search::run(const std::vector<std::size_t>& start, Progress& progress) {
   std::vector<Choice> beam{evaluate(start)};
   Choice best = beam.front();
   for (int level = 0; level < 64; ++level) {

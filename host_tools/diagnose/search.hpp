@@ -48,7 +48,7 @@ class Search {
   Search(Linearised& problem, const SearchSettings& settings) : problem_(problem), settings_(settings) {}
 
   /// @param start groups to begin with (named effects of the model)
-  Choice run(std::vector<std::size_t> start, Progress& progress);
+  Choice run(const std::vector<std::size_t>& start, Progress& progress);
   std::vector<Found> explain(const Choice& choice);
   Choice evaluate(const std::vector<std::size_t>& groups) const;
   /// By group, at the start of run(): share of its columns that the nuisance and the named effects do not absorb (the
