@@ -64,7 +64,7 @@ void check_robot(const IdentifiedModel& model, const ProcessedLog& log) {
   for (Index j = 0; j < measured.cols(); ++j) {
     if (left.col(j).segment(log.first, count).norm() < measured.col(j).segment(log.first, count).norm()) return;
   }
-  throw DataError(
+  throw InputError(
       fmt::format("{}: the model explains the torque of no joint: is it this robot's, in the same units?", log.name));
 }
 

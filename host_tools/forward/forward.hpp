@@ -29,8 +29,8 @@ struct Forward {
 /// @param raw the log as it was read, with torque
 /// @param log the same log, processed with the model's filter
 /// @param given at least 3 and fewer than the log's samples
-/// @throws InputError: too few samples; a torque that stands still while its joint moves; DataError: the model explains
-/// none of the torque, so it is another robot's.
+/// @throws InputError: too few samples; a torque that stands still while its joint moves; the model explains none of
+/// the torque, so it is another robot's.
 Forward simulate_forward(const IdentifiedModel& model, const Log& raw, const ProcessedLog& log, Eigen::Index given);
 
 }  // namespace fxdyn

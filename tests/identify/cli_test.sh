@@ -103,6 +103,18 @@ done
 echo '{"schema": "fxdyn.model/1"}' >"$work/model.json"
 expect 2 "model.json" predict --model "$work/model.json" --log "$work/good.csv" --out "$work/out"
 expect 1 "the mass of the load cannot be identified from this motion: no joint of this robot lifts" payload --model "$work/good/model.json" --log "$work/good.csv" --out "$work/out"
+forward() { expect 2 "$1" forward --model "$work/good/model.json" --log "$work/$2" --out "$work/out" "${@:3}"; }
+forward "at least 3 samples" good.csv --given 2
+forward "nothing is left to simulate" good.csv --given 5000
+forward "tau2 (second) stays at 0" zero.csv
+awk -F, 'BEGIN { OFS = "," } NR > 1 { $4 = -$4; $5 = -$5 } { print }' "$work/good.csv" >"$work/opposite.csv"
+forward "is it this robot's" opposite.csv
+[ ! -e "$work/out" ] || { echo "FAILED: forward left files behind"; failures=$((failures + 1)); }
+"$fxdyn" forward --model "$work/good/model.json" --log "$work/good.csv" --out "$work/forward" >/dev/null 2>&1 ||
+  { echo "FAILED: forward of a good log"; failures=$((failures + 1)); }
+for file in forward.json closed.csv forward.svg; do
+  [ -s "$work/forward/$file" ] || { echo "FAILED: forward: no $file"; failures=$((failures + 1)); }
+done
 expect 2 "would be overwritten" payload --model "$work/good/model.json" --log "$work/good.csv" --out "$work/good"
 expect 2 "'diagnos' is no verb" diagnos "$work/good.toml" --out "$work/fresh"
 expect 2 "'--oout' is no option here" diagnose "$work/good.toml" --oout "$work/fresh"
