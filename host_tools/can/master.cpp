@@ -11,6 +11,8 @@ constexpr std::uint8_t initiate_download = 0x20, initiate_upload = 0x40, upload_
 constexpr std::uint8_t downloaded = 0x60, segment_downloaded = 0x20;
 constexpr std::uint8_t toggle = 0x10, expedited = 0x02, size_is_given = 0x01, last_segment = 0x01;
 constexpr std::size_t segment_bytes = 7;
+/// An answer that was sent before the node's boot-up message has come by then.
+constexpr Duration after_boot_up = std::chrono::milliseconds(200);
 
 std::string object_name(std::uint8_t node, std::uint16_t index, std::uint8_t sub_index) {
   std::array<char, 64> text{};
@@ -85,15 +87,37 @@ void Master::wait_for(std::uint8_t node, canopen::NmtState state, Duration timeo
                             to_text(state) + ": its error history is object 0x1003");
 }
 
+void Master::reset(std::uint8_t node, Duration timeout) {
+  constexpr int most_boot_ups = 3;  // of its start, of the command, and one of another master's
+  command(canopen::NmtCommand::reset_node, node);
+  wait_for(node, canopen::NmtState::initialising, timeout);
+  for (int boot_up = 1;; ++boot_up) {
+    try {
+      static_cast<void>(read(node, 0x1000, 0));
+      return;
+    } catch (const SdoAbort&) {
+      return;  // it is there
+    } catch (const NodeRestarted&) {
+      if (boot_up == most_boot_ups) throw;
+    }
+  }
+}
+
 Master::Bytes Master::exchange(std::uint8_t node, const Bytes& request, std::uint16_t index, std::uint8_t sub_index) {
   Frame frame{.id = canopen::sdo_request_id + node, .size = 8};
   std::copy(request.begin(), request.end(), frame.data.begin());
   bus_.send(frame);
-  const Duration end = bus_.now() + sdo_timeout;
+  Duration end = bus_.now() + sdo_timeout;
+  bool restarted = false;
   for (Duration left = sdo_timeout; left.count() > 0; left = end - bus_.now()) {
     if (!bus_.receive(frame, left)) continue;
     if (frame.id != canopen::sdo_answer_id + node || frame.extended || frame.size != 8) {
+      const std::uint32_t heartbeats = heartbeat_of(node).count;
       dispatch(frame);
+      if (heartbeat_of(node).count != heartbeats && heartbeat_of(node).state == canopen::NmtState::initialising) {
+        restarted = true;
+        end = std::min(end, bus_.now() + after_boot_up);
+      }
       continue;
     }
     Bytes answer;
@@ -106,6 +130,9 @@ Master::Bytes Master::exchange(std::uint8_t node, const Bytes& request, std::uin
     }
     return answer;
   }
+  if (restarted)
+    throw NodeRestarted(object_name(node, index, sub_index) +
+                        ": no answer but a boot-up message: it restarted; its supply, or another master's reset?");
   throw NodeError(object_name(node, index, sub_index) +
                   ": no answer: its power, its node id, the bit rate; `candump` shows what is on the bus");
 }

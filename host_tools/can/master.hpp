@@ -18,6 +18,10 @@ namespace fxdyn::can {
 struct NodeError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
+/// The node's boot-up message came instead of an answer: it lost the request by its reset.
+struct NodeRestarted : NodeError {
+  using NodeError::NodeError;
+};
 /// An SDO transfer that the node aborted.
 struct SdoAbort : NodeError {
   SdoAbort(const std::string& what, canopen::Abort reason) : NodeError(what), code(reason) {}
@@ -59,6 +63,10 @@ class Master {
   void listen(Duration time);
   /// Waits for a heartbeat (boot-up counts as `initialising`) of the node in this state; throws NodeError.
   void wait_for(std::uint8_t node, canopen::NmtState state, Duration timeout);
+  /// NMT reset of a node; returns when it answers to SDO again; throws NodeError. A node that was just switched on may
+  /// send the boot-up message of its start before it obeys the command, and a second one afterwards (CiA 301, 7.3.2.2:
+  /// no SDO while it initialises).
+  void reset(std::uint8_t node, Duration timeout);
   struct Heartbeat {
     canopen::NmtState state = canopen::NmtState::initialising;
     std::uint32_t count = 0;

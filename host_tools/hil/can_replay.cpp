@@ -159,9 +159,7 @@ void CanDrives::restart() {
   if (lockstep_) lost_ += lockstep_->statistics().missing + lockstep_->statistics().late;
   runs_ = true;
   for (const Node& node : nodes_) {
-    master_.command(canopen::NmtCommand::reset_node, node.id);
-    // The boot-up message: a heartbeat may still be one from before the reset.
-    master_.wait_for(node.id, canopen::NmtState::initialising, start_time);
+    master_.reset(node.id, start_time);
     wait_for_zero_torque(node);
     master_.use_lockstep(node.id, patience);
     if (heartbeat_of_ != 0)

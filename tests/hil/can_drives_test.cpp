@@ -26,6 +26,7 @@ struct ScriptedNode {
   bool sends_torque = true;
   std::uint8_t torque_status = 0;
   bool has_fd = true;
+  int late_resets = 0;  ///< so many requests are lost to a reset, since a boot-up message came before it
 };
 
 class ScriptedBus final : public can::Bus {
@@ -76,6 +77,11 @@ class ScriptedBus final : public can::Bus {
     }
   }
   void answer(std::uint8_t id, ScriptedNode& node, const can::Frame& request) {
+    if (node.late_resets > 0) {
+      --node.late_resets;
+      heartbeat(id, NmtState::initialising);
+      return;
+    }
     can::Frame reply{.id = canopen::sdo_answer_id + id, .size = 8, .data = request.data};
     const std::pair object{canopen::load<2>(&request.data[1]), std::uint32_t{request.data[3]}};
     if ((request.data[0] & 0xE0U) == 0x20) {
@@ -192,6 +198,28 @@ TEST_F(CanDrivesTest, DoesNotStopWhatItHasNotStarted) {
   bus_.nodes[1].state = NmtState::operational;
   { CanDrives drives(bus_, model_, {}); }
   EXPECT_TRUE(bus_.commands.empty());
+}
+
+TEST_F(CanDrivesTest, ANodeJustSwitchedOnIsAskedAgainAfterItsReset) {
+  two_nodes();
+  CanDrives drives(bus_, model_, {});
+  bus_.nodes[1].late_resets = 1;
+  drives.restart();
+  EXPECT_EQ(states(), (std::vector{NmtState::operational, NmtState::operational}));
+  EXPECT_EQ(bus_.nodes[1].late_resets, 0);
+}
+
+TEST_F(CanDrivesTest, ANodeThatRestartsAgainAndAgainIsNamed) {
+  two_nodes();
+  CanDrives drives(bus_, model_, {});
+  bus_.nodes[2].late_resets = 1000;
+  try {
+    drives.restart();
+    FAIL() << "a node that never answers was taken";
+  } catch (const can::NodeRestarted& error) {
+    EXPECT_NE(std::string(error.what()).find("node 2"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("it restarted"), std::string::npos) << error.what();
+  }
 }
 
 TEST_F(CanDrivesTest, NodesWatchTheHostsHeartbeat) {

@@ -60,9 +60,7 @@ std::uint32_t counter(can::Master& master, std::uint8_t node, Counter item) {
 }
 
 void configure(can::Master& master, std::uint8_t node, bool fd) {
-  master.command(canopen::NmtCommand::reset_node, node);
-  // The boot-up message: a heartbeat may still be one from before the reset.
-  master.wait_for(node, canopen::NmtState::initialising, std::chrono::seconds(60));  // an emulator may just start
+  master.reset(node, std::chrono::seconds(60));  // an emulator may just start
   check_equal(master.read(node, 0x1018, 2), dictionary::product_code, "product code", node);
   check_equal(master.read(node, dictionary::tables, 1), tables::page.header.crc32, "CRC of the tables", node);
   check_equal(master.read(node, dictionary::tables, 3), 1, "tables valid", node);
