@@ -11,6 +11,7 @@
 #include "model/effects/gravity_tilt.hpp"
 #include "model/effects/joint_coupling.hpp"
 #include "model/effects/load_friction.hpp"
+#include "model/effects/lugre.hpp"
 #include "model/effects/motor_coupling.hpp"
 #include "model/effects/offset.hpp"
 #include "model/effects/payload.hpp"
@@ -41,7 +42,7 @@ using UserEffects = EffectList<>;
 using Catalogue = Joined<
     EffectList<Viscous, Coulomb, Offset, RotorInertia, Stribeck, Presliding, AsymmetricFriction, ViscousQuadratic,
                ViscousCubic, LoadFriction, TorqueGain, Ripple, Spring, GravityCompensator, FrictionDrift, Saturation,
-               JointCoupling, Delay, Elasticity, Backlash, Eccentricity, MotorCoupling>,
+               JointCoupling, Delay, Elasticity, Backlash, Eccentricity, MotorCoupling, LuGre>,
     UserEffects>;
 
 /// Effects on the rigid body itself: they change its parameters and have no basis.

@@ -171,10 +171,14 @@ struct EffectTraits {
   TurnsWithSign turns_with_sign = TurnsWithSign::no;
   /// Takes the place of this effect: its first coefficient is about as large.
   std::string_view replaces{};
+  /// One law for these effects together: it is tried where one of them was found, and takes their place if it explains
+  /// more. Shape parameters of the same name begin where theirs are.
+  std::array<std::string_view, 2> unites{};
   /// It grows with time alone, from nothing to these effects together, by the share warmth(seconds, shape).
   std::array<std::string_view, 2> warms_into{};
 
   constexpr bool drifts() const { return !warms_into[0].empty(); }
+  constexpr bool unites_others() const { return !unites[0].empty(); }
   constexpr bool named_experiment(const NamedExperiment& experiment) const {
     for (const NamedExperiment& own : experiments) {
       if (own.order == experiment.order && own.text == experiment.text) return !own.text.empty();

@@ -35,6 +35,9 @@ inline double tanh_of(double x) { return std::tanh(x); }
 /// exp(-x) for x >= 0
 inline double exp_negative(double x) { return std::exp(-x); }
 inline double asinh_of(double x) { return std::asinh(x); }
+constexpr double half_of(double x) { return x / 2; }
+/// 1 / x, 0.25 <= x <= 1
+constexpr double reciprocal_of(double x) { return 1 / (x < 0.25 ? 0.25 : x > 1 ? 1 : x); }
 constexpr double magnitude(double x) { return x < 0 ? -x : x; }
 /// sign(x): -1, 0 or 1
 constexpr double sign_of(double x) { return static_cast<double>((x > 0) - (x < 0)); }
@@ -195,6 +198,29 @@ constexpr std::int32_t exp_negative(std::int32_t x) {
   return static_cast<std::int32_t>(((static_cast<std::uint32_t>(full) << 1 >> k) + 1) >> 1);
 }
 
+/// 256 / i, 0.25 <= i / 256 <= 1, 28 bits.
+inline constexpr int reciprocal_bits = 28;
+inline constexpr auto reciprocal_table = [] {
+  std::array<std::int32_t, 193> table{};
+  for (std::size_t i = 0; i < table.size(); ++i)
+    table[i] = series::to_raw(256 / static_cast<double>(i + 64), reciprocal_bits);
+  return table;
+}();
+
+/// 1 / x (ratio_bits) of x in [0.25, 1] with 30 bits, limited to it, |error| < 6e-8. With the nearest node's r:
+/// e = 1 - x r, 1 / x = r (1 + e + e^2 + e^3) + O(e^4 / x), |e| <= 1/128.
+constexpr std::int32_t reciprocal(std::int32_t x) {
+  constexpr std::int32_t least = 1 << 28, most = 1 << 30;
+  x = x > least ? x : least;
+  x = x < most ? x : most;
+  const std::int32_t r = reciprocal_table[static_cast<std::size_t>(((x + (1 << 21)) >> 22) - 64)];
+  const auto e = static_cast<std::int32_t>(((std::int64_t{1} << 58) - std::int64_t{x} * r) >> 22);  // 36 bits
+  const std::int32_t square = multiply_high(e, e);                                                 // 40 bits
+  const std::int32_t gain = e + (square >> 4) + (multiply_high(square, e) >> 8);                   // 36 bits
+  const std::int32_t value = r + proven_narrow<36>(std::int64_t{r} * gain);                        // 28 bits
+  return (value + (1 << 3)) >> (reciprocal_bits - ratio_bits);
+}
+
 struct Parabola {
   std::int32_t c0, c1, c2;  ///< 27 bits; over a segment parameter in [0, 1)
 };
@@ -238,6 +264,7 @@ constexpr std::int32_t magnitude(std::int32_t x) {
 
 /// sign(x) with 30 bits
 constexpr std::int32_t sign(std::int32_t x) { return ((x > 0) - (x < 0)) * (1 << 30); }
+constexpr std::int32_t sign(std::int64_t x) { return ((x > 0) - (x < 0)) * (1 << 30); }
 
 /// What a limiter to [-limit, limit], limit >= 0, adds to x; masks stand for max(x - limit, 0) and min(x + limit, 0).
 constexpr std::int32_t clipping(std::int32_t x, std::int32_t limit) {
@@ -269,12 +296,22 @@ constexpr SineCosine<Fixed<unit_bits>> sin_cos_turns(Wide<bits> turns) {
 constexpr Fixed<unit_bits> tanh_of(Fixed<argument_bits> x) { return {raw::tanh(x.raw)}; }
 constexpr Fixed<unit_bits> exp_negative(Fixed<argument_bits> x) { return {raw::exp_negative(x.raw)}; }
 constexpr Fixed<argument_bits> asinh_of(Fixed<ratio_bits> x) { return {raw::asinh(x.raw)}; }
+constexpr Fixed<ratio_bits> reciprocal_of(Fixed<unit_bits> x) { return {raw::reciprocal(x.raw)}; }
+/// Exact: one more fractional bit.
+template <int bits>
+constexpr Wide<bits + 1> half_of(Wide<bits> x) {
+  return {x.raw};
+}
 template <int bits>
 constexpr Fixed<bits> magnitude(Fixed<bits> x) {
   return {raw::magnitude(x.raw)};
 }
 template <int bits>
 constexpr Fixed<unit_bits> sign_of(Fixed<bits> x) {
+  return {raw::sign(x.raw)};
+}
+template <int bits>
+constexpr Fixed<unit_bits> sign_of(Wide<bits> x) {
   return {raw::sign(x.raw)};
 }
 template <int bits>
@@ -288,6 +325,12 @@ constexpr WholeAndRest<Fixed<unit_bits>> split_count(Fixed<count_bits> x) {
 
 // ---- all number systems
 // ----------------------------------------------------------------------------------------------
+
+/// exp(-x^2).
+template <class N>
+constexpr Unit<N> bell_of(Argument<N> x) {
+  return exp_negative(N::template clamp<Argument<N>>(x * x));
+}
 
 /// a + share (b - a), 0 <= share <= 1: never outside [a, b].
 template <class N, class T>

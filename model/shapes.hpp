@@ -65,6 +65,10 @@ inline ValueList loads(Scales s) { return geometric(0.015 * s.structural, 0.25 *
 inline ValueList usual_loads(Scales s) { return shares_of(s.structural, {0.05, 0.02, 0.1}); }
 inline ValueList link_loads(Scales s) { return shares_of(s.structural, {0.03, 0.01, 0.025, 0.06, 0.15}); }
 
+// share of the static friction
+inline ValueList friction_shares(Scales) { return {0.7, 0.5, 0.85}; }
+inline ShapeRange friction_share_range(Scales) { return {0.3, 1}; }
+
 // direction, width
 inline ValueList both_directions(Scales) { return {1, -1}; }
 inline ValueList widths(Scales s) {
@@ -121,6 +125,10 @@ inline constexpr ShapeValues relaxation{
 /// A small load that decides which flank of a gear is in touch.
 inline constexpr ShapeValues small_load{
     .tried = detail::loads, .judged = detail::usual_loads, .of_link = detail::link_loads};
+/// Coulomb's friction as a share of the static one.
+inline constexpr ShapeValues friction_share{.tried = detail::friction_shares,
+                                            .judged = detail::friction_shares,
+                                            .fitted = detail::friction_share_range};
 /// Same or opposite.
 inline constexpr ShapeValues direction{
     .tried = detail::both_directions, .judged = detail::both_directions, .search = ShapeSearch::list};

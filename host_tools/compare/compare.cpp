@@ -65,7 +65,7 @@ MatrixXd states(const ProcessedLog& log, std::size_t joint) {
 }
 
 /// Methods whose swarms can take long enough to be worth going on with.
-constexpr const char* searched[] = {"bls_pso", "bls_pso_physical"};
+constexpr const char* searched[] = {"bls_pso", "bls_pso_friction", "bls_pso_physical"};
 
 class Comparison {
  public:
@@ -110,10 +110,12 @@ class Comparison {
     if (wanted("friction_ls")) structural("friction_ls", coulomb_and_viscous, "wls");
     if (wanted("rls")) structural("rls", coulomb_and_viscous, "rls");
     if (wanted("mlp")) mlp();
-    if (wanted("bls_default")) state_bls("bls_default", false);
-    if (wanted("bls_pso")) state_bls("bls_pso", true);
+    if (wanted("bls_default")) state_bls("bls_default", {}, false);
+    if (wanted("bls_pso")) state_bls("bls_pso", {}, true);
+    if (wanted("bls_pso_friction")) state_bls("bls_pso_friction", coulomb_and_viscous, true);
     if (wanted("bls_physical")) physical_bls("bls_physical", false);
     if (wanted("bls_pso_physical")) physical_bls("bls_pso_physical", true);
+    if (wanted("dahl_stribeck")) structural("dahl_stribeck", dahl_stribeck_friction, "wls");
     if (wanted("lugre")) structural("lugre", lugre_friction, "wls");
     if (wanted("named_bls")) named_bls();
     if (against_truth_ && wanted("oracle")) oracle();
@@ -338,11 +340,13 @@ class Comparison {
     return shape;
   }
 
-  /// The paper's: what the rigid body leaves, as a function of the state.
-  void state_bls(const std::string& name, bool by_swarm) {
+  /// The paper's: what a structure leaves, as a function of the state. Without effects that is the rigid body of its
+  /// section 3; Eq. 8 has viscous and Coulomb friction in it as well.
+  void state_bls(const std::string& name, const std::vector<std::string>& effects, bool by_swarm) {
     const std::size_t n = project_.robot.size();
     const auto start = std::chrono::steady_clock::now();
-    const IdentifiedModel structure = identify_structure(project_, data_, {}, "ls", progress_);
+    const IdentifiedModel structure =
+        identify_structure(project_, data_, effects, effects.empty() ? "ls" : "wls", progress_);
     const std::vector<MatrixXd> rest = missing(structure);
     PsoSettings pso;
     pso.particles = 12;
@@ -459,7 +463,7 @@ ComparisonResult compare_methods(const Project& project, const fs::path& directo
 ComparisonResult compare(const fs::path& project, const fs::path& directory) {
   Comparison comparison(read_project(project), directory, true);
   const ComparisonResult result = comparison.run({"rigid_ls", "friction_ls", "rls", "mlp", "bls_default", "bls_pso",
-                                                  "bls_pso_physical", "lugre", "named_bls", "oracle", "noise_floor"});
+                                                  "bls_pso_friction", "bls_pso_physical", "dahl_stribeck", "lugre", "named_bls", "oracle", "noise_floor"});
   write_comparison_plots(comparison.shown(), directory);
   write_file(directory / "compare.json", to_json(result).dump(1) + "\n");
   comparison.drop_searches();

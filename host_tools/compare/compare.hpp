@@ -20,11 +20,11 @@ namespace fxdyn {
 ///   train_s              wall time from the logs to the model, null where a killed run's search went on; named_bls: of
 ///                        diagnose and train when they last ran in DIR, null where that is not known
 ///   fixed_error          largest |fixed - double| on the test logs, share of rated; null: not for firmware
-/// Methods: rigid_ls friction_ls rls mlp bls_default bls_pso bls_pso_physical lugre named_bls oracle noise_floor; the
-/// last two only where the truth is known.
+/// Methods: rigid_ls friction_ls rls mlp bls_default bls_pso bls_pso_friction bls_pso_physical dahl_stribeck lugre
+/// named_bls oracle noise_floor; the last two only where the truth is known.
 /// Beside compare.json it draws DIR/plots/compare_*.svg, what the paper's Figs. 5 to 11 show.
-/// The swarms keep their last generation in DIR/compare.bls_pso.pso.json and compare.bls_pso_physical.pso.json: a
-/// killed run goes on from there.
+/// The swarms keep their last generation in DIR/compare.bls_pso.pso.json, compare.bls_pso_friction.pso.json and
+/// compare.bls_pso_physical.pso.json: a killed run goes on from there.
 /// @throws DataError: no test log, no validate log, generations of another project or other logs
 ComparisonResult compare(const std::filesystem::path& project, const std::filesystem::path& directory);
 

@@ -26,7 +26,7 @@ struct Method {
 };
 constexpr Method paper_methods[] = {{"rls", "RLS", "#e4572e"},
                                     {"mlp", "MLP", "#2e6fb7"},
-                                    {"bls_pso", "BLS-PSO on q, dq, ddq (the paper's)", "#8e5ea2"},
+                                    {"bls_pso_friction", "BLS-PSO on q, dq, ddq (the paper's)", "#8e5ea2"},
                                     {learned, "BLS-PSO with memory (ours)", "#2a9d4a"}};
 
 std::string time_label(const ComparedLog& log) { return fmt::format("time [s] in {}", log.log); }

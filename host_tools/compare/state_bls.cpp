@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "host_tools/support/random.hpp"
+#include "host_tools/train/sparse_features.hpp"
 
 namespace fxdyn {
 namespace {
@@ -22,39 +23,38 @@ MatrixXd affine(const MatrixXd& x, const MatrixXd& weights) {
   return (x * weights.topRows(x.cols())).rowwise() + weights.bottomRows(1).row(0);
 }
 
+MatrixXd activated(const MatrixXd& x, const std::string& activation) {
+  if (activation == "tanh") return x.array().tanh();
+  if (activation == "sigmoid") return (1 + (-x.array()).exp()).inverse();
+  if (activation == "relu") return x.cwiseMax(0);
+  return x.array().sin();
+}
+
 }  // namespace
 
 StateBls::StateBls(const StateBlsShape& shape, const MatrixXd& examples, std::uint64_t seed) : shape_(shape) {
   mean_ = examples.colwise().mean();
-  inverse_std_ = ((examples.rowwise() - mean_).colwise().squaredNorm() / static_cast<double>(examples.rows()))
-                     .array()
-                     .sqrt()
-                     .max(1e-12)
-                     .inverse();
+  const MatrixXd centred = examples.rowwise() - mean_;
+  inverse_range_ = centred.cwiseAbs().colwise().maxCoeff().array().max(1e-12).inverse();
   Random random(seed);
   const Index features = shape_.windows * shape_.nodes;
-  feature_ = random_matrix(random, examples.cols() + 1, features, 1);
+  feature_ = sparse_feature_weights(centred.array().rowwise() * inverse_range_.array(), shape_.windows, shape_.nodes, random);
   enhancement_ = random_matrix(random, features + 1, shape_.enhancement,
                                shape_.scale * 3 / std::sqrt(static_cast<double>(features)));
 }
 
 MatrixXd StateBls::columns(const MatrixXd& x) const {
-  const MatrixXd scaled = (x.rowwise() - mean_).array().rowwise() * inverse_std_.array();
-  const MatrixXd z = affine(scaled, feature_);
-  MatrixXd h = affine(z, enhancement_);
-  if (shape_.activation == "tanh") h = h.array().tanh();
-  if (shape_.activation == "sigmoid") h = (1 + (-h.array()).exp()).inverse();
-  if (shape_.activation == "relu") h = h.cwiseMax(0);
-  if (shape_.activation == "sine") h = h.array().sin();
+  const MatrixXd scaled = (x.rowwise() - mean_).array().rowwise() * inverse_range_.array();
+  const MatrixXd z = activated(affine(scaled, feature_), shape_.activation);
+  const MatrixXd h = activated(affine(z, enhancement_), shape_.activation);
   MatrixXd out(x.rows(), z.cols() + h.cols());
   out << z, h;
   return out;
 }
 
 Index StateBls::multiplications() const {
-  // Linear features fold into the enhancement's weights and into one coefficient an input.
-  const Index inputs = mean_.size();
-  return inputs * shape_.enhancement + shape_.enhancement + inputs;
+  const Index features = shape_.windows * shape_.nodes;
+  return mean_.size() * features + features * shape_.enhancement + features + shape_.enhancement;
 }
 
 }  // namespace fxdyn

@@ -13,11 +13,13 @@ struct StateBlsShape {
   Eigen::Index enhancement = 20;        ///< nodes n l
   double scale = 1;                     ///< of the random weights
   double ridge = 1e-4;                  ///< Eq. 30
-  std::string activation = "tanh";      ///< of the enhancement nodes: tanh sigmoid relu sine
+  std::string activation = "tanh";      ///< of all nodes: tanh sigmoid relu sine
 };
 
-/// Random features of standardised inputs.
-///   Z_i = x W_i + b_i (linear, as in Chen, Liu 2018), H = xi(Z W_h + b_h), A = [Z, H]
+/// Features of standardised inputs, x within +-1 of the examples.
+///   Z_i = phi(x W_i + b_i), H = xi(Z W_h + b_h), A = [Z, H]   (paper Eqs. 23-27)
+/// W_i, b_i: sparse autoencoder of the inputs (Chen, Liu 2018, which the paper names for its BLS); W_h, b_h random;
+/// phi and xi are the same activation.
 class StateBls {
  public:
   StateBls(const StateBlsShape& shape, const Eigen::MatrixXd& examples, std::uint64_t seed);
@@ -29,7 +31,7 @@ class StateBls {
 
  private:
   StateBlsShape shape_;
-  Eigen::RowVectorXd mean_, inverse_std_;
+  Eigen::RowVectorXd mean_, inverse_range_;
   Eigen::MatrixXd feature_, enhancement_;  ///< the last row is the bias
 };
 

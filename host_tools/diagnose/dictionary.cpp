@@ -71,7 +71,7 @@ std::vector<Group> dictionary(const Linearised& problem, const std::vector<Effec
     inertia[j] = least_inertia(problem.models().current, j, positions);
   }
   for (const EffectInfo& info : effect_infos()) {
-    if (info.nominal || info.of_spectrum()) continue;
+    if (info.nominal || info.of_spectrum() || info.unites_others()) continue;
     if (info.needs_peers && n < 2) continue;
     for (std::size_t j = 0; j < (info.acts_on == ActsOn::body ? 1 : n); ++j) {
       const bool skipped = std::any_of(skip.begin(), skip.end(), [&](const EffectCandidate& c) {

@@ -108,6 +108,9 @@ class ShapeSearch {
   int rounds_ = 0;
 };
 
+/// Of shapes that are searched one after the other.
+constexpr std::size_t sweeps = 3;
+
 /// First step of the search: a cell of a ripple's grid, else half as much again.
 double first_ratio(const Linearised& problem, const EffectCandidate& candidate, std::size_t shape) {
   if (!find_effect(candidate.effect)->of_spectrum()) return 1.5;
@@ -120,14 +123,16 @@ double first_ratio(const Linearised& problem, const EffectCandidate& candidate, 
 }  // namespace
 
 std::optional<Refined> refined(const Linearised& problem, const LinearFit& beside, const Group& start) {
-  const int searched = searched_shape(start.candidate);
-  if (searched < 0 && !start.rotor) return std::nullopt;
+  if (searched_shape(start.candidate) < 0 && !start.rotor) return std::nullopt;
   ShapeSearch search(problem, beside, start);
-  if (searched >= 0) {
-    const auto index = static_cast<std::size_t>(searched);
-    const EffectInfo& info = *find_effect(start.candidate.effect);
-    const auto [least, most] = shape_limits(problem.models(), start.candidate.joint, info, info.shape[index]);
-    search.search(search.group().candidate.shape[index], first_ratio(problem, start.candidate, index), least, most);
+  const EffectInfo& info = *find_effect(start.candidate.effect);
+  const std::vector<std::size_t> shapes = info.refined_shapes();
+  // One at a time: the best value of one depends on the others.
+  for (std::size_t sweep = 0; sweep < (shapes.size() > 1 ? sweeps : 1); ++sweep) {
+    for (const std::size_t index : shapes) {
+      const auto [least, most] = shape_limits(problem.models(), start.candidate.joint, info, info.shape[index]);
+      search.search(search.group().candidate.shape[index], first_ratio(problem, start.candidate, index), least, most);
+    }
   }
   double& inertia = search.group().rotor_inertia;
   if (inertia > 0) search.search(inertia, 1.25, 0, 1.1 * inertia);

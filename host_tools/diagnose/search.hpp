@@ -7,6 +7,7 @@
 #include "host_tools/diagnose/dictionary.hpp"
 #include "host_tools/diagnose/gain.hpp"
 #include "host_tools/diagnose/linearised.hpp"
+#include "host_tools/effects/effects.hpp"
 #include "host_tools/support/progress.hpp"
 
 namespace fxdyn::diagnosis {
@@ -49,6 +50,9 @@ class Search {
 
   /// @param start groups to begin with (named effects of the model)
   Choice run(const std::vector<std::size_t>& start, Progress& progress);
+  /// The choice with an effect that unites others (EffectTraits::unites) in place of those of them that it has, joint by
+  /// joint, where that scores better.
+  Choice unite(Choice best);
   std::vector<Found> explain(const Choice& choice);
   Choice evaluate(const std::vector<std::size_t>& groups) const;
   /// By group, at the start of run(): share of its columns that the nuisance and the named effects do not absorb (the
@@ -77,6 +81,7 @@ class Search {
   Eigen::VectorXd scores_of_noise(std::size_t joint, const Choice& state, const Candidates& candidates) const;
   std::vector<Scored> score_all(const Choice& state, bool with_thresholds);
   std::size_t refine(const Choice& state, std::size_t group);
+  std::optional<Choice> united(const Choice& choice, const EffectInfo& info, std::size_t joint);
   double penalty(std::size_t group) const;
   double threshold(std::size_t group) const;
   bool allowed(const Choice& state, std::size_t group) const;

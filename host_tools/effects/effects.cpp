@@ -140,11 +140,17 @@ std::vector<std::string_view> joint_effect_names() {
   return names;
 }
 
-int EffectInfo::refined_shape() const {
+std::vector<std::size_t> EffectInfo::refined_shapes() const {
+  std::vector<std::size_t> found;
   for (std::size_t i = 0; i < shape.size(); ++i) {
-    if (shape[i].values.search != ShapeSearch::list) return static_cast<int>(i);
+    if (shape[i].values.search != ShapeSearch::list) found.push_back(i);
   }
-  return -1;
+  return found;
+}
+
+int EffectInfo::refined_shape() const {
+  const std::vector<std::size_t> all = refined_shapes();
+  return all.empty() ? -1 : static_cast<int>(all.front());
 }
 
 const std::vector<std::string>& nominal_effects() {
@@ -220,7 +226,6 @@ std::string why_not_identified(const EffectInfo& info) {
     if (!shape.values.fitted.given())
       return fmt::format("effect '{}': the search of its {} is not built yet", info.name, shape.name);
   }
-  if (info.shape.size() > 1) return reason("has several shape parameters");
   return {};
 }
 

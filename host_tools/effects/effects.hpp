@@ -25,7 +25,8 @@ struct EffectInfo : EffectTraits {
   bool separates_rotor() const { return needs_structural; }
   /// Its wavenumber comes from a spectrum.
   bool of_spectrum() const { return !shape.empty() && shape[0].values.search == ShapeSearch::spectrum; }
-  /// The shape parameter that is refined continuously; -1: none.
+  /// The shape parameters that are refined continuously, and the first of them; -1: none.
+  std::vector<std::size_t> refined_shapes() const;
   int refined_shape() const;
 };
 

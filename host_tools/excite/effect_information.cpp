@@ -68,7 +68,7 @@ void Information::add_blocks(const IdentifiedModel& nominal, const std::vector<M
   }
   nominal_blocks = blocks.size();
   for (const EffectInfo& info : effect_infos()) {
-    if (info.nominal) continue;
+    if (info.nominal || info.unites_others()) continue;  // what shows those shows it
     for (std::size_t j = 0; j < (info.acts_on == ActsOn::body ? 1 : n); ++j) {
       for (const auto& shape : typical_shapes(info.name, j, nominal.robot, motions, torque, structural))
         add(info.name, j, shape);

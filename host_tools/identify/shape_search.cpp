@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "host_tools/effects/effects.hpp"
@@ -89,6 +90,55 @@ Candidate search_coupling(const Fitter& fitter, std::size_t joint, std::string_v
   return better.judgement.rmse < best.judgement.rmse ? better : best;
 }
 
+/// Values of a shape to begin with: of the effects that are united, else a few over its range.
+std::vector<double> starts(const JointFit& before, const EffectInfo& info, const ParameterInfo& shape,
+                           const ShapeRange& range) {
+  for (const std::string_view one : info.unites) {
+    const EffectFit* fit = before.find(one);
+    if (fit == nullptr) continue;
+    const auto shapes = find_effect(one)->shape;
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      if (shapes[i].name == shape.name) return {fit->shape[i]};
+    }
+  }
+  const double from = std::max(range.from, 1e-3 * range.to), to = std::min(shape.upper, range.to);
+  return geometric(from * std::pow(to / from, 0.1), from * std::pow(to / from, 0.9), 4);
+}
+
+/// Several shapes: the best of a coarse grid, then one after the other, each by steps that become smaller.
+Candidate search_shapes(const Fitter& fitter, std::size_t joint, JointFit design, const EffectInfo& info,
+                        const Scales& scales) {
+  constexpr int sweeps = 3, rounds = 3;
+  std::vector<std::vector<double>> grid;
+  std::vector<ShapeRange> ranges;
+  for (const ParameterInfo& shape : info.shape) {
+    const ShapeRange range = shape.values.fitted(motion_scales(scales));
+    ranges.push_back({std::max(shape.lower, range.from), std::min(shape.upper, range.to)});
+    grid.push_back(starts(fitter.design(joint), info, shape, ranges.back()));
+  }
+  Candidate best{design, {}};
+  const auto attempt = [&](const std::vector<double>& shape) {
+    design.effects.back().shape = shape;
+    const Judgement judgement = fitter.held_out_with(joint, design, {0.0})[0];
+    if (judgement.rmse < best.judgement.rmse) best = {design, judgement};
+  };
+  for (const std::vector<double>& shape : combinations(grid)) attempt(shape);
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
+    for (std::size_t i = 0; i < ranges.size(); ++i) {
+      double ratio = sweep == 0 ? 1.5 : 1.2;
+      for (int round = 0; round < rounds; ++round, ratio = std::sqrt(ratio)) {
+        const std::vector<double> centre = best.design.effects.back().shape;
+        for (const double value : {std::max(ranges[i].from, centre[i] / ratio), std::min(ranges[i].to, centre[i] * ratio)}) {
+          std::vector<double> shape = centre;
+          shape[i] = value;
+          attempt(shape);
+        }
+      }
+    }
+  }
+  return best;
+}
+
 }  // namespace
 
 Candidate search_width(const Fitter& fitter, std::size_t joint, const Scales& scales) {
@@ -100,12 +150,15 @@ Candidate search_effect(const Fitter& fitter, std::size_t joint, std::string_vie
   JointFit design = fitter.design(joint);
   const EffectInfo& info = *find_effect(effect);
   if (info.needs_peers) return search_coupling(fitter, joint, effect, scales);
+  std::erase_if(design.effects, [&](const EffectFit& one) {
+    return std::find(info.unites.begin(), info.unites.end(), one.effect) != info.unites.end();
+  });
   EffectFit fit;
   fit.effect = effect;
   fit.shape.resize(info.shape.size());
   design.effects.push_back(fit);
   if (info.shape.empty()) return {design, fitter.held_out_with(joint, design, {0.0})[0]};
-  // One shape: why_not_identified() lets no other effects through.
+  if (info.shape.size() > 1) return search_shapes(fitter, joint, design, info, scales);
   const ShapeRange range = info.shape[0].values.fitted(motion_scales(scales));
   const double to = std::min(info.shape[0].upper, range.to);
   return search(fitter, joint, design, range.from, to,

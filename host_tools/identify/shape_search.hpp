@@ -23,7 +23,8 @@ struct Scales {
 
 /// The joint's design at its best width of the Coulomb sign.
 Candidate search_width(const Fitter& fitter, std::size_t joint, const Scales& scales);
-/// The joint's design with the effect added, at its best shape.
+/// The joint's design with the effect added, at its best shape; in place of those that it unites
+/// (EffectTraits::unites), at whose shapes the search begins.
 /// @throws InputError: the effect needs a second joint
 Candidate search_effect(const Fitter& fitter, std::size_t joint, std::string_view effect, const Scales& scales);
 

@@ -327,6 +327,21 @@ inline BoundedNumbers::Of<Quantity::unit> exp_negative(BoundedNumbers::Of<Quanti
   }
   return {out};
 }
+/// Not as exp_negative() of the square: the square's error is large where the curve is flat.
+template <>
+inline BoundedNumbers::Of<Quantity::unit> bell_of<BoundedNumbers>(BoundedNumbers::Of<Quantity::argument> x) {
+  constexpr double steepest = 0.858;  // of exp(-x^2), at x = 1 / sqrt(2)
+  const bool zero = x.value.low <= 0 && x.value.high >= 0;
+  const double nearest = zero ? 0 : std::fmin(std::fabs(x.value.low), std::fabs(x.value.high));
+  const double farthest = x.value.magnitude();
+  Bound out{std::exp(-farthest * farthest), std::exp(-nearest * nearest), 0};
+  if (detail::rounding()) {
+    out.error = steepest * x.value.error + std::ldexp(0.5, -argument_bits) + 1.4e-9;
+    const double end = std::ldexp(1.0, 31 - argument_bits);
+    if (square(farthest + x.value.error) > end) out.error += std::exp(-end);  // fixed point goes no further
+  }
+  return {out};
+}
 inline BoundedNumbers::Of<Quantity::argument> asinh_of(BoundedNumbers::Of<Quantity::ratio> x) {
   Bound out{std::asinh(x.value.low), std::asinh(x.value.high), 0};
   if (detail::rounding()) {
@@ -344,6 +359,15 @@ template <Kind kind>
 BoundedNumbers::Of<Quantity::unit> sign_of(Bounded<kind> x) {
   const bool touches = x.value.low - x.value.error <= 0 && x.value.high + x.value.error >= 0;
   return {{sign_of(x.value.low), sign_of(x.value.high), touches && x.value.error > 0 ? 2.0 : 0.0}};
+}
+inline BoundedNumbers::Of<Quantity::unit> sign_of(BoundedWide x) {
+  return sign_of(BoundedNumbers::Of<Quantity::unit>{x.value});
+}
+inline BoundedWide half_of(BoundedWide x) { return {{x.value.low / 2, x.value.high / 2, x.value.error / 2}}; }
+inline BoundedNumbers::Of<Quantity::ratio> reciprocal_of(BoundedNumbers::Of<Quantity::unit> x) {
+  Bound out{reciprocal_of(x.value.high), reciprocal_of(x.value.low), 0};
+  if (detail::rounding()) out.error = x.value.error * out.high * out.high + 6e-8;
+  return {out};
 }
 template <Kind kind>
 Bounded<kind> clipping(Bounded<kind> x, Bounded<kind> limit) {

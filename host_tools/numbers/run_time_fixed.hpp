@@ -183,6 +183,10 @@ inline RunTimeNumbers::Of<Quantity::unit> exp_negative(RunTimeNumbers::Of<Quanti
 inline RunTimeNumbers::Of<Quantity::argument> asinh_of(RunTimeNumbers::Of<Quantity::ratio> x) {
   return {raw::asinh(x.raw)};
 }
+inline RunTimeNumbers::Of<Quantity::ratio> reciprocal_of(RunTimeNumbers::Of<Quantity::unit> x) {
+  return {raw::reciprocal(x.raw)};
+}
+inline RunTimeWide half_of(RunTimeWide x) { return {x.raw, x.bits + 1}; }
 template <Kind kind>
 RunTimeFixed<kind> magnitude(RunTimeFixed<kind> x) {
   return {raw::magnitude(x.raw)};
@@ -191,6 +195,7 @@ template <Kind kind>
 RunTimeNumbers::Of<Quantity::unit> sign_of(RunTimeFixed<kind> x) {
   return {raw::sign(x.raw)};
 }
+inline RunTimeNumbers::Of<Quantity::unit> sign_of(RunTimeWide x) { return {raw::sign(x.raw)}; }
 template <Kind kind>
 RunTimeFixed<kind> clipping(RunTimeFixed<kind> x, RunTimeFixed<kind> limit) {
   return {raw::clipping(x.raw, limit.raw)};

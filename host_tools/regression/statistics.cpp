@@ -21,18 +21,29 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 /// Widths and distances that no joint has: what the catalogue's bounds leave.
 constexpr double smallest_shape = 1e-8, largest_shape = 1e3;
 
-/// Whether the shape can be an unknown of the fit: a width or a distance, not an index or a count.
+/// Whether the shape can be an unknown of the fit: a width, a distance or a share, not an index or a count.
 bool is_continuous(const ParameterInfo& shape) {
-  return shape.quantity == Quantity::inverse_velocity || shape.quantity == Quantity::inverse_path;
+  if (shape.values.search != ShapeSearch::refine) return false;
+  return shape.quantity == Quantity::inverse_velocity || shape.quantity == Quantity::inverse_path ||
+         shape.quantity == Quantity::unit;
 }
 
-/// A joint's shapes that are unknowns, as pointers into a design: the sign's width first.
-std::vector<double*> unknown_shapes(JointFit& design) {
-  std::vector<double*> out{&design.sign_width};
+/// A shape that is an unknown, in a design.
+struct UnknownShape {
+  double* value;
+  double least, most;
+  void set(double to) const { *value = std::clamp(to, least, most); }
+};
+
+/// A joint's shapes that are unknowns: the sign's width first.
+std::vector<UnknownShape> unknown_shapes(JointFit& design) {
+  std::vector<UnknownShape> out{{&design.sign_width, smallest_shape, largest_shape}};
   for (EffectFit& fit : design.effects) {
     const auto infos = find_effect(fit.effect)->shape;
     for (std::size_t i = 0; i < infos.size(); ++i) {
-      if (is_continuous(infos[i])) out.push_back(&fit.shape[i]);
+      if (!is_continuous(infos[i])) continue;
+      out.push_back(
+          {&fit.shape[i], std::max(smallest_shape, infos[i].lower), std::min(largest_shape, infos[i].upper)});
     }
   }
   return out;
@@ -54,12 +65,13 @@ MatrixXd Fitter::shape_rows(std::size_t joint, const VectorXd& theta) const {
   const auto shapes = unknown_shapes(design);
   MatrixXd out(torque_rows_[joint].size(), static_cast<Index>(shapes.size()));
   for (std::size_t s = 0; s < shapes.size(); ++s) {
-    const double value = *shapes[s];
-    *shapes[s] = value * (1 + step);
+    double& shape = *shapes[s].value;
+    const double value = shape;
+    shape = value * (1 + step);
     const VectorXd more = own_rows(joint, designs) * theta;
-    *shapes[s] = value * (1 - step);
+    shape = value * (1 - step);
     out.col(static_cast<Index>(s)) = (more - own_rows(joint, designs) * theta) / (2 * step);
-    *shapes[s] = value;
+    shape = value;
   }
   return out;
 }
@@ -131,8 +143,7 @@ void Fitter::polish() {
         if (designs[j].bls) continue;
         const auto shapes = unknown_shapes(designs[j]);
         for (std::size_t s = 0; s < shapes.size(); ++s)
-          *shapes[s] = std::clamp(*shapes[s] * std::exp(step[all.offset[j] - all.offset[0] + static_cast<Index>(s)]),
-                                  smallest_shape, largest_shape);
+          shapes[s].set(*shapes[s].value * std::exp(step[all.offset[j] - all.offset[0] + static_cast<Index>(s)]));
       }
       set_designs(std::move(designs));
       solution = solve(normal_equations());

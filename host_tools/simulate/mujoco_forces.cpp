@@ -21,7 +21,7 @@ using Eigen::VectorXd;
 double soft_sign(double v, double width) { return v / std::sqrt(v * v + width * width); }
 
 /// Effects that are no torque of force(): MuJoCo's own, those of the body, of the gears and of the sensors.
-constexpr std::array<std::string_view, 12> elsewhere{"viscous",      "coulomb",     "rotor_inertia", "elasticity",
+constexpr std::array<std::string_view, 13> elsewhere{"lugre", "viscous",      "coulomb",     "rotor_inertia", "elasticity",
                                                      "backlash",     "presliding",  "eccentricity",  "payload",
                                                      "gravity_tilt", "torque_gain", "saturation",    "delay"};
 
@@ -80,7 +80,12 @@ VectorXd relaxed(const Eigen::Ref<const VectorXd>& torque, double r, double step
 }  // namespace
 
 DriveForces::DriveForces(const IdentifiedModel& plant)
-    : plant_(plant), bristle_(plant.joints.size(), 0.0), bristle_q_(plant.joints.size(), 0.0) {}
+    : plant_(plant), bristle_(plant.joints.size(), 0.0), bristle_q_(plant.joints.size(), 0.0) {
+  for (const JointFit& joint : plant.joints) {
+    const EffectFit* fit = joint.find("lugre");
+    lugre_.push_back(fit != nullptr ? std::optional<LuGreBristles>(*fit) : std::nullopt);
+  }
+}
 
 VectorXd DriveForces::operator()(const DriveState& now) {
   VectorXd sum = VectorXd::Zero(now.q.size());
@@ -88,6 +93,10 @@ VectorXd DriveForces::operator()(const DriveState& now) {
     const auto i = static_cast<std::size_t>(j);
     const JointFit& joint = plant_.joints[i];
     sum[j] += coulomb_share(joint).applied * soft_sign(now.dq[j], joint.sign_width);
+    if (lugre_[i]) {
+      const double v0 = started_ ? last_dq_[j] : now.dq[j], seconds = started_ ? now.time_s - last_s_ : 0;
+      sum[j] += lugre_[i]->advance(v0, now.dq[j], seconds);
+    }
     for (const EffectFit& fit : joint.effects) {
       if (fit.effect != "presliding") {
         sum[j] += force(fit, joint, j, now, plant_);
@@ -102,6 +111,8 @@ VectorXd DriveForces::operator()(const DriveState& now) {
     }
   }
   started_ = true;
+  last_dq_ = now.dq;
+  last_s_ = now.time_s;
   return sum;
 }
 

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <optional>
 #include <vector>
 
 #include "host_tools/effects/forward.hpp"
+#include "host_tools/simulate/lugre_plant.hpp"
 
 namespace fxdyn {
 
@@ -28,6 +30,9 @@ class DriveForces {
  private:
   const IdentifiedModel& plant_;
   std::vector<double> bristle_, bristle_q_;  ///< deflected share of the presliding friction, and where
+  std::vector<std::optional<LuGreBristles>> lugre_;
+  Eigen::VectorXd last_dq_;
+  double last_s_ = 0;
   bool started_ = false;
 };
 

@@ -113,7 +113,9 @@ mjModel* load(const std::string& xml) {
 
 CoulombShare coulomb_share(const JointFit& joint) {
   // where friction builds up over a distance, that share of it is no Coulomb friction
-  const double left = linear(joint, "coulomb", 0) - linear(joint, "presliding", 0);
+  const EffectFit* lugre = joint.find("lugre");
+  const double of_lugre = lugre != nullptr ? lugre->shape[2] * lugre->linear[0] : 0;
+  const double left = linear(joint, "coulomb", 0) - linear(joint, "presliding", 0) - of_lugre;
   return {std::max(left, 0.0), std::min(left, 0.0)};
 }
 

@@ -9,6 +9,7 @@
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/signals/fourier.hpp"
 #include "host_tools/simulate/closed_loop.hpp"
+#include "host_tools/simulate/lugre_plant.hpp"
 #include "host_tools/simulate/mujoco_plant.hpp"
 #include "host_tools/simulate/scenario.hpp"
 #include "host_tools/simulate/sensors.hpp"
@@ -81,6 +82,15 @@ PlantRun closed_loop(const Scenario& scenario, Reference reference, double age_s
   return {reference.step_s, std::move(run.q), std::move(run.dq), std::move(run.ddq), {}, {}};
 }
 
+/// The torque of the very motion that the log shows, however the plant came to it. LuGre friction has code of its own.
+void add_torque(const Scenario& scenario, double start_s, PlantRun& run) {
+  IdentifiedModel plant = scenario.plant;
+  for (JointFit& joint : plant.joints)
+    std::erase_if(joint.effects, [](const EffectFit& fit) { return fit.effect == "lugre"; });
+  run.tau = predict(plant, run.q, run.dq, run.ddq, run.step_s, &run.deflections, start_s);
+  if (has_lugre(scenario.plant)) run.tau += lugre_torque(scenario.plant, run.dq, run.step_s);
+}
+
 PlantRun run_plant(const Scenario& scenario, const ScenarioLog& log, double length_s) {
   const bool controlled = scenario.motion == Scenario::Motion::closed_loop;
   const double step_s = plant_step(scenario);
@@ -96,8 +106,7 @@ PlantRun run_plant(const Scenario& scenario, const ScenarioLog& log, double leng
     run = {step_s, std::move(motion.q), std::move(motion.dq), std::move(motion.ddq), {}, {}};
   }
   if (mujoco) return run;
-  // The torque of the very motion that the log shows, however the plant came to it.
-  run.tau = predict(scenario.plant, run.q, run.dq, run.ddq, run.step_s, &run.deflections, log.start_s);
+  add_torque(scenario, log.start_s, run);
   return run;
 }
 

@@ -39,19 +39,28 @@ MatrixXd lasso(const MatrixXd& a, const MatrixXd& y, double lambda) {
   return sparse;
 }
 
+MatrixXd sparse_feature_weights(const MatrixXd& u, Index windows, Index features, Random& random) {
+  const Index columns = u.cols() + 1;
+  MatrixXd inputs(u.rows(), columns);
+  inputs << u, VectorXd::Ones(u.rows());
+  MatrixXd weights(columns, windows * features);
+  for (Index window = 0; window < windows; ++window) {
+    MatrixXd start(columns, features);
+    for (Index i = 0; i < features; ++i) start.col(i) = random_vector(random, columns);
+    MatrixXd a = inputs * start;
+    for (Index i = 0; i < features; ++i) a.col(i) /= std::max(a.col(i).cwiseAbs().maxCoeff(), 1e-12);
+    weights.middleCols(window * features, features) = lasso(a, inputs, sparsity).transpose();
+  }
+  return weights;
+}
+
 MatrixXd sparse_weights(const MatrixXd& u, Index nodes, Index windows, Index features, std::uint64_t seed) {
   Random random(seed);
   const Index columns = u.cols() + 1, all = windows * features + 1;
   MatrixXd inputs(u.rows(), columns);
   inputs << u, VectorXd::Ones(u.rows());
   MatrixXd feature_weights = MatrixXd::Zero(columns, all);
-  for (Index window = 0; window < windows; ++window) {
-    MatrixXd start(columns, features);
-    for (Index i = 0; i < features; ++i) start.col(i) = random_vector(random, columns);
-    MatrixXd a = inputs * start;
-    for (Index i = 0; i < features; ++i) a.col(i) /= std::max(a.col(i).cwiseAbs().maxCoeff(), 1e-12);
-    feature_weights.middleCols(window * features, features) = lasso(a, inputs, sparsity).transpose();
-  }
+  feature_weights.leftCols(all - 1) = sparse_feature_weights(u, windows, features, random);
   feature_weights(columns - 1, all - 1) = 1;
 
   MatrixXd weights(nodes, columns), group(all, 0);

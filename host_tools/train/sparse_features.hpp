@@ -3,11 +3,17 @@
 #include <Eigen/Dense>
 #include <cstdint>
 
+#include "host_tools/support/random.hpp"
+
 namespace fxdyn {
 
 /// argmin_W 1/(2 N) |A W - Y|^2 + lambda sum|W|, N the rows, by the alternating direction method of multipliers, a
 /// fixed number of rounds. Elements that do not pay are exactly zero.
 Eigen::MatrixXd lasso(const Eigen::MatrixXd& a, const Eigen::MatrixXd& y, double lambda);
+
+/// W_1 .. W_m of the windows below, side by side: (inputs + 1) x (windows features), the bias last.
+Eigen::MatrixXd sparse_feature_weights(const Eigen::MatrixXd& u, Eigen::Index windows, Eigen::Index features,
+                                       Random& random);
 
 /// Input weights of nodes on sparse-autoencoder features (Chen, Liu 2018): nodes x (inputs + 1), the bias last.
 ///   A_i = U R_i                            random features of a window, U = [u, 1]; each scaled to +-1

@@ -26,7 +26,7 @@ struct Stribeck {
   template <class N, class Emit>
   static constexpr void basis(const JointInput<N>& u, Words<N> words, NoState&, Saturations&, Emit&& emit) {
     const auto ratio = N::template clamp<Argument<N>>(u.dq * words.template number<Quantity::inverse_velocity>(0));
-    const auto bump = exp_negative(N::template clamp<Argument<N>>(ratio * ratio));
+    const auto bump = bell_of<N>(ratio);
     emit(as<Quantity::unit>, 0, N::template proven_narrow<Unit<N>>(u.sign * bump));
   }
 };

@@ -16,7 +16,7 @@ std::vector<double> list(const ValueList& values) { return {values.begin(), valu
 TEST(EffectDeclarations, ListsAreThoseOfTheTraits) {
   EXPECT_EQ(nominal_effects(), (std::vector<std::string>{"viscous", "coulomb", "offset", "rotor_inertia"}));
   EXPECT_EQ(identified_effects(),
-            (std::vector<std::string_view>{"motor_coupling", "asymmetric_friction", "presliding", "stribeck"}));
+            (std::vector<std::string_view>{"motor_coupling", "asymmetric_friction", "presliding", "stribeck", "lugre"}));
   const auto named = [](auto&& has) {
     std::vector<std::string_view> names;
     for (const EffectInfo& info : effect_infos()) {
@@ -31,11 +31,12 @@ TEST(EffectDeclarations, ListsAreThoseOfTheTraits) {
   EXPECT_EQ(named([](const EffectInfo& info) { return info.drifts(); }), (Names{"friction_drift"}));
   EXPECT_EQ(named([](const EffectInfo& info) { return info.several; }), (Names{"ripple", "joint_coupling"}));
   EXPECT_EQ(named([](const EffectInfo& info) { return info.share; }), (Names{"saturation", "delay"}));
+  EXPECT_EQ(named([](const EffectInfo& info) { return info.unites_others(); }), (Names{"lugre"}));
 }
 
 TEST(EffectDeclarations, WhatIsNamedElsewhereIsInTheCatalogue) {
   for (const EffectInfo& info : effect_infos()) {
-    for (const std::string_view other : {info.replaces, info.warms_into[0], info.warms_into[1]})
+    for (const std::string_view other : {info.replaces, info.warms_into[0], info.warms_into[1], info.unites[0], info.unites[1]})
       EXPECT_TRUE(other.empty() || find_effect(other) != nullptr) << info.name << ": " << other;
     if (info.acts_on == ActsOn::position) {
       for (const ParameterInfo& shape : info.shape) EXPECT_TRUE(shape.values.of_link.given()) << info.name;
@@ -48,6 +49,7 @@ TEST(EffectDeclarations, TheRefinedShapeIsTheContinuousOne) {
   EXPECT_EQ(find_effect("stribeck")->refined_shape(), 0);
   EXPECT_EQ(find_effect("joint_coupling")->refined_shape(), -1);
   EXPECT_EQ(find_effect("motor_coupling")->refined_shape(), 2);
+  EXPECT_EQ(find_effect("lugre")->refined_shapes(), (std::vector<std::size_t>{0, 1, 2}));
 }
 
 TEST(EffectDeclarations, TheFirstCommonExperimentTellsTwoEffectsApart) {

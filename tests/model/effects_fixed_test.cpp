@@ -71,6 +71,8 @@ constexpr std::array cases{
     Case{"rotor_inertia", {}, {exact}},
     Case{"stribeck", {0.02, 10}, {3e-7}},      // exp ends at exp(-16)
     Case{"presliding", {1e-5, 0.03}, {3e-7}},  // the same, and rounding of the state
+    // the state as presliding's; dq's phi has its error and the reciprocal's times dq
+    Case{"lugre", {1e-4, 0.03}, {1e-6, 15 * 8e-6}},
     Case{"asymmetric_friction", {}, {exact, exact}},
     Case{"viscous_quadratic", {}, {0.51 * lsb(Quantity::velocity_squared)}},
     Case{"viscous_cubic", {}, {0.51 * (dq_limit * lsb(Quantity::velocity_squared) + lsb(Quantity::velocity_cubed))}},
@@ -128,7 +130,7 @@ template <class E, class N>
 std::vector<double> run(const std::vector<Tick>& ticks, double varied) {
   std::vector<typename N::Word> words;
   for (std::size_t i = 0; i < E::shape.size(); ++i) {
-    const double shape = i == 0 ? varied : (E::shape[i].name == "ratio" ? -0.7 : 0.05);
+    const double shape = i == 0 ? varied : (E::shape[i].name == "ratio" ? -0.7 : E::shape[i].name == "share" ? 0.7 : 0.05);
     const std::int32_t raw = to_raw(E::stored_shape(i, shape, step_s), Fixed32::bits(E::shape[i].quantity));
     if constexpr (std::is_same_v<N, Real>) {
       words.push_back(from_raw(raw, Fixed32::bits(E::shape[i].quantity)));

@@ -59,6 +59,13 @@ std::vector<double> expected(std::string_view effect, const JointSeries& s, int 
     z = direction - (direction - z) * std::exp(-std::fabs(dq) * step_s / 0.003);
     return {z - sign};
   }
+  if (effect == "lugre") {
+    // exact for the mean of both ends' velocities
+    const auto n = [](double v) { return 0.7 + 0.3 * std::exp(-std::pow(v / 0.2, 2)); };
+    const double mean = (dq + (k > 0 ? s.dq[k - 1] : 0)) / 2, to = std::copysign(n(mean), mean);
+    z = to - (to - z) * std::exp(-std::fabs(mean) * step_s / 0.003 / n(mean));
+    return {z - 0.7 * sign, dq - std::fabs(dq) * z / n(dq)};
+  }
   if (effect == "asymmetric_friction") return {std::fabs(sign), std::fabs(dq)};
   if (effect == "viscous_quadratic") return {std::copysign(dq * dq, dq)};
   if (effect == "viscous_cubic") return {std::pow(dq, 3)};
@@ -99,6 +106,7 @@ std::vector<double> expected(std::string_view effect, const JointSeries& s, int 
 std::vector<double> shape_of(std::string_view effect) {
   if (effect == "stribeck") return {0.1};
   if (effect == "presliding") return {0.003};
+  if (effect == "lugre") return {0.003, 0.2, 0.7};
   if (effect == "ripple") return {7};
   if (effect == "friction_drift") return {2};
   if (effect == "saturation") return {20};

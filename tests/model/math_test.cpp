@@ -100,6 +100,25 @@ TEST(Math, AreaSineKeepsTheStatedError) {
   }
 }
 
+TEST(Math, ReciprocalKeepsTheStatedError) {
+  for (std::int32_t x = 1 << 28; x <= 1 << 30; x += 9973) {
+    ASSERT_NEAR(value(raw::reciprocal(x), ratio_bits), 1 / value(x, 30), 6e-8) << x;
+  }
+  EXPECT_EQ(raw::reciprocal(1 << 30), 1 << ratio_bits);
+  for (const std::int32_t x : {INT32_MIN, -1, 0, 1, (1 << 28) - 1})
+    EXPECT_EQ(raw::reciprocal(x), raw::reciprocal(1 << 28)) << x;
+  EXPECT_EQ(raw::reciprocal(INT32_MAX), 1 << ratio_bits);
+  EXPECT_EQ(reciprocal_of(0.1), 4);
+  EXPECT_EQ(reciprocal_of(3.0), 1);
+}
+
+TEST(Math, HalfOfASumIsExact) {
+  const Fixed<28> a{3}, b{4};
+  EXPECT_EQ(half_of(a + b).raw, 7);  // of 29 bits
+  static_assert(std::is_same_v<decltype(half_of(a + b)), Wide<29>>);
+  EXPECT_EQ(sign_of(Wide<28>{std::int64_t{-1} << 40}).raw, -(1 << 30));
+}
+
 TEST(Math, MagnitudeAndSignAreTotal) {
   EXPECT_EQ(raw::magnitude(INT32_MIN), INT32_MAX);
   EXPECT_EQ(raw::magnitude(-5), 5);

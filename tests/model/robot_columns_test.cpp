@@ -41,6 +41,7 @@ Motion swing() {
 std::vector<double> shape_of(std::string_view effect, std::size_t joint) {
   if (effect == "stribeck") return {0.1};
   if (effect == "presliding") return {0.003};
+  if (effect == "lugre") return {0.003, 0.1, 0.7};
   if (effect == "ripple") return {7};
   if (effect == "friction_drift") return {2};
   if (effect == "saturation") return {0.1 * rated[joint]};

@@ -115,7 +115,7 @@ python3 - <<'PYTHON' || fail "compare.json"
 import json
 
 whole, begun = (json.load(open(f"{name}/compare.json")) for name in ("compared", "begun"))
-names = "rigid_ls friction_ls rls mlp bls_default bls_pso bls_pso_physical lugre named_bls oracle noise_floor".split()
+names = "rigid_ls friction_ls rls mlp bls_default bls_pso bls_pso_friction bls_pso_physical dahl_stribeck lugre named_bls oracle noise_floor".split()
 assert whole["against"] == "truth"
 assert [m["name"] for m in whole["methods"]] == names
 methods = {m["name"]: m for m in whole["methods"]}
@@ -125,7 +125,7 @@ for name, method in methods.items():
     assert all(peak > rmse for peak, rmse in zip(method["peak"], method["rmse"])), method
     assert abs(method["mean_percent_rated"] - sum(method["percent_rated"]) / 2) < 1e-12, method
     # What could go into firmware has been there.
-    fixed = name in ("rigid_ls", "friction_ls", "rls", "bls_pso_physical", "lugre", "named_bls")
+    fixed = name in ("rigid_ls", "friction_ls", "rls", "bls_pso_physical", "dahl_stribeck", "lugre", "named_bls")
     assert (method["fixed_error"] is not None) == fixed, method
     assert not fixed or 0 < method["fixed_error"] < 1e-3, method
 error = {name: method["mean_percent_rated"] for name, method in methods.items()}
@@ -135,7 +135,7 @@ assert error["bls_pso_physical"] <= 0.5 * error["mlp"]
 assert error["bls_pso_physical"] <= 0.3 * error["rls"]
 for name, method in ((m["name"], m) for m in begun["methods"]):
     assert method["rmse"] == methods[name]["rmse"], name
-    assert (method["train_s"] is None) == (name in ("bls_pso", "bls_pso_physical")), (name, method["train_s"])
+    assert (method["train_s"] is None) == (name in ("bls_pso", "bls_pso_friction", "bls_pso_physical")), (name, method["train_s"])
 PYTHON
 "$fxdyn" report arm.project --out compared >report.txt 2>&1 || fail "report: $(tail -1 report.txt)"
 grep -q 'Methods compared' compared/report.html || fail "the report lacks the comparison"

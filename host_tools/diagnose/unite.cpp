@@ -1,0 +1,88 @@
+#include <algorithm>
+#include <cmath>
+
+#include "host_tools/diagnose/dictionary.hpp"
+#include "host_tools/diagnose/refine.hpp"
+#include "host_tools/diagnose/search.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+bool is_united(const EffectInfo& info, std::string_view effect) {
+  return std::find(info.unites.begin(), info.unites.end(), effect) != info.unites.end();
+}
+
+/// Value of the members' shape parameter of this name.
+std::optional<double> shape_of(const std::vector<Group>& members, std::string_view name) {
+  for (const Group& member : members) {
+    const EffectInfo& info = *find_effect(member.candidate.effect);
+    for (std::size_t i = 0; i < info.shape.size(); ++i) {
+      if (info.shape[i].name == name) return member.candidate.shape[i];
+    }
+  }
+  return {};
+}
+
+/// Shapes to begin with: those of the members, else usual ones.
+std::vector<std::vector<double>> starts(const EffectInfo& info, const std::vector<Group>& members,
+                                        const MotionScales& scales) {
+  std::vector<std::vector<double>> values;
+  for (const ParameterInfo& shape : info.shape) {
+    if (const auto known = shape_of(members, shape.name)) {
+      values.push_back({*known});
+    } else {
+      const ValueList usual = shape.values.judged(scales);
+      values.emplace_back(usual.begin(), usual.end());
+    }
+  }
+  return combinations(values);
+}
+
+Group candidate(const EffectInfo& info, std::size_t joint, std::vector<double> shape) {
+  Group group;
+  group.candidate = {std::string(info.name), joint, std::move(shape)};
+  group.nonlinear = static_cast<int>(info.refined_shapes().size());
+  for (const ParameterInfo& p : info.linear) group.lower.push_back(p.lower);
+  return group;
+}
+
+}  // namespace
+
+std::optional<Choice> Search::united(const Choice& choice, const EffectInfo& info, std::size_t joint) {
+  std::vector<std::size_t> others;
+  std::vector<Group> members;
+  for (const std::size_t g : choice.groups) {
+    const Group& group = problem_.groups()[g];
+    const bool member =
+        !group.on_body && group.candidate.joint == joint && is_united(info, group.candidate.effect);
+    if (member) members.push_back(group);
+    if (!member) others.push_back(g);
+  }
+  if (members.empty()) return {};
+  const Choice without = evaluate(others);
+  std::optional<Choice> best;
+  const auto consider = [&](std::size_t g) {
+    std::vector<std::size_t> groups = others;
+    groups.push_back(g);
+    Choice tried = evaluate(groups);
+    if (tried.possible && (!best || tried.score > best->score)) best = std::move(tried);
+  };
+  for (const auto& shape : starts(info, members, scales_of(problem_, joint))) {
+    const Group start = candidate(info, joint, shape);
+    consider(problem_.add(start, problem_.make(start)));
+  }
+  if (best) consider(refine(without, best->groups.back()));
+  return best;
+}
+
+Choice Search::unite(Choice best) {
+  for (const EffectInfo& info : effect_infos()) {
+    for (std::size_t j = 0; info.unites_others() && j < problem_.joints(); ++j) {
+      std::optional<Choice> tried = united(best, info, j);
+      if (tried && tried->score > best.score) best = std::move(*tried);
+    }
+  }
+  return best;
+}
+
+}  // namespace fxdyn::diagnosis
