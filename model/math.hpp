@@ -35,6 +35,8 @@ inline double tanh_of(double x) { return std::tanh(x); }
 /// exp(-x) for x >= 0
 inline double exp_negative(double x) { return std::exp(-x); }
 inline double asinh_of(double x) { return std::asinh(x); }
+/// size where x >= 0, else -size.
+constexpr double signed_as(double size, double x) { return x < 0 ? -size : size; }
 constexpr double half_of(double x) { return x / 2; }
 /// 1 / x, 0.25 <= x <= 1
 constexpr double reciprocal_of(double x) { return 1 / (x < 0.25 ? 0.25 : x > 1 ? 1 : x); }
@@ -201,23 +203,22 @@ constexpr std::int32_t exp_negative(std::int32_t x) {
 /// 256 / i, 0.25 <= i / 256 <= 1, 28 bits.
 inline constexpr int reciprocal_bits = 28;
 inline constexpr auto reciprocal_table = [] {
-  std::array<std::int32_t, 193> table{};
+  std::array<std::int32_t, 256> table{};
   for (std::size_t i = 0; i < table.size(); ++i)
-    table[i] = series::to_raw(256 / static_cast<double>(i + 64), reciprocal_bits);
+    table[i] = series::to_raw(256 / static_cast<double>((i < 192 ? i : 192) + 64), reciprocal_bits);
   return table;
 }();
 
-/// 1 / x (ratio_bits) of x in [0.25, 1] with 30 bits, limited to it, |error| < 6e-8. With the nearest node's r:
+/// 1 / x (ratio_bits) of x in [0.25, 1] with 30 bits, |error| < 6e-8; beyond, anything. With the nearest node's r:
 /// e = 1 - x r, 1 / x = r (1 + e + e^2 + e^3) + O(e^4 / x), |e| <= 1/128.
 constexpr std::int32_t reciprocal(std::int32_t x) {
-  constexpr std::int32_t least = 1 << 28, most = 1 << 30;
-  x = x > least ? x : least;
-  x = x < most ? x : most;
-  const std::int32_t r = reciprocal_table[static_cast<std::size_t>(((x + (1 << 21)) >> 22) - 64)];
-  const auto e = static_cast<std::int32_t>(((std::int64_t{1} << 58) - std::int64_t{x} * r) >> 22);  // 36 bits
-  const std::int32_t square = multiply_high(e, e);                                                 // 40 bits
-  const std::int32_t gain = e + (square >> 4) + (multiply_high(square, e) >> 8);                   // 36 bits
-  const std::int32_t value = r + proven_narrow<36>(std::int64_t{r} * gain);                        // 28 bits
+  const std::uint32_t node = wrapping_subtract(wrapping_add(static_cast<std::uint32_t>(x), 1U << 21), 1U << 28) >> 22;
+  const std::int32_t r = reciprocal_table[node & 255U];
+  // 36 bits, of which the one has none among the lowest 32
+  const auto e = static_cast<std::int32_t>(wrapping_negate(static_cast<std::uint32_t>((std::int64_t{x} * r) >> 22)));
+  const std::int32_t square = multiply_high(e, e);  // 40 bits
+  const std::int32_t gain = e + (square >> 4) + (multiply_high(square, e) >> 8);
+  const std::int32_t value = r + proven_narrow<36>(std::int64_t{r} * gain);  // 28 bits
   return (value + (1 << 3)) >> (reciprocal_bits - ratio_bits);
 }
 
@@ -264,7 +265,11 @@ constexpr std::int32_t magnitude(std::int32_t x) {
 
 /// sign(x) with 30 bits
 constexpr std::int32_t sign(std::int32_t x) { return ((x > 0) - (x < 0)) * (1 << 30); }
-constexpr std::int32_t sign(std::int64_t x) { return ((x > 0) - (x < 0)) * (1 << 30); }
+/// size where x >= 0, else -size.
+constexpr std::int32_t signed_as(std::int32_t size, std::int64_t x) {
+  const auto mask = static_cast<std::int32_t>(x >> 63);
+  return (size ^ mask) - mask;
+}
 
 /// What a limiter to [-limit, limit], limit >= 0, adds to x; masks stand for max(x - limit, 0) and min(x + limit, 0).
 constexpr std::int32_t clipping(std::int32_t x, std::int32_t limit) {
@@ -310,9 +315,9 @@ template <int bits>
 constexpr Fixed<unit_bits> sign_of(Fixed<bits> x) {
   return {raw::sign(x.raw)};
 }
-template <int bits>
-constexpr Fixed<unit_bits> sign_of(Wide<bits> x) {
-  return {raw::sign(x.raw)};
+template <int bits, int other>
+constexpr Fixed<bits> signed_as(Fixed<bits> size, Wide<other> x) {
+  return {raw::signed_as(size.raw, x.raw)};
 }
 template <int bits>
 constexpr Fixed<bits> clipping(Fixed<bits> x, Fixed<bits> limit) {

@@ -200,8 +200,7 @@ struct FixedNumbers {
   template <class T, int bits>
   static constexpr T clamp(Wide<bits> x) {
     static_assert(bits >= T::bits, "narrowing to a finer format");
-    std::uint32_t outside = 0;
-    return {raw::narrow(x.raw, bits - T::bits, outside)};
+    return {raw::clamp<bits - T::bits>(x.raw)};
   }
   template <class T, int bits>
   static constexpr T convert(Fixed<bits> x) {

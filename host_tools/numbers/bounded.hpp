@@ -360,8 +360,13 @@ BoundedNumbers::Of<Quantity::unit> sign_of(Bounded<kind> x) {
   const bool touches = x.value.low - x.value.error <= 0 && x.value.high + x.value.error >= 0;
   return {{sign_of(x.value.low), sign_of(x.value.high), touches && x.value.error > 0 ? 2.0 : 0.0}};
 }
-inline BoundedNumbers::Of<Quantity::unit> sign_of(BoundedWide x) {
-  return sign_of(BoundedNumbers::Of<Quantity::unit>{x.value});
+template <Kind kind>
+Bounded<kind> signed_as(Bounded<kind> size, BoundedWide x) {
+  const Bound v = size.value;
+  Bound out = x.value.low >= 0 ? v : x.value.high < 0 ? -v : Bound::hull(v, -v);
+  const bool touches = x.value.low - x.value.error < 0 && x.value.high + x.value.error >= 0;
+  if (touches && x.value.error > 0) out.error += 2 * v.magnitude();
+  return {out};
 }
 inline BoundedWide half_of(BoundedWide x) { return {{x.value.low / 2, x.value.high / 2, x.value.error / 2}}; }
 inline BoundedNumbers::Of<Quantity::ratio> reciprocal_of(BoundedNumbers::Of<Quantity::unit> x) {

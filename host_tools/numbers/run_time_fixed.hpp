@@ -195,7 +195,10 @@ template <Kind kind>
 RunTimeNumbers::Of<Quantity::unit> sign_of(RunTimeFixed<kind> x) {
   return {raw::sign(x.raw)};
 }
-inline RunTimeNumbers::Of<Quantity::unit> sign_of(RunTimeWide x) { return {raw::sign(x.raw)}; }
+template <Kind kind>
+RunTimeFixed<kind> signed_as(RunTimeFixed<kind> size, RunTimeWide x) {
+  return {raw::signed_as(size.raw, x.raw)};
+}
 template <Kind kind>
 RunTimeFixed<kind> clipping(RunTimeFixed<kind> x, RunTimeFixed<kind> limit) {
   return {raw::clipping(x.raw, limit.raw)};
