@@ -43,8 +43,7 @@ consteval BitTiming bit_timing(BitTimingLimits limits, std::uint32_t clock_hz, B
     const std::uint64_t per_quantum = std::uint64_t{prescaler} * wanted.bits_per_second;
     if (per_quantum == 0 || clock_hz % per_quantum != 0) continue;
     const std::uint64_t quanta = clock_hz / per_quantum;
-    if (quanta < wanted.fewest_quanta || quanta > std::uint64_t{1} + limits.largest_segment1 + limits.largest_segment2)
-      continue;
+    if (quanta < wanted.fewest_quanta) continue;
     for (std::uint32_t segment2 = limits.largest_segment2; segment2 >= limits.smallest_segment2; --segment2) {
       if (quanta < std::uint64_t{1} + limits.smallest_segment1 + segment2) continue;
       const auto segment1 = static_cast<std::uint32_t>(quanta) - 1 - segment2;

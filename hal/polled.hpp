@@ -13,7 +13,7 @@ class Microseconds {
  public:
   /// `counter_hz` as a constant: the target does not divide. Rounded to 2^-32 us a count.
   struct Rate {
-    std::uint64_t us_per_count = 0;  ///< scaled by 2^32
+    std::uint64_t us_per_count;  ///< scaled by 2^32
     consteval explicit Rate(std::uint64_t counter_hz)
         : us_per_count(((std::uint64_t{1'000'000} << 32) + counter_hz / 2) / counter_hz) {}
   };

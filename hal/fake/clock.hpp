@@ -6,16 +6,18 @@
 
 namespace fxdyn::hal::fake {
 
-/// Each measurement returns the next multiple of 1000; the first one (the calibration) 0.
+/// Each measurement returns the next multiple of 1000; the first one (the calibration) 0. As a counter of a processor
+/// it counts on where it is not started again, and since power-on where it never was.
 class CycleCounter {
  public:
-  void start() {}
-  std::uint32_t stop() { return 1000 * measurements_++; }
+  static constexpr std::uint32_t since_power_on = 1'000'000'000;
+  void start() { counted_ = 0; }
+  std::uint32_t stop() { return counted_ += 1000 * measurements_++; }
   static constexpr const char* unit() { return "thousandths"; }
   void start_over() { measurements_ = 0; }  ///< what comes costs less again
 
  private:
-  std::uint32_t measurements_ = 0;
+  std::uint32_t measurements_ = 0, counted_ = since_power_on;
 };
 static_assert(hal::CycleCounter<CycleCounter>);
 

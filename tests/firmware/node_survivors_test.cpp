@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/firmware/node_bench.hpp"
 
 namespace fxdyn {
@@ -85,6 +87,100 @@ TEST(NodeSurvivors, TheFaultOutputIsSetAtTheStartAlsoWithoutAFault) {
   bench.on_wire.fault.level = true;
   bench.pass(1'000);
   EXPECT_FALSE(bench.on_wire.fault.level);
+}
+
+/// What the velocity limit of joint 1 allows from one tick to the next, twice: more is a jump.
+std::int32_t jump() {
+  using N = test::Robot::Numbers;
+  const double dq = std::ldexp(tables::page.parameters.constants[0].limits.dq_upper.raw, -Velocity<N>::bits);
+  return static_cast<std::int32_t>(std::ldexp(2 * dq * 0.002, Position<N>::bits));
+}
+
+// Two SYNCs at once are one period of the motion: a jump of one and a half periods' worth is none that two allow.
+TEST(NodeSurvivors, ASyncThatComesTwiceIsOnePeriod) {
+  Bench<> bench;
+  bench.start();
+  std::size_t k = 0;
+  while (k < 10) bench.tick(test::motion(k++));
+  bench.send_setpoints(test::motion(k));
+  bench.sync();
+  bench.pass(200);
+  bench.sync();
+  bench.pass(1800);
+  auto setpoints = test::motion(k);
+  setpoints[0].q += jump() + jump() / 2;
+  bench.send_setpoints(setpoints);
+  bench.sync();
+  EXPECT_EQ(bench.counted(dictionary::Counter::implausible_setpoints), 1U);
+  EXPECT_EQ(bench.counted(dictionary::Counter::ticks), 11U);
+  EXPECT_EQ(bench.counted(dictionary::Counter::stale_ticks), 2U) << "the SYNC that came twice, and the jump";
+}
+
+// The node's own tick comes half a period after a SYNC that was lost. Less than a quarter later the SYNC is the lost
+// one, with the setpoints of one period; from then on the next one, with those of two.
+TEST(NodeSurvivors, AQuarterAfterTheNodesOwnTickBeginsTheNextPeriod) {
+  for (const std::uint32_t after_us : {499U, 500U}) {
+    for (const int sent : {1, 2}) {
+      Bench<> bench;
+      bench.start();
+      std::size_t k = 0;
+      while (k < 9) bench.tick(test::motion(k++));
+      bench.send_setpoints(test::motion(k++));
+      bench.sync();
+      bench.pass(3000);
+      ASSERT_EQ(bench.counted(dictionary::Counter::overdue_syncs), 1U);
+      for (int i = 0; i < sent; ++i) bench.send_setpoints(test::motion(k++));
+      bench.pass(after_us);
+      bench.sync();
+      const bool fits = sent == (after_us < 500 ? 1 : 2);
+      EXPECT_EQ(bench.counted(dictionary::Counter::ticks), fits ? 11U : 10U) << after_us << ' ' << sent;
+    }
+  }
+}
+
+/// Whether 256 periods that take `over_us` more than their ticks are a wrong rate.
+bool is_wrong_rate(std::uint64_t over_us) {
+  Bench<> bench;
+  bench.start();
+  std::uint64_t passed = 0;
+  for (std::uint64_t i = 1; i <= 257; ++i) {
+    bench.send_setpoints(test::motion(i));
+    bench.sync();
+    const std::uint64_t until = 2000 * i + over_us * i / 256;
+    bench.pass(until - passed);
+    passed = until;
+  }
+  return bench.node.errors().is_present(Error::sync_rate);
+}
+
+// Two ticks and a 64th of 256 ticks: 4 ms and 8 ms.
+TEST(NodeSurvivors, ARateMayBeOffByTwoTicksAndA64th) {
+  EXPECT_FALSE(is_wrong_rate(12'000));
+  EXPECT_TRUE(is_wrong_rate(12'001));
+}
+
+/// A cost as the node keeps it; asking by SDO would be work of its own.
+std::uint32_t cost_in_thousands(const Bench<>& bench, std::uint8_t sub_index) {
+  dictionary::Object object;
+  EXPECT_EQ(bench.node.find(0x2002, sub_index, object), Abort::none);
+  std::array<std::uint8_t, dictionary::longest_string> bytes{};
+  bench.node.read(object, bytes.data());
+  return canopen::load<4>(bytes.data()) / 1000;
+}
+
+// The fake counter's n-th measurement takes n thousand, from its start on. With the model's n-th: six setpoints, what
+// is before the model, the model, what is after it; and of the poll of the tick before, of which the model was the m-th
+// measurement, what came after that tick: the end of its frame and, after a look at an empty bus, what is due.
+TEST(NodeSurvivors, EveryStretchIsMeasuredOnce) {
+  Bench<> bench;
+  bench.start();
+  bench.tick(test::motion(0));
+  const std::uint32_t m = cost_in_thousands(bench, 1);
+  bench.tick(test::motion(1));
+  const std::uint32_t n = cost_in_thousands(bench, 1);
+  std::uint32_t all = (m + 2) + (m + 4);
+  for (std::uint32_t i = n - 7; i <= n + 1; ++i) all += i;
+  EXPECT_EQ(cost_in_thousands(bench, 3), all) << m << ' ' << n;
 }
 
 // Object 0x2000:8 and the detail of an EMCY: numbers on the wire, which no version may change.

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <type_traits>
+
 #include "hal/can_timing.hpp"
 #include "hal/polled.hpp"
 #include "hal/stm32g4/drive_board.hpp"
@@ -30,6 +32,46 @@ static_assert(of_170.prescaler == 1 && of_170.segment1 == 148 && of_170.segment2
 constexpr BitTiming of_20_hertz = bit_timing(stm32g4::nominal_limits, 20, {.bits_per_second = 1});
 static_assert(of_20_hertz.prescaler == 1 && of_20_hertz.quanta() == 20);
 
+// Small fields: what they can't hold is not chosen, and every value that they can is.
+constexpr BitTimingLimits tiny{.largest_prescaler = 2,
+                               .smallest_segment1 = 1,
+                               .largest_segment1 = 7,
+                               .smallest_segment2 = 1,
+                               .largest_segment2 = 4,
+                               .largest_jump_width = 2};
+consteval bool is(BitTiming timing, std::uint32_t prescaler, std::uint32_t segment1, std::uint32_t segment2) {
+  return timing.prescaler == prescaler && timing.segment1 == segment1 && timing.segment2 == segment2;
+}
+static_assert(is(bit_timing(tiny, 20, {1, 800}), 2, 7, 2), "20 quanta are too many, its half needs the last prescaler");
+static_assert(is(bit_timing(tiny, 12, {1, 666}), 1, 7, 4), "both segments full");
+static_assert(is(bit_timing(tiny, 24, {1, 666}), 2, 7, 4));
+static_assert(is(bit_timing(tiny, 8, {1, 875}), 1, 6, 1), "the shortest segment 2");
+constexpr BitTimingLimits four_at_least{4, 4, 7, 4, 7, 4};
+static_assert(is(bit_timing(four_at_least, 9, {1, 555, 25}), 1, 4, 4), "both as short as they may be");
+static_assert(is(bit_timing(four_at_least, 12, {1, 875, 300}), 1, 7, 4), "as far as they go");
+// Of 12 quanta the nearest is 667, of the 4 that prescaler 3 would make 750: too coarse where 8 are asked for.
+constexpr BitTimingLimits coarse{16, 1, 7, 1, 8, 4};
+static_assert(is(bit_timing(coarse, 12, {1, 750, 100, 8}), 1, 7, 4));
+static_assert(is(bit_timing(coarse, 12, {1, 750, 100, 4}), 3, 2, 1));
+static_assert(is(bit_timing(coarse, 12, {1, 750, 100, 5}), 1, 7, 4));
+// Equally near: more quanta, then the earlier sample.
+static_assert(is(bit_timing(tiny, 16, {1, 500, 25, 4}), 2, 3, 4), "16 quanta are too many");
+static_assert(is(bit_timing(coarse, 8, {1, 750, 25, 4}), 1, 5, 2), "as 2 quanta and 1 of four");
+static_assert(is(bit_timing(coarse, 8, {1, 687, 100}), 1, 4, 3) && is(bit_timing(coarse, 8, {1, 688, 100}), 1, 5, 2));
+static_assert(bit_timing(tiny, 8, {1, 500, 25}).jump_width == 2 && bit_timing(tiny, 8, {1, 875}).jump_width == 1);
+
+// What there is no timing for does not compile.
+template <BitTimingLimits limits, std::uint32_t clock_hz, BitRate wanted>
+concept Possible = requires {
+  typename std::integral_constant<std::uint32_t, bit_timing(limits, clock_hz, wanted).prescaler>;
+};
+constexpr BitTimingLimits wide{2, 1, 16, 1, 8, 4}, late{2, 1, 16, 3, 8, 4};
+static_assert(Possible<wide, 10, {1}> && Possible<late, 20, {1}>, "90.0 % and 85.0 %: 2.5 % from what CiA 301 says");
+static_assert(Possible<tiny, 8, {1, 850}> && !Possible<tiny, 8, {1, 849}>, "87.5 %: 2.5 % off, and 2.6 %");
+static_assert(!Possible<tiny, 7, {1, 857}> && Possible<tiny, 7, {1, 857, 25, 7}>, "seven quanta where eight are usual");
+static_assert(!Possible<four_at_least, 8, {1, 500}> && Possible<four_at_least, 9, {1, 555}>);
+static_assert(!Possible<wide, 10, {}> && !Possible<wide, 10, {3}>);
+
 // The clock's tolerance in examples of others.
 // F. Hartwich, A. Bassemir, "The Configuration of the CAN Bit Timing", 1999: 1 Mbit/s of 10 MHz with 6 quanta of
 // propagation, 0.39 %; 100 kbit/s of 2 MHz with 1 quantum, 1.58 %, the most that CAN bears.
@@ -57,6 +99,20 @@ static_assert(clock_tolerance_ppm({1, 7, 2, 1}, 7) == 0 && clock_tolerance_ppm({
 static_assert(clock_tolerance_ppm({1, 7, 2, 1}, {1, 7, 2, 1}, 7) == 0);
 static_assert(propagation_quanta({1, 7, 2, 1}, 10'000'000, 600) == 6);
 static_assert(propagation_quanta({1, 7, 2, 1}, 10'000'000, 601) == 7);
+static_assert(propagation_quanta({1, 7, 2, 1}, 1, 1) == 1, "a part of a quantum is a quantum");
+static_assert(propagation_quanta({1, 7, 2, 1}, 1'000'000'000, 2'000'000'000) == 2'000'000'000,
+              "and a whole one is one");
+// Rounded down from the exact quotient of millionths: whole where it is whole, else the next one below.
+static_assert(clock_tolerance_ppm({1, 60, 40, 20}, 10) == 9900 && clock_tolerance_ppm({1, 59, 40, 20}, 10) == 10'000);
+static_assert(clock_tolerance_ppm({1, 9, 26, 26}, 0) == 10180 && clock_tolerance_ppm({1, 3, 4, 4}, 0) == 15'000);
+static_assert(clock_tolerance_ppm({4, 39, 26, 26}, {1, 59, 37, 28}, 5) == 14432);  // 3: 14432.99
+static_assert(clock_tolerance_ppm({1, 71, 30, 30}, {2, 36, 3, 2}, 42) == 2500);    // 3: 2500
+static_assert(clock_tolerance_ppm({4, 40, 29, 29}, {4, 52, 33, 14}, 32) == 4110);  // 4: 4110.997
+static_assert(clock_tolerance_ppm({2, 35, 40, 40}, {8, 11, 39, 36}, 7) == 8750);   // 4: 8750
+static_assert(clock_tolerance_ppm({4, 68, 29, 29}, {2, 11, 12, 10}, 2) == 10180);  // 5: 10180.99
+static_assert(clock_tolerance_ppm({4, 17, 12, 12}, {1, 31, 36, 7}, 9) == 4000);    // 5: 4000
+static_assert(clock_tolerance_ppm({4, 5, 30, 30}, {4, 49, 16, 4}, 3) == 1582);     // 4, phase segment 1 is 2
+static_assert(clock_tolerance_ppm({1, 40'000, 100, 1}, {1, 30, 11, 11}, 8) == 1);
 
 // What the guide says of the STM32G474.
 static_assert(stm32g4::crystal_ppm == 100 && stm32g4::internal_ppm == 7'500 + 10'000 + 1'000);

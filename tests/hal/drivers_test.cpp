@@ -53,6 +53,31 @@ TEST_F(FdcanTest, StartsInTheOrderOfTheManualAndAtTheBitRate) {
   EXPECT_EQ(model.field(0x1c, 25, 7) + 1, fast_timing.nominal.jump_width);
   EXPECT_EQ(model.field(0x0c, 0, 4) + 1, fast_timing.data.jump_width);
   EXPECT_EQ(model.interrupts, std::vector<std::uint32_t>{21});
+  EXPECT_GE(model.field(0x80, 2, 2), 2U) << "ANFE: rejected, not into the other FIFO, which nobody reads";
+  EXPECT_GE(model.field(0x80, 4, 2), 2U) << "ANFS";
+  EXPECT_EQ(model.field(0x80, 16, 5), 28U) << "LSS: every standard filter that there is";
+  EXPECT_EQ(model.field(0x80, 24, 4), 8U) << "LSE";
+}
+
+TEST_F(FdcanTest, AnInterruptOfBeforeTheStartIsForgotten) {
+  ASSERT_EQ(can.start(fast_timing), Status::ok);
+  model.arrives({.id = 1}, 0);
+  ASSERT_TRUE(model.interrupt());
+  ASSERT_EQ(can.start(fast_timing), Status::ok);
+  EXPECT_FALSE(model.interrupt());
+}
+
+TEST_F(FdcanTest, LengthsOfFdFramesAreThoseOfTheirCodes) {
+  ASSERT_EQ(can.start(fast_timing), Status::ok);
+  constexpr std::array<std::uint8_t, 16> sizes{0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64};  // ISO 11898-1
+  for (std::uint32_t code = 0; code < sizes.size(); ++code) {
+    FdFrame frame{.id = 1, .fd = true, .size = sizes[code]};
+    ASSERT_EQ(can.send(frame), Status::ok) << code;
+    EXPECT_EQ(model.transmit()->shape, code << 16 | 0b11U << 20);
+    receive(frame, code);
+    ASSERT_EQ(can.receive(frame), Status::ok);
+    EXPECT_EQ(frame.size, sizes[code]);
+  }
 }
 
 TEST_F(FdcanTest, TheTransmittersDelayIsCompensatedAtBothDataBitRates) {
@@ -78,7 +103,7 @@ TEST_F(FdcanTest, SlowDataPhaseNeedsNoCompensation) {
 
 TEST_F(FdcanTest, SendsEveryKindOfFrame) {
   ASSERT_EQ(can.start(fast_timing), Status::ok);
-  ASSERT_EQ(can.send({.id = 0x181, .size = 3, .data = {1, 2, 3}}), Status::ok);
+  ASSERT_EQ(can.send({.id = 0x181, .size = 3, .data = {1, 2, 3, 4}}), Status::ok);
   auto sent = model.transmit();
   ASSERT_TRUE(sent);
   EXPECT_EQ(sent->head, 0x181U << 18);
@@ -93,12 +118,14 @@ TEST_F(FdcanTest, SendsEveryKindOfFrame) {
   ASSERT_EQ(can.send(frame), Status::ok);
   sent = model.transmit();
   EXPECT_EQ(sent->shape, 15U << 16 | 0b11U << 20);
+  EXPECT_EQ(sent->words[0], 0x03020100U);
   EXPECT_EQ(sent->words[15], 0x3f3e3d3cU);
   for (const unsigned size : {9U, 10U, 63U, 65U}) {
     frame.size = static_cast<std::uint8_t>(size);
     EXPECT_EQ(can.send(frame), Status::failed) << size;
   }
   EXPECT_EQ(can.send({.id = 1, .size = 12}), Status::failed) << "12 bytes are none of classic CAN";
+  EXPECT_EQ(can.send({.id = 1, .remote = true, .fd = true}), Status::failed) << "CAN FD has no remote frames";
 }
 
 TEST_F(FdcanTest, WhatWaitsGoesOutLowestIdentifierFirst) {

@@ -352,12 +352,14 @@ TEST(Stm32g4, ClockRegistersEndAsTheManualHasThem) {
     model.write(0x4002'100c, 0b11U | 0xfU << 4 | 0x7fU << 8 | 0b11U << 21 | 0b11U << 25);
     model.write(0x4002'1000, model.read(0x4002'1000) | 1U << 24);
     model.write(0x4002'1008, 0b1111U << 4 | 0b01U);
+    model.write(0x4002'2000, 0x0004'010b);  // and of the flash other wait states, prefetch, no caches
     model.violations.clear();
     ASSERT_EQ(stm32g4::start_clock(Modelled{&model}).mhz, 168U);
     const std::uint32_t source_and_m = crystal ? 0b11U | 5U << 4 : 0b10U | 3U << 4;
     EXPECT_EQ(model.read(0x4002'100c), source_and_m | 84U << 8 | 1U << 20 | 1U << 21 | 1U << 24)
         << "PLLCFGR: N = 84, Q = 4, R = 2, both on";
     EXPECT_EQ(model.read(0x4002'1008), 0b1111U) << "CFGR: PLL, nothing divided";
+    EXPECT_EQ(model.read(0x4002'2000), 0x0004'0604U) << "ACR: 4 wait states, caches, no prefetch";
     EXPECT_EQ(model.read(0x4000'7080), 0U) << "CR5: range 1 with boost";
     EXPECT_EQ(model.read(0x4002'1000) >> 16 & 1U, crystal ? 1U : 0U) << "HSE stays on where it works";
     EXPECT_EQ(model.violations, std::vector<std::string>{});
@@ -413,7 +415,11 @@ TEST(Stm32g4, ItDoesNotSwitchWithoutWaitStatesNorStayHalfWay) {
   EXPECT_EQ(stm32g4::start_clock(Stubborn<test::G4>{&system, 0x4002'1008, 0b1100}).source,
             stm32::ClockSource::internal_slow);
   EXPECT_FALSE(system.runs_from_pll());
-  EXPECT_EQ(system.read(0x4002'1008) & 0xf0U, 0U) << "undivided again";
+  EXPECT_EQ(system.read(0x4002'1008) & 0xf3U, 0b01U) << "undivided again, HSI";
+  test::RccModel<test::G4> half;
+  EXPECT_EQ(stm32g4::start_clock(Stubborn<test::G4>{&half, 0x4002'1008, 0b1000}).source,
+            stm32::ClockSource::internal_slow)
+      << "SWS says HSI";
 }
 TEST(Stm32g4, APllThatDoesNotStopIsLeftAlone) {
   struct Running {

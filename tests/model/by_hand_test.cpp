@@ -3,12 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <ostream>
 #include <vector>
 
 #include "model/broad_learning.hpp"
 #include "model/catalogue.hpp"
 #include "model/joint_model.hpp"
+#include "model/rigid_body.hpp"
 
 namespace fxdyn {
 namespace {
@@ -141,6 +143,83 @@ TEST(ByHand, ARampIsAnEighthOfItsArgumentUpToEight) {
   EXPECT_EQ(RampNodes::of(4), 0.5);
   EXPECT_EQ(RampNodes::of(7), 0.875);
   EXPECT_EQ(RampNodes::of(9), 1);
+}
+
+// --- rigid bodies ----------------------------------------------------------------------------------------------------
+
+LinkInertia<Real> point_mass(double m, double x) { return {m, {m * x, 0, 0}, m * x * x}; }
+using TwoLinks = std::array<LinkGeometry<Real>, 2>;
+using TwoBodies = std::array<LinkInertia<Real>, 2>;
+using TwoJoints = std::array<JointState<Real>, 2>;
+using TwoTorques = std::array<double, 2>;
+constexpr double g = 9.81;
+
+/// Gravity along -y of the base, its z axis being joint 1's.
+TwoTorques inverse_dynamics(const TwoLinks& links, const TwoBodies& bodies, const TwoJoints& joints) {
+  std::array<LinkMotion<Real>, 2> motions;
+  std::array<Wrench<Real>, 2> wrenches;
+  TwoTorques tau{};
+  rnea<Real, 2>(links, bodies, {0, g, 0}, joints, motions, wrenches, tau);
+  return tau;
+}
+
+// Two point masses at the ends of two links in a vertical plane: Craig, Introduction to Robotics, Eq. 6.58.
+TEST(ByHand, AnArmOfTwoLinksInAPlane) {
+  const double l1 = 2, l2 = 0.7, m1 = 3, m2 = 5;
+  const TwoJoints joints{{{0.3, 0.9, -1.3}, {0.8, -0.6, 2.1}}};
+  const auto [q1, dq1, ddq1] = joints[0];
+  const auto [q2, dq2, ddq2] = joints[1];
+  const TwoLinks links{{{JointType::revolute, 1, 0, {0, 0, 0}}, {JointType::revolute, 1, 0, {l1, 0, 0}}}};
+  const TwoBodies bodies{point_mass(m1, l1), point_mass(m2, l2)};
+  const double c2 = std::cos(q2), s2 = std::sin(q2), far = m2 * l2 * l2 * (ddq1 + ddq2), both = m2 * l1 * l2,
+               outer_weight = m2 * l2 * g * std::cos(q1 + q2);
+  const double tau1 = far + both * c2 * (2 * ddq1 + ddq2) + (m1 + m2) * l1 * l1 * ddq1 - both * s2 * dq2 * dq2 -
+                      2 * both * s2 * dq1 * dq2 + outer_weight + (m1 + m2) * l1 * g * std::cos(q1);
+  const double tau2 = both * c2 * ddq1 + both * s2 * dq1 * dq1 + outer_weight + far;
+  const TwoTorques tau = inverse_dynamics(links, bodies, joints);
+  EXPECT_NEAR(tau[0], tau1, 1e-12);
+  EXPECT_NEAR(tau[1], tau2, 1e-12);
+  TwoTorques unrolled{};
+  using Planar = Link<JointType::revolute, Twist::none>;
+  rnea_of<Real, 0, Planar, Planar>(links, bodies, {0, g, 0}, joints, unrolled);
+  EXPECT_NEAR(unrolled[0], tau1, 1e-12);
+  EXPECT_NEAR(unrolled[1], tau2, 1e-12);
+}
+
+// A mass that slides along a turning link, in polar coordinates: m (r'' - r phi'^2), m (r^2 phi'' + 2 r r' phi').
+TEST(ByHand, AMassThatSlidesAlongATurningLink) {
+  const double m = 3;
+  const TwoJoints joints{{{0.4, 1.1, -0.7}, {1.5, -0.8, 0.6}}};
+  const auto [q, dphi, ddphi] = joints[0];
+  const auto [r, dr, ddr] = joints[1];
+  const double phi = q - raw::pi / 2;  // the second joint's axis is -y of the first link
+  const TwoLinks links{{{JointType::revolute, 1, 0, {0, 0, 0}}, {JointType::prismatic, 0, 1, {0, 0, 0}}}};
+  const TwoTorques tau = inverse_dynamics(links, {point_mass(0, 0), point_mass(m, 0)}, joints);
+  EXPECT_NEAR(tau[0], m * (r * r * ddphi + 2 * r * dr * dphi + g * r * std::cos(phi)), 1e-12);
+  EXPECT_NEAR(tau[1], m * (ddr - r * dphi * dphi + g * std::sin(phi)), 1e-12);
+}
+
+// --- Broad Learning System -------------------------------------------------------------------------------------------
+
+// Three nodes whose activation is an eighth of their argument, over x = [q, dq, ddq] and the curved velocity.
+TEST(ByHand, TheBasisOfABroadLearningSystem) {
+  const double curved = 0.881373587019543;                         // asinh(1)
+  const std::vector<double> words{0.5, 0.5, 0.25, 0.25, 0.5, 0.5,  // middle, then one over: see StateInputs
+                                  4,   1,   2,    -4,   0,         // bias, weights
+                                  1,   2,   4,    0,    0,         //
+                                  0.5, 0,   0,    0,    4};
+  JointInput<Real> input{};
+  input.q = 1;
+  input.dq = 2;
+  input.ddq = -3;
+  NoState state;
+  Saturations saturations;
+  std::array<double, 3> scratch{};
+  std::vector<double> out(7);
+  broad_learning_basis<StateInputs, RampNodes, Real>(3, input, Words<Real>{words.data()}, state, saturations, scratch,
+                                                     [&](auto, std::size_t i, double value) { out.at(i) = value; });
+  const std::vector<double> expected{0.25, 0.5, -0.75, curved / 2, 1, 3.5 / 8, (0.5 + 2 * curved) / 8};
+  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(out[i], expected[i], 1e-9) << i;
 }
 
 struct Formats {

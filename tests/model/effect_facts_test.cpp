@@ -79,6 +79,13 @@ TEST(EffectFacts, BoundsAreSound) {
   BodyEffects::for_each([]<class E>() { bounds_are_sound<E>(); });
 }
 
+// From a ripple that repeats after two turns of the joint to one of an encoder's lines.
+TEST(EffectFacts, ARippleMayBeSlowAndFast) {
+  const ParameterInfo& wavenumber = Ripple::shape[0];
+  EXPECT_LE(wavenumber.lower, 0.5);
+  EXPECT_GE(wavenumber.upper, 65536);
+}
+
 TEST(EffectFacts, ALimitCountsWhatItCutAndNothingElse) {
   Saturations saturations;
   EXPECT_EQ(limit(0.5, -1.0, 1.0, saturations), 0.5);

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "host_tools/numbers/bounded.hpp"
 #include "host_tools/numbers/run_time_fixed.hpp"
 #include "host_tools/support/random.hpp"
 
@@ -214,6 +215,24 @@ TEST(Fixed, ProvenNarrowRoundsHalfUpAtEveryShift) {
   }
   EXPECT_EQ(raw::shift_right(INT64_MAX, 1), INT64_MAX / 2 + 1);
   EXPECT_EQ(raw::shift_right(-1, 1), 0);  // a tie goes up
+}
+
+// |a + b| <= |a| + |b|, |a x b| <= |a| |b|, |s a| <= |s| |a|; of lengths that are known better than the components'.
+TEST(Vectors, ABoundOnTheLengthIsKept) {
+  using Number = BoundedNumbers::Of<Quantity::length>;
+  const auto vector = [](double most, double length, double error) {
+    const Number component{{-most, most, error}};
+    return Vector3<Number>{component, component, component, {length, error}};
+  };
+  const auto a = vector(2, 2, 0.25), b = vector(5, 5, 0.5);
+  const double error = 2 * 0.5 + 5 * 0.25 + 0.25 * 0.5;
+  EXPECT_EQ((a + b).length.length, 7);
+  EXPECT_EQ((a + b).length.error, 0.75);
+  EXPECT_EQ(cross(a, b).length.length, 10);
+  EXPECT_EQ(cross(a, b).length.error, error);
+  EXPECT_EQ(scale(b.x, a).length.length, 10);
+  EXPECT_EQ(scale(b.x, a).length.error, error);
+  EXPECT_EQ((Matrix3<Number>{b, b, b, {5, 0.5}} * a).length.length, 10);
 }
 
 }  // namespace

@@ -116,7 +116,7 @@ class RccModel : public RegisterModel {
       require((registers_[Part::flash] & 0xf) >= Part::latency, "switches with too few wait states");
       require(Part::half_before_switch(value), "switches above 80 MHz without AHB / 2");
       require(Part::fast_enough(registers_), "switches above 150 MHz without boost");
-      reads_since_switch_ = 0;
+      reads_since_switch_ = -2;  // neither the one that sees the switch nor that of the next change
       require(Part::buses_slow_enough(value), "switches with buses too fast");
     }
     if (address == Part::configuration && runs_from_pll() && ((registers_[address] ^ value) & 0xf0) != 0)  // HPRE
