@@ -26,17 +26,20 @@
 #include "model/effects/viscous_cubic.hpp"
 #include "model/effects/viscous_quadratic.hpp"
 
-// More effects without a change of this file: a header with `using UserEffects = EffectList<..>;` in namespace fxdyn,
-// named by -DFXDYN_EFFECTS=.. to CMake.
-#ifdef FXDYN_EFFECTS
+// More effects without a change of this file: a header with `using UserEffects = EffectList<..>;` in namespace fxdyn.
+// It is named by the macro FXDYN_EFFECTS, or by -DFXDYN_EFFECTS=.. to CMake, which writes configured_effects.hpp: no
+// command line of the compiler changes, so only what includes this file is compiled again.
+#if defined(FXDYN_EFFECTS)
 #include FXDYN_EFFECTS
+#elif __has_include("configured_effects.hpp")
+#include "configured_effects.hpp"
+#else
+namespace fxdyn {
+using UserEffects = EffectList<>;
+}
 #endif
 
 namespace fxdyn {
-
-#ifndef FXDYN_EFFECTS
-using UserEffects = EffectList<>;
-#endif
 
 /// The one list of joint effects: simulator, identifier, exporter and diagnoser walk it.
 using Catalogue = Joined<
@@ -57,7 +60,18 @@ template <class... Effects>
 constexpr bool all_are_declared(EffectList<Effects...>) {
   return (Declared<Effects>::value && ...);
 }
+template <class... First, class... Second>
+constexpr bool names_differ(EffectList<First...>, EffectList<Second...>) {
+  const std::array names{First::name..., Second::name...};
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      if (names[i] == names[k]) return false;
+    }
+  }
+  return true;
+}
 static_assert(all_are_effects(Catalogue{}));
+static_assert(names_differ(Catalogue{}, BodyEffects{}), "files name effects: no two may have the same name");
 static_assert(all_are_declared(Catalogue{}) && all_are_declared(BodyEffects{}));
 }  // namespace detail
 

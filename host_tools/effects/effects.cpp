@@ -12,7 +12,11 @@
 namespace fxdyn {
 namespace {
 
-void check(const EffectInfo& effect, const JointSeries& series) {
+void check(const EffectInfo& effect, std::span<const double> shape, const JointSeries& series) {
+  if (shape.size() != effect.shape.size()) {
+    throw InputError(
+        fmt::format("effect '{}' has {} shape parameters, not {}", effect.name, effect.shape.size(), shape.size()));
+  }
   const auto need = [&](bool needed, const auto& columns, std::string_view what) {
     if (needed && columns.size() == 0)
       throw InputError(fmt::format("effect '{}' needs {}, which is not known here", effect.name, what));
@@ -25,7 +29,7 @@ void check(const EffectInfo& effect, const JointSeries& series) {
 
 template <class E>
 Eigen::MatrixXd columns_of(std::span<const double> shape, double sign_width, const JointSeries& series) {
-  check(*find_effect(E::name), series);
+  check(*find_effect(E::name), shape, series);
   std::vector<double> words;
   for (std::size_t i = 0; i < E::shape.size(); ++i) words.push_back(E::stored_shape(i, shape[i], series.step_s));
   if constexpr (E::traits.most_ticks > 0) {

@@ -2,7 +2,8 @@
 
 #include "host_tools/report/section.hpp"
 
-// A line a section, in the order of the page: name, result file, to what the result has to belong, drawn without it?
+// A line a section, in the order of the page: name; result file without .json, "" where model and logs are enough; what
+// the result has to belong to (Belongs in results.hpp), else it is left out; whether it is drawn without its result.
 #define FXDYN_REPORT_SECTIONS(SECTION)              \
   SECTION(data, "metrics", anything, false)         \
   SECTION(error, "metrics", anything, false)        \

@@ -98,7 +98,7 @@ const Case& case_of(std::string_view effect) {
   for (const Case& c : cases) {
     if (c.effect == effect) return c;
   }
-  ADD_FAILURE() << "no tolerance for " << effect;
+  ADD_FAILURE() << "no range and tolerance for " << effect << ": write them into cases";
   return cases[0];
 }
 

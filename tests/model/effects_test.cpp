@@ -99,7 +99,7 @@ std::vector<double> expected(std::string_view effect, const JointSeries& s, int 
     const double other = -0.8 * s.peers_dq(k, 1);
     return {1 - 2 / (1 + std::exp(2 * (dq + other) / 0.05)), other, -0.8 * s.peers_ddq(k, 1)};
   }
-  ADD_FAILURE() << "no independent formula for " << effect << ": write one";
+  ADD_FAILURE() << "no independent formula for " << effect << ": write one into expected()";
   return {};
 }
 
@@ -115,7 +115,9 @@ std::vector<double> shape_of(std::string_view effect) {
   if (effect == "elasticity") return {0.01};
   if (effect == "backlash") return {5};
   if (effect == "motor_coupling") return {2, -0.8, 0.05};
-  return {};
+  const std::size_t count = find_effect(effect)->shape.size();
+  if (count > 0) ADD_FAILURE() << "no values for the shape of " << effect << ": write them into shape_of()";
+  return std::vector<double>(count, 0.1);
 }
 
 TEST(Effects, EveryOneFollowsItsIndependentFormula) {
@@ -163,6 +165,14 @@ TEST(Effects, WhatASeriesLacksIsRefused) {
       EXPECT_NO_THROW(columns()) << effect;
     }
   }
+}
+
+TEST(Effects, AnotherNumberOfShapeParametersIsRefused) {
+  const JointSeries series = random_series(13, 50);
+  const std::vector<double> two{0.1, 0.1};
+  EXPECT_THROW(effect_columns("stribeck", {}, sign_width, series), InputError);
+  EXPECT_THROW(effect_columns("stribeck", two, sign_width, series), InputError);
+  EXPECT_NO_THROW(effect_columns("stribeck", std::span(two).first(1), sign_width, series));
 }
 
 TEST(Effects, ADelayBeyondTheBufferIsRefused) {

@@ -1,6 +1,7 @@
 // The table of sections, and what the report shows of compare.json, vibration.json and efficiency.json.
 
 #include "host_tools/report/section.hpp"
+#include "host_tools/effects/identified_model.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,6 +11,7 @@
 
 #include "host_tools/report/comparison_plots.hpp"
 #include "host_tools/support/files.hpp"
+#include "tests/diagnose/small_log.hpp"
 #include "tests/support/files.hpp"
 
 namespace fxdyn {
@@ -21,16 +23,15 @@ void expect_all(const std::string& page, const std::vector<std::string>& parts) 
   for (const std::string& part : parts) EXPECT_NE(page.find(part), std::string::npos) << part << " not in " << page;
 }
 
-/// What the section of that name draws from its result alone.
-std::string drawn(std::string_view name, const json& result, const std::filesystem::path& directory = test::folder()) {
+/// What the section of that name draws from its result; for those that show the model or the logs, from these too.
+std::string drawn(std::string_view name, const json& result, const std::filesystem::path& directory = test::folder(),
+                  const IdentifiedModel& model = {}, const std::vector<ProcessedLog>& logs = {}) {
   const auto sections = report_sections();
   const auto section = std::find_if(sections.begin(), sections.end(), [&](const auto& s) { return s.name == name; });
   if (section == sections.end()) return "no such section";
   Results results;
   results.files[std::string(section->needs.name)] = result;
-  const IdentifiedModel model;
-  const std::vector<ProcessedLog> logs;
-  return draw_sections({model, {}, logs, results, directory}, {&*section, 1});
+  return draw_sections({model, to_json(model), logs, results, directory}, {&*section, 1});
 }
 
 TEST(Sections, EachHasItsName) {
@@ -61,6 +62,30 @@ TEST(Sections, OneMoreIsDrawnInItsPlace) {
   EXPECT_EQ(draw_sections(input, both), "second test\n");
   results.files["numbers"] = {{"count", 3}};
   EXPECT_EQ(draw_sections(input, both), "first 3\nsecond test\n");
+}
+
+TEST(ModelSections, ShowBaseParametersAndEffects) {
+  IdentifiedModel model = test::plant_of(read_urdf(test::puma560));
+  BaseParameter parameter;
+  parameter.column = 21;
+  parameter.name = "hx3";
+  parameter.value = -1.5;
+  parameter.std = 0.75;
+  model.base = {parameter};
+  model.joints[1].effects = {test::effect("viscous", {}, {2.25})};
+  const auto nowhere = test::folder();
+  expect_all(drawn("base", nullptr, nowhere, model),
+             {"<h2>Base parameters</h2>", "hx3", "-1.5", "0.75", "50 %", "kg*m"});
+  expect_all(drawn("effects", nullptr, nowhere, model),
+             {"<h2>Effects</h2>", "viscous", "coefficient = 2.25 N*m*s/rad"});
+}
+
+TEST(TorqueSection, DrawsEveryJointOfEveryLog) {
+  const IdentifiedModel model = test::plant_of(read_urdf(test::puma560));
+  const std::vector<ProcessedLog> logs{test::small_log(model, Role::test, 1)};
+  const std::string page = drawn("torque", nullptr, test::folder(), model, logs);
+  for (const Joint& joint : model.robot.joints) expect_all(page, {"<h3>" + joint.name + " in small.csv: RMSE "});
+  expect_all(page, {"<h2>Torque, measured and predicted</h2>", "<svg"});
 }
 
 json method(const std::string& name, double percent, const json& fixed) {
