@@ -23,7 +23,9 @@ class SearchOfEffects : public testing::Test {
     IdentifiedModel robot = model_;
     for (const EffectFit& fit : more) robot.joints[joint].effects.push_back(fit);
     logs_ = {test::small_session_log(robot, Role::train, 1), test::small_session_log(robot, Role::train, 2)};
-    problem_ = std::make_unique<Linearised>(test::around(model_), logs_, test::no_whitening());
+    Models models = test::around(model_);
+    models.options = options_;
+    problem_ = std::make_unique<Linearised>(models, logs_, test::no_whitening());
     std::vector<Group> groups;
     for (const EffectCandidate& candidate : candidates) {
       Group group;
@@ -53,6 +55,7 @@ class SearchOfEffects : public testing::Test {
   }
 
   IdentifiedModel model_;
+  Options options_;
   std::vector<SessionLog> logs_;
   std::unique_ptr<Linearised> problem_;
   std::vector<Found> found_;
@@ -66,6 +69,11 @@ const std::vector<EffectCandidate> stribeck_grid{{"stribeck", 1, {0.05}},
                                                  {"viscous_cubic", 1, {}}};
 
 TEST_F(SearchOfEffects, FindsNothingInNoise) { EXPECT_EQ(names(run(0, {}, stribeck_grid)), ""); }
+
+TEST_F(SearchOfEffects, FindsNothingBelowItsThresholds) {
+  options_.search.least_score = options_.search.most_score = 1e6;
+  EXPECT_EQ(names(run(1, {test::effect("ripple", {14}, {0.3, 0.2})}, stribeck_grid)), "");
+}
 
 TEST_F(SearchOfEffects, FindsARippleWithItsWavenumber) {
   const Choice choice = run(1, {test::effect("ripple", {14}, {0.3, 0.2})}, stribeck_grid);
