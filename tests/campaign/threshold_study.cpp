@@ -31,8 +31,8 @@ using nlohmann::json;
 /// A case whose logs are read and filtered once.
 class Prepared {
  public:
-  Prepared(const Case& one, const fs::path& out) {
-    const fs::path data = out / one.name / "data", truth = out / one.name / "truth";
+  Prepared(const Case& one, const fs::path& out) : folder_(out / one.name) {
+    const fs::path data = folder_ / "data", truth = folder_ / "truth";
     generate(one, data, truth);
     truth_ = json::parse(read_file(truth / "truth.json"));
     project_ = read_project(data / "project.toml");
@@ -41,8 +41,10 @@ class Prepared {
       log.role = Role::train;
       baseline_.push_back(process(std::move(log), data_.filter));
     }
-    fs::remove_all(out / one.name);
   }
+  ~Prepared() { fs::remove_all(folder_); }
+  Prepared(const Prepared&) = delete;
+  Prepared& operator=(const Prepared&) = delete;
 
   Answer answer(const diagnosis::Options& options) const {
     GateData data = data_;
@@ -55,6 +57,7 @@ class Prepared {
   }
 
  private:
+  fs::path folder_;  ///< the diagnosis reads project and URDF again
   json truth_;
   Project project_;
   GateData data_;
@@ -76,7 +79,8 @@ Answer varied(const Prepared& prepared, const Case& one, const Threshold& thresh
   threshold.of(options) *= factor;
   Answer answer = prepared.answer(options);
   if (words_of(answer) != words_of(normal))
-    fmt::print("  {}: {} x {:g}: {}\n", one.name, threshold.name, factor, words_of(answer));
+    fmt::print("  {}: {} x {:g}: {}, {}\n", one.name, threshold.name, factor, words_of(answer),
+               answer.right ? "right" : "wrong");
   return answer;
 }
 

@@ -110,7 +110,7 @@ class List {
 
 void add_healthy(List& list) {
   list.add(Group::clean, {}, "");
-  list.add(Group::clean, {}, "13_bits").recording.encoder_bits = 13;
+  list.add(Group::clean, {}, "15_bits").recording.encoder_bits = 15;
   list.add(Group::clean, {}, "no_baseline").baseline = false;
   list.add(Group::clean, {}, "controlled").closed_loop = true;
   list.add(Group::changed_friction, {}, "").friction_change = 0.05;
@@ -139,7 +139,7 @@ void add_others(List& list) {
     list.add(Group::dual_encoder, {{effect, 0, {}, false, deflection}}, effect).link_encoders = true;
   list.add(Group::background, {}, "quiet").background = {{"ripple", 0.006}, {"stribeck", 0.01}};
   list.add(Group::background, {{"spring", 0.01}}, "spring").background = {{"ripple", 0.006}, {"stribeck", 0.01}};
-  list.add(Group::single, {{"stribeck", 0.02}}, "stribeck_13_bits").recording.encoder_bits = 13;
+  list.add(Group::single, {{"stribeck", 0.02}}, "stribeck_15_bits").recording.encoder_bits = 15;
 }
 
 std::string counts(const ThresholdRow::Changed& changed) {
