@@ -84,8 +84,20 @@ Answer varied(const Prepared& prepared, const Case& one, const Threshold& thresh
   return answer;
 }
 
+/// What this very program answered before, to these thresholds.
+json key_of(const std::vector<Threshold>& thresholds) {
+  json names = json::array();
+  for (const Threshold& threshold : thresholds) names.push_back(threshold.name);
+  return {{"program", hash_of_file("/proc/self/exe")}, {"thresholds", names}};
+}
+
 CaseAnswers study(const Case& one, const std::vector<Threshold>& thresholds, const fs::path& out) {
   const auto start = std::chrono::steady_clock::now();
+  const fs::path file = out / (one.name + ".json");
+  if (fs::exists(file)) {
+    const json before = json::parse(read_file(file));
+    if (before.value("key", json()) == key_of(thresholds)) return case_answers(before.at("answers"));
+  }
   const Prepared prepared(one, out);
   CaseAnswers answers;
   answers.normal = prepared.answer({});
@@ -96,6 +108,7 @@ CaseAnswers study(const Case& one, const std::vector<Threshold>& thresholds, con
   fmt::print("{}: {}, {} ({:.1f} s)\n", one.name, words_of(answers.normal), answers.normal.right ? "right" : "wrong",
              std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   std::fflush(stdout);
+  write_file(file, json{{"key", key_of(thresholds)}, {"answers", to_json(answers)}}.dump(1) + "\n");
   return answers;
 }
 
@@ -150,7 +163,8 @@ int run(int argc, char** argv) {
   std::size_t jobs = 1;
   std::vector<std::string> some_cases, some_thresholds;
   bool list = false;
-  app.add_option("--out", out, "folder for the table and, meanwhile, the cases' logs")->required();
+  app.add_option("--out", out, "folder for table and answers; what this program answered there is not asked again")
+      ->required();
   app.add_option("--jobs", jobs, "cases at a time")->check(CLI::Range(1, 64));
   app.add_option("--case", some_cases, "only these");
   app.add_option("--threshold", some_thresholds, "only these");

@@ -200,6 +200,27 @@ Answer answer_of(const nlohmann::json& truth, const nlohmann::json& report) {
   return out;
 }
 
+nlohmann::json to_json(const CaseAnswers& answers) {
+  const auto one = [](const Answer& a) -> nlohmann::json {
+    return {{"verdict", a.verdict}, {"effects", a.effects}, {"joints", a.joints}, {"right", a.right}};
+  };
+  nlohmann::json out = {{"normal", one(answers.normal)}, {"halved", nlohmann::json::array()}};
+  out["doubled"] = out["halved"];
+  for (const Answer& answer : answers.halved) out["halved"].push_back(one(answer));
+  for (const Answer& answer : answers.doubled) out["doubled"].push_back(one(answer));
+  return out;
+}
+
+CaseAnswers case_answers(const nlohmann::json& json) {
+  const auto one = [](const nlohmann::json& a) -> Answer {
+    return {a.at("verdict"), a.at("effects"), a.at("joints"), a.at("right")};
+  };
+  CaseAnswers out{one(json.at("normal")), {}, {}};
+  for (const nlohmann::json& answer : json.at("halved")) out.halved.push_back(one(answer));
+  for (const nlohmann::json& answer : json.at("doubled")) out.doubled.push_back(one(answer));
+  return out;
+}
+
 bool ThresholdRow::without_effect() const {
   const auto none = [](const Changed& c) { return c.verdict + c.effects + c.joints == 0; };
   return none(halved) && none(doubled);

@@ -42,6 +42,9 @@ struct CaseAnswers {
   std::vector<Answer> halved, doubled;  ///< by threshold
 };
 
+nlohmann::json to_json(const CaseAnswers& answers);
+CaseAnswers case_answers(const nlohmann::json& json);
+
 /// One threshold over all cases.
 struct ThresholdRow {
   struct Changed {

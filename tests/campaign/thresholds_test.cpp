@@ -91,6 +91,19 @@ TEST(Thresholds, ChangesAreCountedCaseByCase) {
   EXPECT_TRUE(rows_of({gain}, {{found, {found}, {found}}})[0].without_effect());
 }
 
+TEST(Thresholds, AnswersAreReadAsTheyAreWritten) {
+  const CaseAnswers answers{
+      {"unexplained", {"spring"}, {0, 2}, true}, {{"refused", {}, {}, false}}, {{"unexplained", {}, {1}, false}}};
+  const CaseAnswers again = case_answers(to_json(answers));
+  EXPECT_EQ(again.normal.effects, answers.normal.effects);
+  EXPECT_EQ(again.normal.joints, answers.normal.joints);
+  EXPECT_TRUE(again.normal.right);
+  ASSERT_EQ(again.halved.size(), 1U);
+  EXPECT_EQ(again.halved[0].verdict, "refused");
+  ASSERT_EQ(again.doubled.size(), 1U);
+  EXPECT_EQ(again.doubled[0].joints, answers.doubled[0].joints);
+}
+
 TEST(Thresholds, AllHaveTheirLineOnThePage) {
   const std::string page = read_file(std::string(FXDYN_SOURCE_DIR) + "/docs/findings/thresholds.md");
   diagnosis::Options defaults;
