@@ -45,7 +45,7 @@ namespace fxdyn {
 using Catalogue = Joined<
     EffectList<Viscous, Coulomb, Offset, RotorInertia, Stribeck, Presliding, AsymmetricFriction, ViscousQuadratic,
                ViscousCubic, LoadFriction, TorqueGain, Ripple, Spring, GravityCompensator, FrictionDrift, Saturation,
-               JointCoupling, Delay, Elasticity, Backlash, Eccentricity, MotorCoupling, LuGre>,
+               JointCoupling, Delay, Elasticity, Backlash, Eccentricity, MotorCoupling, Lugre>,
     UserEffects>;
 
 /// Effects on the rigid body itself: they change its parameters and have no basis.

@@ -6,8 +6,16 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+namespace {
+
+/// Order of the model (decision 0005).
+constexpr Index order = 6;
+/// Share of the variance that is added to it: the equations stay regular for a pure tone.
+constexpr double ridge = 1e-4;
+
+}  // namespace
+
 VectorXd autoregression(const std::vector<VectorXd>& residuals) {
-  constexpr Index order = 6;
   VectorXd r = VectorXd::Zero(order + 1);
   for (const VectorXd& e : residuals) {
     for (Index lag = 0; lag <= order && lag < e.size(); ++lag)
@@ -18,7 +26,7 @@ VectorXd autoregression(const std::vector<VectorXd>& residuals) {
   for (Index i = 0; i < order; ++i) {
     for (Index k = 0; k < order; ++k) toeplitz(i, k) = r[std::abs(i - k)];
   }
-  toeplitz.diagonal() *= 1 + 1e-4;
+  toeplitz.diagonal() *= 1 + ridge;
   return toeplitz.ldlt().solve(r.tail(order));
 }
 

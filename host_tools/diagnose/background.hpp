@@ -13,10 +13,8 @@ namespace fxdyn::diagnosis {
 /// rows, - sqrt(prior) C(v). Sums of products of such columns are those of the whole problem less b.
 class Background {
  public:
-  static constexpr double prior = 4;
-
-  /// @param functions rows x functions, of any size: they are scaled to RMS 1
-  Background(Eigen::MatrixXd functions, const Blocks& blocks);
+  /// @param functions rows x functions, of any size: they are scaled to RMS 1 @param prior of |b|^2 [noise variances]
+  Background(Eigen::MatrixXd functions, const Blocks& blocks, double prior);
 
   /// Columns (all rows) without the background; their extra rows below.
   Eigen::MatrixXd eliminate(const Eigen::MatrixXd& columns) const;
@@ -29,6 +27,7 @@ class Background {
 
  private:
   std::vector<Block> fit_;
+  double prior_;
   Eigen::MatrixXd b_, inverse_;
 };
 

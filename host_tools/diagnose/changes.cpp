@@ -10,8 +10,8 @@
 namespace fxdyn::diagnosis {
 namespace {
 
-bool is_changed(const Unknown& u) {
-  constexpr double beyond = 2;  // times what sessions differ by
+/// By so many times what sessions differ by.
+bool is_changed(const Unknown& u, double beyond) {
   return u.change && u.kind == Unknown::Kind::linear && std::fabs(u.value) >= beyond * u.prior_std;
 }
 
@@ -20,7 +20,7 @@ bool is_changed(const Unknown& u) {
 std::vector<EffectCandidate> changed_effects(const Linearised& problem) {
   std::vector<EffectCandidate> out;
   for (const Unknown& u : problem.unknowns()) {
-    if (!is_changed(u)) continue;
+    if (!is_changed(u, problem.models().options.prior.changed)) continue;
     const EffectFit& fit = problem.models().current.joints[u.joint].effects[u.effect];
     // Of these, one that comes on top is the change: torques that add up, with shapes of their own.
     if (find_effect(fit.effect)->changes_by_one_more) out.push_back({fit.effect, u.joint, fit.shape});
@@ -33,7 +33,7 @@ std::vector<std::string> changed_parameters(const Linearised& problem) {
   const Models& models = problem.models();
   std::set<std::size_t> joints;
   for (const Unknown& u : problem.unknowns()) {
-    if (!is_changed(u)) continue;
+    if (!is_changed(u, problem.models().options.prior.changed)) continue;
     joints.insert(u.joint);
     const EffectFit& now = models.current.joints[u.joint].effects[u.effect];
     const Joint& joint = models.current.robot.joints[u.joint];

@@ -17,15 +17,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Least share of the deflection's power, on data that did not fit it, that a set has to close.
-constexpr double least_closure = 0.5;
-/// Of the power of all parts.
-constexpr double least_part = 0.05;
-/// Times the noise: a deflection without a name that is reported.
-constexpr double worth_a_word = 2;
-/// A parameter that differs by less than this share from the healthy session's has not changed.
-constexpr double same_share = 0.33;
-
 /// Logs of one joint, by what they are for.
 struct JointLogs {
   std::vector<LinkedLog> train, judge, healthy;
@@ -54,8 +45,10 @@ struct Closure {
 /// The deflection of one joint: the set of effects that explains it, and what speaks for it.
 class JointDeflection {
  public:
-  JointDeflection(const IdentifiedModel& model, const MatrixXd& covariance, JointLogs logs, std::size_t joint)
-      : model_(model),
+  JointDeflection(const IdentifiedModel& model, const MatrixXd& covariance, JointLogs logs, std::size_t joint,
+                  const DeflectionOptions& options)
+      : options_(options),
+        model_(model),
         covariance_(covariance),
         logs_(std::move(logs)),
         joint_(joint),
@@ -69,9 +62,9 @@ class JointDeflection {
     learn_healthy();
     closure_ = close();
     Deflections out;
-    if (closure_.all() < least_closure) {
+    if (closure_.all() < options_.least_closure) {
       // .. and so little that encoders may make it themselves is not worth a word.
-      if (closure_.before >= worth_a_word * closure_.noise)
+      if (closure_.before >= options_.noted * closure_.noise)
         out.notes.push_back(fmt::format("{}: the deflection that the link encoder shows is none that has a name",
                                         model_.robot.joints[joint_].name));
       return out;
@@ -88,13 +81,13 @@ class JointDeflection {
   VectorXd colour_of_rest() const { return rows_.colour(residual(design(rows_, set_.parts), rows_.delta())); }
 
   void choose() {
-    set_ = best_set(rows_, model_, covariance_, uncertainty_);
+    set_ = best_set(rows_, model_, covariance_, uncertainty_, options_);
     rotor_ = uncertainty_.rotor > 0 ? uncertainty_.rotor * rows_.z().tail(1)[0] : 0;
     if (rotor_ >= 0) return;
     // No rotor has less than nothing.
     rows_ = DeflectionRows(model_, logs_.train, joint_);
     uncertainty_ = {};
-    set_ = best_set(rows_, model_, covariance_, uncertainty_, false);
+    set_ = best_set(rows_, model_, covariance_, uncertainty_, options_, false);
     rotor_ = 0;
   }
 
@@ -109,7 +102,7 @@ class JointDeflection {
         whole += sizes.back();
       }
       const auto least = std::min_element(sizes.begin(), sizes.end());
-      if (*least > least_part * whole) return;
+      if (*least > options_.least_part * whole) return;
       set_.parts.erase(set_.parts.begin() + (least - sizes.begin()));
       fit(rows_, colour, set_);
     }
@@ -130,7 +123,7 @@ class JointDeflection {
     // The load stays where today's deflection has it: only the product with the compliance is known.
     rows.drop_slopes();
     LoadUncertainty same;
-    healthy_ = best_set(rows, model_, {}, same);
+    healthy_ = best_set(rows, model_, {}, same, options_);
     for (std::size_t p = 0; p < healthy_.parts.size(); ++p)
       healthy_sizes_.push_back(size_of(rows_, healthy_.parts[p], healthy_.theta_of(p)));
   }
@@ -141,7 +134,7 @@ class JointDeflection {
     const double today = size_of(rows_, set_.parts[part], set_.theta_of(part));
     for (std::size_t p = 0; p < healthy_.parts.size(); ++p) {
       if (healthy_.parts[p].effect == set_.parts[part].effect)
-        alike = std::fabs(today - healthy_sizes_[p]) < same_share * healthy_sizes_[p];
+        alike = std::fabs(today - healthy_sizes_[p]) < options_.same * healthy_sizes_[p];
     }
     return alike;
   }
@@ -207,6 +200,7 @@ class JointDeflection {
     return out;
   }
 
+  const DeflectionOptions& options_;
   const IdentifiedModel& model_;
   const MatrixXd& covariance_;
   JointLogs logs_;
@@ -223,7 +217,7 @@ class JointDeflection {
 
 Deflections find_deflections(const IdentifiedModel& model, const MatrixXd& base_covariance,
                              const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before,
-                             std::vector<DeflectionEffect>& background) {
+                             std::vector<DeflectionEffect>& background, const DeflectionOptions& options) {
   const std::size_t n = model.joints.size();
   IdentifiedModel healthy_model = model;  // without today's load
   std::erase_if(healthy_model.body, [](const EffectFit& fit) { return fit.named; });
@@ -233,7 +227,8 @@ Deflections find_deflections(const IdentifiedModel& model, const MatrixXd& base_
   parallel_for(n, [&](std::size_t j) {
     JointLogs logs{with_link(now, load_now, j, Role::train), with_link(now, load_now, j, Role::validate),
                    with_link(before, load_before, j, {})};
-    if (!logs.train.empty()) found[j] = JointDeflection(model, base_covariance, std::move(logs), j).find(learned[j]);
+    if (!logs.train.empty())
+      found[j] = JointDeflection(model, base_covariance, std::move(logs), j, options).find(learned[j]);
   });
   Deflections out;
   for (std::size_t j = 0; j < n; ++j) {

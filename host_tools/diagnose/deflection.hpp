@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/diagnose/options.hpp"
 #include "host_tools/effects/forward.hpp"
 #include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/regression/dataset.hpp"
@@ -38,6 +39,6 @@ struct Deflections {
 /// @param now logs of the current session (train fits, validate judges) @param before healthy ones, may be empty
 Deflections find_deflections(const IdentifiedModel& model, const Eigen::MatrixXd& base_covariance,
                              const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before,
-                             std::vector<DeflectionEffect>& background);
+                             std::vector<DeflectionEffect>& background, const DeflectionOptions& options);
 
 }  // namespace fxdyn::diagnosis

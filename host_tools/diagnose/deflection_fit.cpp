@@ -14,9 +14,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Minimum score gain to accept an effect.
-constexpr double least_score = 12;
-
 /// The values of a shape parameter on a link encoder: where a fit begins, then what it tries.
 ValueList link_values(const ParameterInfo& shape, double largest_load) {
   MotionScales scales;
@@ -229,7 +226,7 @@ void fit(const DeflectionRows& rows, const VectorXd& a, DeflectionSet& set) {
 }
 
 DeflectionSet best_set(DeflectionRows& rows, const IdentifiedModel& model, const MatrixXd& covariance,
-                       LoadUncertainty& uncertainty, bool with_rotor) {
+                       LoadUncertainty& uncertainty, const DeflectionOptions& options, bool with_rotor) {
   const std::vector<DeflectionPart> full = all_parts(rows.largest_load());
   // Colour of what no set explains.
   const VectorXd a = rows.colour(residual(design(rows, full), rows.delta()));
@@ -240,13 +237,13 @@ DeflectionSet best_set(DeflectionRows& rows, const IdentifiedModel& model, const
     std::vector<Moved> next = extended(rows, a, best, full);
     double most = -1e300;
     for (const Moved& one : next) most = std::max(most, one.set.score);
-    if (most < best.set.score + least_score) break;
-    if (level == 0 && covariance.size() > 0) uncertainty = rows.add_uncertainty(model, covariance, with_rotor);
+    if (most < best.set.score + options.least_score) break;
+    if (level == 0 && covariance.size() > 0) uncertainty = rows.add_uncertainty(model, covariance, options, with_rotor);
     for (Moved& one : next) one = move_load(rows, a, one.set);
     if (level == 0 && rows.z().size() > 0) try_likely_load(rows, a, full, next);
     const auto chosen =
         std::max_element(next.begin(), next.end(), [](const Moved& x, const Moved& y) { return x.score < y.score; });
-    if (chosen->score < best.score + least_score) break;
+    if (chosen->score < best.score + options.least_score) break;
     best = *chosen;
     if (best.z.size() > 0) rows.move(best.z);
   }

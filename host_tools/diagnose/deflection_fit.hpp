@@ -40,7 +40,7 @@ void fit(const DeflectionRows& rows, const Eigen::VectorXd& colour, DeflectionSe
 /// @param rows their load is moved @param covariance of the base parameters; empty: the load is taken as it is
 /// @param uncertainty of the load, as it was found
 DeflectionSet best_set(DeflectionRows& rows, const IdentifiedModel& model, const Eigen::MatrixXd& covariance,
-                       LoadUncertainty& uncertainty, bool with_rotor = true);
+                       LoadUncertainty& uncertainty, const DeflectionOptions& options, bool with_rotor = true);
 
 /// RMS of a part's deflection over the rows.
 double size_of(const DeflectionRows& rows, const DeflectionPart& part, const Eigen::VectorXd& theta);

@@ -133,8 +133,8 @@ void DeflectionRows::drop_slopes() {
 }
 
 LoadUncertainty DeflectionRows::add_uncertainty(const IdentifiedModel& model, const MatrixXd& covariance,
-                                                bool with_rotor) {
-  constexpr double little = 1e-3;  // of the load
+                                                const DeflectionOptions& options, bool with_rotor) {
+  const double little = options.load_uncertainty;
   LoadUncertainty u;
   const auto j = static_cast<Index>(joint_);
   std::vector<Index> mine;  // those of links from the joint on

@@ -4,6 +4,7 @@
 #include <string_view>
 #include <vector>
 
+#include "host_tools/diagnose/options.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/dataset.hpp"
@@ -45,7 +46,7 @@ class DeflectionRows {
 
   /// Directions in which the load is uncertain; the rows get its slopes along them, and z = 0.
   LoadUncertainty add_uncertainty(const IdentifiedModel& model, const Eigen::MatrixXd& base_covariance,
-                                  bool with_rotor);
+                                  const DeflectionOptions& options, bool with_rotor);
   /// .. of other rows of the same joint.
   void add_slopes(const IdentifiedModel& model, const LoadUncertainty& uncertainty);
   void drop_slopes();

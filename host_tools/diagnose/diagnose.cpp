@@ -120,8 +120,10 @@ VectorXd diluted(const Linearised& problem) {
 class Diagnoser {
  public:
   Diagnoser(const Project& project, GateData& data, const std::vector<ProcessedLog>& baseline,
-            const std::vector<ProcessedLog>& test, const std::vector<bool>& still, Progress& progress)
+            const std::vector<ProcessedLog>& test, const std::vector<bool>& still, Progress& progress,
+            const Options& options)
       : project_(project), data_(data), baseline_(baseline), test_(test), still_(still), progress_(progress) {
+    models_.options = options;
     models_.has_baseline = !baseline_.empty();
     models_.smallest_step_s = project_.target.tick_s;
     for (const std::vector<ProcessedLog>* logs :
@@ -132,7 +134,7 @@ class Diagnoser {
     // Few things change at once; a robot of which nothing is known may lack more.
     // A change beside a baseline is something or other; without one every joint may lack all that it is asked for.
     settings_.most = 4 + joints() * (models_.has_baseline ? 1 : settings_.max_effects);
-    logs_ = sessions(data_.logs, baseline_, session_);
+    logs_ = sessions(data_.logs, baseline_, session_, options.session);
     for (std::size_t j = 0; j < joints(); ++j) {
       if (!still_[j]) continue;
       for (const std::string_view effect : joint_effect_names()) never_.push_back({std::string(effect), j, {}});
@@ -140,7 +142,7 @@ class Diagnoser {
   }
 
   Diagnosis run() {
-    check_lengths(logs_);
+    check_lengths(logs_, options().session);
     const auto judges = [](const ProcessedLog& log) { return log.role == Role::validate; };
     if (data_.logs.size() > 1 && std::none_of(data_.logs.begin(), data_.logs.end(), judges)) {
       notes_.push_back("no log has role = \"validate\": names are accepted on the " + gate_of(data_.logs) +
@@ -150,7 +152,7 @@ class Diagnoser {
       learn_baseline();
     } else {
       models_.current = nominal_model(project_, data_, false, progress_);
-      mute(logs_, models_.current, still_);
+      mute(logs_, models_.current, still_, options().session);
       look_at_links(models_.current, logs_);
     }
     models_.current.session = session_;
@@ -165,8 +167,8 @@ class Diagnoser {
       before = models_;
       refit(before, logs_, plain(), 8);
     }
-    add_notes(check_judges(before.current, data_.logs, still_));
-    add_notes(check_judges(before.current, test_, still_));
+    add_notes(check_judges(before.current, data_.logs, still_, options().session));
+    add_notes(check_judges(before.current, test_, still_, options().session));
     if (deflections_.found.empty()) {
       models_ = before;
     } else {
@@ -202,7 +204,7 @@ class Diagnoser {
     believe(found.current, gate, *outcome.problem);
     result.model = found.current;
     if (models_.has_baseline) add_notes(changed_parameters(*outcome.problem));
-    const auto impacts = find_impacts(result.model, data_.logs, found.healthy, baseline_);
+    const auto impacts = find_impacts(result.model, data_.logs, found.healthy, baseline_, options().impact);
     result.report =
         verdicts({result.nominal, result.model, outcome, gate, deflections_, impacts, still_, data_.logs, test_});
     for (std::size_t j = 0; j < joints(); ++j) {
@@ -219,17 +221,17 @@ class Diagnoser {
 
  private:
   std::size_t joints() const { return project_.robot.size(); }
+  const Options& options() const { return models_.options; }
   std::vector<VectorXd> plain() const { return std::vector<VectorXd>(joints(), VectorXd::Zero(1)); }
   void add_notes(const std::vector<std::string>& notes) { notes_.insert(notes_.end(), notes.begin(), notes.end()); }
   const std::string& name_of(std::size_t j) const { return project_.robot.joints[j].name; }
 
   /// The rotor that a link encoder separates from the link.
   static void add_rotor(Models& models, const DeflectionEffect& effect) {
-    constexpr double share = 0.1;  // of it, standard deviation
     if (effect.rotor <= 0 || rotor_of(models.current.joints[effect.joint]) != nullptr) return;
     const IdentifiedModel& model = models.current;
     Rotor rotor{effect.joint, rotor_in_base(to_dh(model.robot), base_of(model), static_cast<Index>(effect.joint)),
-                effect.rotor, share * effect.rotor};
+                effect.rotor, models.options.prior.link_rotor * effect.rotor};
     bring_rotor(models, rotor, effect.rotor);
   }
 
@@ -241,6 +243,7 @@ class Diagnoser {
     {
       Models alone;
       alone.current = model;
+      alone.options = options();
       std::vector<SessionLog> logs;
       for (const SessionLog& log : fitted) {
         if (!log.fits) continue;
@@ -250,7 +253,7 @@ class Diagnoser {
       covariance = base_covariance(Linearised(alone, logs));
     }
     std::vector<DeflectionEffect> already;
-    deflections_ = find_deflections(model, covariance, data_.logs, baseline_, already);
+    deflections_ = find_deflections(model, covariance, data_.logs, baseline_, already, options().deflection);
     add_notes(deflections_.notes);
     if (!baseline_.empty() && std::none_of(baseline_.begin(), baseline_.end(), linked) && !deflections_.found.empty())
       notes_.push_back("the baseline has no qlink columns: what the link encoders show may have been there before");
@@ -300,8 +303,8 @@ class Diagnoser {
     std::vector<EffectId> unused = ids;
     const Models asked = without_rotors(outcome.models, deflections_, unused);
     std::vector<DeflectionEffect> already;
-    const Deflections again =
-        find_deflections(asked.current, base_covariance(Linearised(asked, logs_)), data_.logs, baseline_, already);
+    const Deflections again = find_deflections(asked.current, base_covariance(Linearised(asked, logs_)), data_.logs,
+                                               baseline_, already, options().deflection);
     Deflections taken, kept;
     for (std::size_t j = 0; j < joints(); ++j) {
       const auto now = at_joint(again, j), was = at_joint(deflections_, j);
@@ -311,7 +314,7 @@ class Diagnoser {
       };
       const bool same = std::equal(now.begin(), now.end(), was.begin(), was.end(),
                                    [](const auto& a, const auto& b) { return a.fit.effect == b.fit.effect; });
-      const bool better = same && !was.empty() && closes(now) >= closes(was) - 0.01;
+      const bool better = same && !was.empty() && closes(now) >= closes(was) - options().deflection.lost_closure;
       taken.found.insert(taken.found.end(), now.begin(), better ? now.end() : now.begin());
       kept.found.insert(kept.found.end(), was.begin(), better ? was.begin() : was.end());
     }
@@ -349,7 +352,7 @@ class Diagnoser {
     } catch (const DataError& error) {
       throw DataError(fmt::format("role = \"baseline\": {}", error.what()));
     }
-    mute(logs_, models_.healthy, still_);
+    mute(logs_, models_.healthy, still_, options().session);
     models_.healthy.logs = data_.references;
     std::vector<SessionLog> before;
     for (const SessionLog& log : logs_) {
@@ -365,6 +368,7 @@ class Diagnoser {
     Models alone;
     alone.current = models_.healthy;
     alone.fixed = models_.fixed;
+    alone.options = options();
     alone.smallest_step_s = models_.smallest_step_s;
     for (const DeflectionEffect& effect : bent_already_) add_rotor(alone, effect);
     for (int round = 0; round < 2; ++round) refit(alone, before, {}, 4);
@@ -389,7 +393,7 @@ class Diagnoser {
           if (fit.named) notes_.push_back(fmt::format("{}: the baseline has {} already", name_of(j), fit.effect));
           fit.named = false;
         }
-        if (!background.lack[j].structured()) continue;
+        if (!background.structured(j)) continue;
         models_.background.push_back(j);
         notes_.push_back(fmt::format("{}: the baseline has structure that no effect explains", name_of(j)));
       }
@@ -406,7 +410,7 @@ class Diagnoser {
     for (std::size_t i = 0; i < gate.groups.size(); ++i) {
       const EffectId& id = problem.groups()[gate.groups[i]].id;
       if (id.body) {
-        model.body[id.effect].named = gate.robot_closure[i] >= least_closure;
+        model.body[id.effect].named = gate.robot_closure[i] >= options().gate.least_closure;
       } else {
         model.joints[id.joint].effects[id.effect].named = gate.accepted[id.joint];
       }
@@ -432,8 +436,8 @@ class Diagnoser {
 }  // namespace
 
 Diagnosis diagnose(const Project& project, GateData& given, const std::vector<ProcessedLog>& given_baseline,
-                   const std::vector<ProcessedLog>& test, Progress& progress) {
-  const std::vector<bool> still = still_joints(given);
+                   const std::vector<ProcessedLog>& test, Progress& progress, const Options& options) {
+  const std::vector<bool> still = still_joints(given, options.session);
   if (std::find(still.begin(), still.end(), false) == still.end()) {
     throw DataError(
         "not_excited: no joint moves in the train logs by more than its encoder's noise; record logs in which they do");
@@ -443,7 +447,7 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
   std::vector<ProcessedLog> baseline = given_baseline;
   leave_out(data.logs, still);
   leave_out(baseline, still);
-  Diagnoser diagnoser(project, data, baseline, test, still, progress);
+  Diagnoser diagnoser(project, data, baseline, test, still, progress, options);
   Diagnosis result = diagnoser.run();
   given.notes = data.notes;
   given.notes.insert(given.notes.end(), diagnoser.notes().begin(), diagnoser.notes().end());

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "host_tools/diagnose/options.hpp"
 #include "host_tools/identify/identify.hpp"
 
 namespace fxdyn {
@@ -19,8 +20,9 @@ struct Diagnosis {
 /// docs/guide/diagnosis.md explains the rules.
 /// @param data train and validate logs @param baseline a healthy session, role train, filtered alike; may be empty
 /// @param test read for the figures only; but their sampling step, like that of all logs, bounds a delay
+/// @param options its thresholds
 /// @throws DataError: logs with too little information, a baseline that can't be the same robot's
 Diagnosis diagnose(const Project& project, GateData& data, const std::vector<ProcessedLog>& baseline,
-                   const std::vector<ProcessedLog>& test, Progress& progress);
+                   const std::vector<ProcessedLog>& test, Progress& progress, const diagnosis::Options& options = {});
 
 }  // namespace fxdyn

@@ -15,9 +15,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// A residual of that many times the noise is mostly gap.
-constexpr double much_more = 3;
-
 /// What can't be seen whatever its size: by joint, the robot's last.
 std::vector<std::vector<std::string>> blind_spots(const Linearised& problem, const Search& search) {
   std::vector<std::vector<std::string>> out(problem.joints() + 1);
@@ -48,7 +45,8 @@ std::vector<VectorXd> colours(const Models& models, const std::vector<SessionLog
   for (std::size_t j = 0; j < n; ++j) {
     double noise = 0;
     for (const SessionLog& entry : logs) noise = std::max(noise, entry.log.torque_noise[static_cast<Index>(j)]);
-    if (1 / std::sqrt(in_band.solver().weights()[static_cast<Index>(j)]) > much_more * noise) out[j] = white[j];
+    if (1 / std::sqrt(in_band.solver().weights()[static_cast<Index>(j)]) > models.options.noise.mostly_gap * noise)
+      out[j] = white[j];
   }
   return out;
 }
@@ -56,8 +54,11 @@ std::vector<VectorXd> colours(const Models& models, const std::vector<SessionLog
 }  // namespace
 
 bool Outcome::structured() const {
-  return std::any_of(lack.begin(), lack.end(), [](const LackOfFit& l) { return l.structured(); });
+  return std::any_of(lack.begin(), lack.end(),
+                     [&](const LackOfFit& l) { return l.structured(models.options.lack_of_fit); });
 }
+
+bool Outcome::structured(std::size_t joint) const { return lack[joint].structured(models.options.lack_of_fit); }
 
 void Outcome::look_again(const std::vector<SessionLog>& logs) {
   problem = std::make_unique<Linearised>(models, logs, whitening);

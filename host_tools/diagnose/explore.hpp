@@ -27,6 +27,7 @@ struct Outcome {
   std::vector<Eigen::VectorXd> whitening;
 
   bool structured() const;  ///< at any joint
+  bool structured(std::size_t joint) const;
   /// Linearises around the models again and looks for lack of fit.
   void look_again(const std::vector<SessionLog>& logs);
 };

@@ -31,7 +31,7 @@ Gain gain_of_one(double gram, double projection, const Reduced& reduced, double 
 
 }  // namespace
 
-Gain gain_of(const Reduced& reduced, const std::vector<double>& lower, bool share) {
+Gain gain_of(const Reduced& reduced, const std::vector<double>& lower, bool share, double beyond) {
   const Index p = reduced.gram.rows();
   const VectorXd scale = reduced.size.unaryExpr([](double x) { return x > 0 ? 1 / std::sqrt(x) : 0.0; });
   const MatrixXd g = scale.asDiagonal() * reduced.gram * scale.asDiagonal();
@@ -55,7 +55,7 @@ Gain gain_of(const Reduced& reduced, const std::vector<double>& lower, bool shar
     const double bound = lower[static_cast<std::size_t>(i)];
     if (bound < no_bound || out.theta[i] >= bound) continue;
     const double std = scale[i] / std::sqrt(std::max(g(i, i), 1e-12));
-    if (out.theta[i] < bound - 3 * std) out.square = 0;
+    if (out.theta[i] < bound - beyond * std) out.square = 0;
   }
   return out;
 }

@@ -7,7 +7,7 @@
 
 namespace fxdyn::diagnosis {
 
-/// Less of a column than this (squared) is nothing.
+/// A numeric choice: less of a column than this (squared) is rounding.
 inline constexpr double nothing_left = 1e-5;
 
 /// Products of a group's columns, weighted, once the columns that are fitted beside them have taken their part.
@@ -26,7 +26,8 @@ struct Gain {
 };
 
 /// @param lower bounds of the coefficients @param share the coefficient is 1 by definition
-Gain gain_of(const Reduced& reduced, const std::vector<double>& lower, bool share);
+/// @param beyond standard deviations: coefficients further below their bounds gain nothing
+Gain gain_of(const Reduced& reduced, const std::vector<double>& lower, bool share, double beyond);
 
 /// A candidate whose coefficient is a share, 1 by definition.
 bool is_share(const Group& group);

@@ -18,13 +18,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// What an effect must bring on data that did not fit it: squares in units of the noise.
-constexpr double least_gain = 4;
-/// .. and of the gap at its joint; more where the joint has structure left, whose squares are no noise.
-constexpr double least_share = 0.01, least_share_in_structure = 0.02;
-/// Times the plain error before.
-constexpr double worse = 1.02;
-
 /// The model without some of its named effects. Leaving out their columns is not enough where they work on what others
 /// do, as those columns are of a model that has the effect: inertias seen through a gear that bends may do its work.
 std::unique_ptr<Linearised> without(const Outcome& outcome, const std::vector<SessionLog>& logs,
@@ -109,7 +102,7 @@ HeldOut judge(const Outcome& outcome, const std::vector<SessionLog>& logs, const
   parallel_for(n, [&](std::size_t j) { in_band[j] = features(problem, j, problem.models().has_baseline); });
   const HeldOut band = hold_out(outcome, logs, problem, in_band, groups);
   for (std::size_t j = 0; j < n; ++j) {
-    if (!outcome.lack[j].structured()) continue;
+    if (!outcome.structured(j)) continue;
     const auto k = static_cast<Index>(j);
     for (VectorXd HeldOut::*of :
          {&HeldOut::before, &HeldOut::after, &HeldOut::leftover, &HeldOut::excess, &HeldOut::rows,
@@ -124,15 +117,16 @@ VectorXd gap_of(const HeldOut& held) { return (held.before - held.after).cwiseMa
 
 /// Whether an effect brings anything: over all joints, and as a share of the gap at its own.
 bool holds(const Outcome& outcome, const Group& group, const HeldOut& held, std::size_t i) {
+  const GateOptions& options = outcome.models.options.gate;
   const double brings = held.alone[i].sum();
-  if (brings <= least_gain) return false;
+  if (brings <= options.least_gain) return false;
   // At its bound a load is what would weigh less than nothing.
   if (group.candidate.effect == Payload::name && outcome.models.current.body[group.id.effect].linear[0] <= least_mass)
     return false;
   if (group.on_body) return true;
   const std::size_t j = group.candidate.joint;
   if (held.alone[i][static_cast<Index>(j)] <= 0) return false;  // whatever it does at others
-  const double share = outcome.lack[j].structured() ? least_share_in_structure : least_share;
+  const double share = outcome.structured(j) ? options.least_share_in_structure : options.least_share;
   return brings > share * gap_of(held)[static_cast<Index>(j)];
 }
 
@@ -180,6 +174,7 @@ void choose_time_constants(Outcome& outcome, const std::vector<SessionLog>& logs
 
 /// Which names are believed at each joint.
 void conclude(Gate& gate, const Outcome& outcome, const std::vector<bool>& still) {
+  const GateOptions& options = outcome.models.options.gate;
   const HeldOut& held = gate.held;
   const auto n = static_cast<Index>(outcome.lack.size());
   gate.gap = gap_of(held);
@@ -190,17 +185,18 @@ void conclude(Gate& gate, const Outcome& outcome, const std::vector<bool>& still
     const auto k = static_cast<std::size_t>(j);
     const double closed = held.before[j] - held.after[j];
     if (gate.gap[j] > 0) gate.closure[j] = closed / gate.gap[j];
-    gate.remains.push_back(!still[k] && outcome.lack[k].structured() &&
-                           held.excess[j] > (1 - sure_closure) * gate.gap[j]);
-    gate.accepted.push_back(
-        gate.closure[j] >= (gate.remains.back() ? sure_closure : least_closure) &&
-        (outcome.problem->background(k) == nullptr || closed >= least_beside_background * (closed + held.leftover[j])));
+    gate.remains.push_back(!still[k] && outcome.structured(k) &&
+                           held.excess[j] > (1 - options.sure_closure) * gate.gap[j]);
+    gate.accepted.push_back(gate.closure[j] >= (gate.remains.back() ? options.sure_closure : options.least_closure) &&
+                            (outcome.problem->background(k) == nullptr ||
+                             closed >= options.beside_background * (closed + held.leftover[j])));
   }
 }
 
 /// The named effect that goes first, as a place in the gate's groups; their number: all hold.
 /// @param before, after mean squares of the plain error on the logs that judge
 std::size_t weakest(const Gate& gate, const Outcome& outcome, const VectorXd& before, const VectorXd& after) {
+  const double worse = outcome.models.options.gate.worse;
   const auto rises = [&](Index j) { return before.size() > 0 && after[j] > worse * worse * before[j]; };
   const std::size_t none = gate.groups.size();
   std::size_t worst = none;
@@ -225,7 +221,7 @@ std::size_t weakest(const Gate& gate, const Outcome& outcome, const VectorXd& be
   for (std::size_t i = 0; i < none; ++i) {
     const Group& group = outcome.problem->groups()[gate.groups[i]];
     const std::size_t j = group.candidate.joint;
-    if (group.on_body || outcome.problem->background(j) == nullptr || outcome.lack[j].structured() || gate.accepted[j])
+    if (group.on_body || outcome.problem->background(j) == nullptr || outcome.structured(j) || gate.accepted[j])
       continue;
     if (worst == none || gate.held.alone[i].sum() < gate.held.alone[worst].sum()) worst = i;
   }
@@ -270,7 +266,7 @@ Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<Se
     if (!outcome.problem->groups()[gate.groups[i]].on_body) continue;
     double left = 0;
     for (Index j = 0; j < held.excess.size(); ++j) {
-      if (held.alone[i][j] > least_felt) left += held.excess[j];
+      if (held.alone[i][j] > outcome.models.options.gate.least_felt) left += held.excess[j];
     }
     const double back = held.alone[i].sum();
     gate.robot_closure[i] = back / std::max(back + left, 1e-300);

@@ -7,16 +7,6 @@
 
 namespace fxdyn::diagnosis {
 
-/// A name closes at least this share of the gap above the noise on data that did not fit it ..
-inline constexpr double least_closure = 0.5;
-/// .. and this much where structure remains: another effect may only resemble it.
-inline constexpr double sure_closure = 0.8;
-/// .. and this much where the healthy session's own structure is counted as well: beside that much of it a name is
-/// anyone's guess.
-inline constexpr double least_beside_background = 0.25;
-/// Squares, in units of the noise, from which a joint feels an effect on the robot.
-inline constexpr double least_felt = 6;
-
 /// Squares of judged residuals per joint, weighted to unit variance: whitened, but for joints with structure left,
 /// which are judged in the whole band.
 struct HeldOut {

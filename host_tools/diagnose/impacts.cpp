@@ -13,10 +13,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double beyond = 6;  // standard deviations: noise does so once in a day
-constexpr double together_s = 0.02;
-constexpr double times = 3;       // as many as the healthy session ..
-constexpr double to_be_sure = 3;  // .. and of so many more than it had
+/// Median of a normal variable's magnitude in standard deviations: Phi^-1(3 / 4).
+constexpr double median_of_sigma = 0.6745;
 
 /// Impacts of one joint in some logs.
 struct Count {
@@ -26,21 +24,21 @@ struct Count {
   double per_second() const { return seconds > 0 ? impacts / seconds : 0; }
 };
 
-void add(Count& to, const ProcessedLog& log, const VectorXd& error) {
+void add(Count& to, const ProcessedLog& log, const VectorXd& error, const ImpactOptions& options) {
   const Index count = log.last - log.first;
   const VectorXd above = (error - log.filter_columns(error)).segment(log.first, count);
   std::vector<double> sizes(above.begin(), above.end());
   for (double& size : sizes) size = std::fabs(size);
   const auto middle = sizes.begin() + count / 2;
   std::nth_element(sizes.begin(), middle, sizes.end());
-  const double sigma = *middle / 0.6745;
+  const double sigma = *middle / median_of_sigma;
   to.seconds += static_cast<double>(count) * log.step_s;
   if (!(sigma > 0)) return;  // most of it is one step of the torque's
-  const auto apart = static_cast<Index>(together_s / log.step_s);
+  const auto apart = static_cast<Index>(options.together_s / log.step_s);
   Index last = -apart - 1;
   for (Index k = 0; k < count; ++k) {
     const double size = std::fabs(above[k]);
-    if (size < beyond * sigma) continue;
+    if (size < options.beyond * sigma) continue;
     if (size > to.worst.largest) {
       to.worst.largest = size;
       to.worst.log = log.name;
@@ -55,23 +53,24 @@ void add(Count& to, const ProcessedLog& log, const VectorXd& error) {
 
 std::vector<std::optional<Impacts>> find_impacts(const IdentifiedModel& model, const std::vector<ProcessedLog>& now,
                                                  const IdentifiedModel& healthy,
-                                                 const std::vector<ProcessedLog>& before) {
+                                                 const std::vector<ProcessedLog>& before,
+                                                 const ImpactOptions& options) {
   const std::size_t n = model.joints.size();
   std::vector<std::optional<Impacts>> out(n);
   if (before.empty()) return out;
   std::vector<Count> train(n), judges(n), old(n);
-  const auto count = [n](const IdentifiedModel& of, const std::vector<ProcessedLog>& logs, auto&& list_of) {
+  const auto count = [n, &options](const IdentifiedModel& of, const std::vector<ProcessedLog>& logs, auto&& list_of) {
     for (const ProcessedLog& log : logs) {
       const MatrixXd error = log.tau - predict(of, log);
       std::vector<Count>& list = list_of(log);
-      parallel_for(n, [&](std::size_t j) { add(list[j], log, error.col(static_cast<Index>(j))); });
+      parallel_for(n, [&](std::size_t j) { add(list[j], log, error.col(static_cast<Index>(j)), options); });
     }
   };
   count(model, now,
         [&](const ProcessedLog& log) -> std::vector<Count>& { return log.role == Role::validate ? judges : train; });
   count(healthy, before, [&](const ProcessedLog&) -> std::vector<Count>& { return old; });
   for (std::size_t j = 0; j < n; ++j) {
-    const double allowed = times * (old[j].impacts + to_be_sure) / std::max(old[j].seconds, 1e-9);
+    const double allowed = options.times * (old[j].impacts + options.added) / std::max(old[j].seconds, 1e-9);
     const bool judged = judges[j].seconds > 0;
     if (train[j].per_second() < allowed || (judged && judges[j].per_second() < allowed)) continue;
     const Count& worst = judged && judges[j].worst.largest > train[j].worst.largest ? judges[j] : train[j];

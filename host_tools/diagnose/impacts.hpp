@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/diagnose/options.hpp"
 #include "host_tools/effects/forward.hpp"
 #include "host_tools/regression/dataset.hpp"
 
@@ -24,6 +25,6 @@ struct Impacts {
 /// @param healthy the model of `before` @returns by joint; nothing without a healthy session
 std::vector<std::optional<Impacts>> find_impacts(const IdentifiedModel& model, const std::vector<ProcessedLog>& now,
                                                  const IdentifiedModel& healthy,
-                                                 const std::vector<ProcessedLog>& before);
+                                                 const std::vector<ProcessedLog>& before, const ImpactOptions& options);
 
 }  // namespace fxdyn::diagnosis

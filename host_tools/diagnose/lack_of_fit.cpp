@@ -16,7 +16,14 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+/// A numeric choice: draws from which mean and variance of noise's statistics are taken.
 constexpr int draws = 64;
+/// Eigenvalue of a Gram matrix of columns of size 1: a direction with less is rounding of the others.
+constexpr double dependent = 1e-4;
+/// A numeric floor under the residual's variance, of that at the start: data without noise.
+constexpr double noise_free = 1e-12, nothing_left = 1e-10;
+/// Noise's share of a direction at most, so that the rest can be divided by.
+constexpr double most_expected = 0.95;
 
 /// What stands for noise on the rows in `blocks`, one column a draw: pieces of the healthy session's residual. Where
 /// there is little of it, or it has structure of its own, the residual of the same block at other times, which is more
@@ -84,7 +91,7 @@ class Projection {
                                                         scale);
     std::vector<Index> kept;
     for (Index i = 0; i < of.count; ++i) {
-      if (eigen.eigenvalues()[i] > 1e-4) kept.push_back(i);
+      if (eigen.eigenvalues()[i] > dependent) kept.push_back(i);
     }
     basis_ = eigen.eigenvectors()(Eigen::all, kept) * eigen.eigenvalues()(kept).cwiseSqrt().cwiseInverse().asDiagonal();
   }
@@ -160,9 +167,10 @@ VectorXd residual_with_background(const Linearised& problem, std::size_t joint, 
 /// @param with_healthy the residual with the healthy session's rows in it
 TimeStructure in_time(const Linearised& problem, const VectorXd& residual, const std::vector<std::size_t>& blocks,
                       const VectorXd& with_healthy) {
-  TimeStructure out = spectral_lines(problem.logs(), problem.blocks(), residual, blocks);
+  const LackOfFitOptions& options = problem.models().options.lack_of_fit;
+  TimeStructure out = spectral_lines(problem.logs(), problem.blocks(), residual, blocks, options);
   if (!problem.models().has_baseline) return out;
-  const TimeStructure slow = slow_changes(problem.logs(), problem.blocks(), with_healthy, blocks);
+  const TimeStructure slow = slow_changes(problem.logs(), problem.blocks(), with_healthy, blocks, options);
   return {std::min(out.p, slow.p), std::max(out.share, slow.share)};
 }
 
@@ -172,9 +180,9 @@ LackOfFit lack_of_fit(const Linearised& problem, std::size_t joint, const Linear
                       const MatrixXd& all_features) {
   LackOfFit out;
   const auto k = static_cast<Index>(joint);
-  const double w = fit.rows[k] / std::max(fit.square[k], 1e-12 * fit.rows[k] / problem.solver().weights()[k]);
+  const double w = fit.rows[k] / std::max(fit.square[k], noise_free * fit.rows[k] / problem.solver().weights()[k]);
   const VectorXd residual = problem.solver().residual(joint, fit);
-  if (fit.square[k] * problem.solver().weights()[k] < 1e-10 * fit.rows[k]) return out;
+  if (fit.square[k] * problem.solver().weights()[k] < nothing_left * fit.rows[k]) return out;
   const Background* background = problem.background(joint);
   const Products today = products(problem, joint, fit, w, residual, all_features, false);
   // Fitted on its own: what today's structure does to common parameters is not the healthy session's.
@@ -204,7 +212,7 @@ LackOfFit lack_of_fit(const Linearised& problem, std::size_t joint, const Linear
     // The columns are fitted to both sessions; today's rows bear their share of them.
     const double rest = today.rows - fitted * today.rows / fit.rows[k] - rank;
     // With hardly more rows than functions no statement is possible.
-    if (rank == 0 || rest <= 0.3 * rank) return 1.0;
+    if (rank == 0 || rest <= problem.models().options.lack_of_fit.free_rows * rank) return 1.0;
     VectorXd null(draws);
     for (Index s = 0; s < null.size(); ++s) null[s] = statistic(theirs.col(s));
     const double mean = null.mean(),
@@ -253,7 +261,7 @@ double structured_share(const Linearised& problem, std::size_t joint, const Line
     if (2 * count < 3 * energy.rank()) return 0.0;  // too few rows
     double null = 0;
     for (Index s = 0; s < theirs.cols(); ++s) null += energy(theirs.col(s));
-    const double found = energy(mine), expected = std::min(null / std::max(noise.squaredNorm(), 1e-300), 0.95);
+    const double found = energy(mine), expected = std::min(null / std::max(noise.squaredNorm(), 1e-300), most_expected);
     return std::clamp((found / whole - expected) / (1 - expected), 0.0, 1.0);
   };
   const Projection all(gram, size, {0, f.cols()});

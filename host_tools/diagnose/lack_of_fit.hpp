@@ -8,7 +8,7 @@ namespace fxdyn::diagnosis {
 struct LackOfFit {
   double state_p = 1;  ///< chance that noise looks as much like a function of the state
   double time_p = 1;   ///< .. like something periodic or slow in time
-  bool structured() const { return state_p < 1e-8 || time_p < 1e-6; }
+  bool structured(const LackOfFitOptions& options) const { return state_p < options.state || time_p < options.time; }
 };
 
 /// Is there structure in what a fit leaves of a joint, on the rows that fit? All functions together see anything, and

@@ -42,7 +42,8 @@ void Linearised::whiten(std::size_t joint) {
 void Linearised::add_background(std::size_t joint) {
   MatrixXd functions = features(log_columns_, noise_, blocks(), joint, true);
   functions.conservativeResize(Eigen::NoChange, functions.cols() - time_features);
-  auto background = std::make_unique<Background>(std::move(functions), blocks());
+  auto background =
+      std::make_unique<Background>(std::move(functions), blocks(), models().options.noise.background_prior);
   const JointRows& rows = solver_->rows(joint);
   const Index total = rows.x.rows();
   const MatrixXd x = background->eliminate(rows.x), y = background->eliminate(rows.y);

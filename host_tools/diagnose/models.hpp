@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "host_tools/diagnose/options.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/effects/robot_columns.hpp"
@@ -33,6 +34,7 @@ struct Models {
   std::vector<EffectCandidate> held;    ///< unnamed effects that stay what the healthy session's fit gave
   std::vector<Rotor> rotors;
   double smallest_step_s = 1;  ///< of all logs and of the drive's tick: what bounds a delay
+  Options options;             ///< thresholds of all that is done with these models
 
   const IdentifiedModel& of(bool of_healthy) const { return of_healthy ? healthy : current; }
 };

@@ -15,8 +15,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// Scale of a row whose doubt is as much as its noise.
-const double half_doubtful = std::sqrt(0.5);
+/// Standard deviations in the median of a normal variable's magnitude: 1 / Phi^-1(3 / 4).
+constexpr double sigma_of_median = 1.4826;
 
 /// Standard deviation of normal noise from its median: what sticks may be far off without being noise.
 double robust_sigma(const Blocks& blocks, const VectorXd& residual) {
@@ -27,7 +27,7 @@ double robust_sigma(const Blocks& blocks, const VectorXd& residual) {
   }
   const auto middle = magnitude.begin() + static_cast<std::ptrdiff_t>(magnitude.size() / 2);
   std::nth_element(magnitude.begin(), middle, magnitude.end());
-  return 1.4826 * *middle;
+  return sigma_of_median * *middle;
 }
 
 /// A whitened row is as doubtful as those that it is made of.
@@ -43,8 +43,12 @@ VectorXd whitened_doubt(const Blocks& blocks, const VectorXd& doubt, const Vecto
 
 }  // namespace
 
-NoiseModel::NoiseModel(const Blocks& blocks, std::vector<VectorXd> whitening, const std::vector<VectorXd>& doubt)
-    : blocks_(blocks), whitening_(std::move(whitening)), row_scale_(doubt.size()) {
+NoiseModel::NoiseModel(const Blocks& blocks, std::vector<VectorXd> whitening, const std::vector<VectorXd>& doubt,
+                       double doubtful)
+    : blocks_(blocks),
+      least_scale_(std::sqrt(1 / (1 + doubtful))),
+      whitening_(std::move(whitening)),
+      row_scale_(doubt.size()) {
   parallel_for(doubt.size(), [&](std::size_t j) {
     row_scale_[j] = (1 + whitened_doubt(blocks_, doubt[j], whitening_[j]).array()).sqrt().inverse();
   });
@@ -55,10 +59,10 @@ MatrixXd NoiseModel::apply(std::size_t log, std::size_t joint, const MatrixXd& r
   return row_scale_[joint].segment(b.first, b.count).asDiagonal() * prewhitened(rows, whitening_[joint]);
 }
 
-bool NoiseModel::is_doubtful(std::size_t joint, Index row) const { return row_scale_[joint][row] < half_doubtful; }
+bool NoiseModel::is_doubtful(std::size_t joint, Index row) const { return row_scale_[joint][row] < least_scale_; }
 
 double NoiseModel::doubtful_share(std::size_t joint) const {
-  const auto doubtful = (row_scale_[joint].array() < half_doubtful).count();
+  const auto doubtful = (row_scale_[joint].array() < least_scale_).count();
   return static_cast<double>(doubtful) / static_cast<double>(row_scale_[joint].size());
 }
 
@@ -73,6 +77,7 @@ NoiseModel estimate_noise(const LogColumns& columns, const BlockSolver& solver, 
                           std::vector<VectorXd> whitening) {
   const Blocks& blocks = solver.blocks();
   const std::size_t n = columns.joints();
+  const NoiseOptions& options = columns.models().options.noise;
   std::vector<VectorXd> coefficients(n), doubts(n);
   parallel_for(n, [&](std::size_t j) {
     const auto k = static_cast<Index>(j);
@@ -82,15 +87,16 @@ NoiseModel estimate_noise(const LogColumns& columns, const BlockSolver& solver, 
     std::vector<VectorXd> parts;
     for (std::size_t l = 0; l < columns.logs().size(); ++l) {
       const Block& b = blocks.of_log[l];
-      const VectorXd u = velocity_doubt(columns.logs()[l].log, j, columns.model(l).joints[j],
-                                        columns.motion(l).dq.col(k), columns.robot(l).structural().col(k), sigma);
+      const VectorXd u =
+          velocity_doubt(columns.logs()[l].log, j, columns.model(l).joints[j], columns.motion(l).dq.col(k),
+                         columns.robot(l).structural().col(k), sigma, options.velocity_error);
       doubts[j].segment(b.first, b.count) = u;
       const bool use = columns.models().has_baseline ? b.healthy : b.fits;
       if (use) parts.emplace_back((e.segment(b.first, b.count).array() / (1 + u.array()).sqrt()).matrix());
     }
     coefficients[j] = autoregression(parts);
   });
-  return {blocks, whitening.empty() ? std::move(coefficients) : std::move(whitening), doubts};
+  return {blocks, whitening.empty() ? std::move(coefficients) : std::move(whitening), doubts, options.doubtful};
 }
 
 }  // namespace fxdyn::diagnosis

@@ -14,13 +14,15 @@ class NoiseModel {
   NoiseModel() = default;
   /// @param whitening per joint the autoregression's coefficients
   /// @param doubt per joint: what uncertain friction adds to each row's variance, in units of the noise's
-  NoiseModel(const Blocks& blocks, std::vector<Eigen::VectorXd> whitening, const std::vector<Eigen::VectorXd>& doubt);
+  /// @param doubtful so much of it makes a row doubtful
+  NoiseModel(const Blocks& blocks, std::vector<Eigen::VectorXd> whitening, const std::vector<Eigen::VectorXd>& doubt,
+             double doubtful);
 
   const std::vector<Eigen::VectorXd>& whitening() const { return whitening_; }
   /// Rows of one log for a joint, filtered and decimated, with noise that is white and of one size.
   Eigen::MatrixXd apply(std::size_t log, std::size_t joint, const Eigen::MatrixXd& rows) const;
 
-  /// In a doubtful row uncertain friction makes more than the noise.
+  /// In a doubtful row uncertain friction makes more than the noise, or as much of it as `doubtful` says.
   bool is_doubtful(std::size_t joint, Eigen::Index row) const;
   /// Share of a joint's rows.
   double doubtful_share(std::size_t joint) const;
@@ -29,6 +31,7 @@ class NoiseModel {
 
  private:
   Blocks blocks_;
+  double least_scale_ = 0;  ///< of a row that is not doubtful
   std::vector<Eigen::VectorXd> whitening_;
   std::vector<Eigen::VectorXd> row_scale_;  ///< per joint: one over the root of a row's variance
 };

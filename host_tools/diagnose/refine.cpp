@@ -69,7 +69,7 @@ class ShapeSearch {
     const MatrixXd z = inverse_ * cross;
     reduced.gram -= cross.transpose() * z;
     reduced.projection -= z.transpose() * projection_;
-    return gain_of(reduced, group_.lower, is_share(group_)).square;
+    return gain_of(reduced, group_.lower, is_share(group_), problem_.models().options.search.beyond_bound).square;
   }
 
   /// @param cross between the fit's columns and the candidate's

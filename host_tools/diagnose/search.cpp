@@ -19,16 +19,19 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Minimum score gain to accept an effect.
-constexpr double least_score = 8;
-/// Largest gain that is asked for: a residual full of structure looks like more than noise at other times too.
-constexpr double most_score = 25;
-constexpr std::size_t beam_width = 3;
-/// Shapes are refined for as many candidates of a state.
-constexpr std::size_t most_refined = 4;
+/// How far the search goes, no thresholds: sets that are followed, on so many first levels; candidates of a state whose
+/// shapes are refined; ripples of a joint that are tried; rounds of swaps; levels at most.
+constexpr std::size_t beam_width = 3, most_refined = 4, most_ripples = 3;
+constexpr int beam_levels = 3, swap_rounds = 4, most_levels = 64;
+/// Residuals at other times, from whose scores Gumbel's distribution is taken.
 constexpr int shifts = 24;
-/// Chance that a joint without anything to find passes the threshold, per level of the search.
-constexpr double false_alarm = 1e-3;
+/// Gumbel's distribution: its scale over the standard deviation, sqrt(6) / pi; its mean beyond the mode, Euler's
+/// constant.
+constexpr double gumbel_scale = 0.7797, gumbel_mean = 0.5772;
+/// A numeric floor under the residual's variance, of that at the start: data without noise.
+constexpr double noise_free = 1e-12;
+/// Bounds below are none.
+constexpr double no_bound = -1e5;
 
 bool of_spectrum(const Group& group) { return find_effect(group.candidate.effect)->of_spectrum(); }
 
@@ -51,10 +54,10 @@ double Search::penalty(std::size_t g) const {
 
 double Search::threshold(std::size_t g) const {
   const Group& group = problem_.groups()[g];
-  if (thresholds_.size() == 0) return least_score;
+  if (thresholds_.size() == 0) return options().least_score;
   if (!group.on_body) return thresholds_[static_cast<Index>(group.candidate.joint)];
   // What a load would stand in for may be on any joint that feels it.
-  double most = least_score;
+  double most = options().least_score;
   for (std::size_t j = 0; j < problem_.joints(); ++j) {
     if (problem_.solver().rows(j).place(group.first) >= 0) most = std::max(most, thresholds_[static_cast<Index>(j)]);
   }
@@ -94,7 +97,7 @@ bool Search::allowed(const Choice& state, std::size_t g) const {
     if (!find_effect(group.candidate.effect)->several) return false;
     // The same ripple or coupling again.
     const double a = o.candidate.shape[0], b = group.candidate.shape[0];
-    if (std::fabs(a - b) < 0.1 * std::max(a, b) || !of_spectrum(o)) {
+    if (std::fabs(a - b) < options().same_ripple * std::max(a, b) || !of_spectrum(o)) {
       if (of_spectrum(o) || a == b) return false;
     }
   }
@@ -107,8 +110,7 @@ Choice Search::evaluate(const std::vector<std::size_t>& groups) const {
   out.fit = problem_.solver().solve(problem_.columns_of(groups));
   out.score = 0;
   for (Index j = 0; j < out.fit.square.size(); ++j) {
-    // noise-free data: below a billionth of the signal there is nothing to find
-    const double floor = out.fit.rows[j] / problem_.solver().weights()[j] * 1e-12;
+    const double floor = out.fit.rows[j] / problem_.solver().weights()[j] * noise_free;
     out.score -= out.fit.rows[j] * std::log((out.fit.square[j] + floor) / out.fit.rows[j]);
   }
   for (const std::size_t g : groups) out.score -= penalty(g);
@@ -118,15 +120,16 @@ Choice Search::evaluate(const std::vector<std::size_t>& groups) const {
   for (const std::size_t g : groups) {
     const Group& group = problem_.groups()[g];
     for (Index i = 0; i < group.count; ++i, ++column) {
-      if (group.lower[static_cast<std::size_t>(i)] < -1e5) continue;
+      if (group.lower[static_cast<std::size_t>(i)] < no_bound) continue;
       const double x = out.fit.x[column], below = group.lower[static_cast<std::size_t>(i)] - x;
       if (below <= 0) continue;
       if (inverse.size() == 0) inverse = solver.inverse();
-      out.possible &= group.count > 1 && below < 3 * std::sqrt(std::max(inverse(column, column), 0.0));
+      out.possible &=
+          group.count > 1 && below < options().beyond_bound * std::sqrt(std::max(inverse(column, column), 0.0));
     }
     if (!is_share(group)) continue;
     const double share = out.fit.x[column - 1];
-    out.possible &= share > 0.4 && share < 2;
+    out.possible &= share > options().least_share && share < options().most_share;
   }
   return out;
 }
@@ -135,7 +138,7 @@ Choice Search::evaluate(const std::vector<std::size_t>& groups) const {
 VectorXd Search::weights_of(const LinearFit& fit) const {
   VectorXd out(fit.rows.size());
   for (Index j = 0; j < out.size(); ++j)
-    out[j] = fit.rows[j] / std::max(fit.square[j], 1e-12 * fit.rows[j] / problem_.solver().weights()[j]);
+    out[j] = fit.rows[j] / std::max(fit.square[j], noise_free * fit.rows[j] / problem_.solver().weights()[j]);
   return out;
 }
 
@@ -166,7 +169,7 @@ Search::Candidates Search::project(const Choice& state) {
     out.products[g].gram =
         mine - cross.middleCols(first, group.count).transpose() * out.by_state.middleCols(first, group.count);
     out.products[g].projection = own.segment(first, group.count);
-    out.gain[g] = gain_of(out.products[g], group.lower, is_share(group));
+    out.gain[g] = gain_of(out.products[g], group.lower, is_share(group), options().beyond_bound);
     if (at_start) kept_[g] = out.gain[g].kept;
     if (out.gain[g].rank > 0 && open) out.usable[g] = 1;
   }
@@ -187,7 +190,7 @@ std::vector<Search::Scored> Search::score_all(const Choice& state, bool with_thr
     if (!group.on_body && find_effect(group.candidate.effect)->acts_on == ActsOn::torque) {
       // all of it is one joint's
       const double rows = state.fit.rows[static_cast<Index>(group.candidate.joint)];
-      likelihood = -rows * std::log(std::max(1e-12, 1 - std::min(gain.square / rows, 1.0)));
+      likelihood = -rows * std::log(std::max(noise_free, 1 - std::min(gain.square / rows, 1.0)));
     }
     out.push_back({g, likelihood - penalty(g) + absorbed(group, gain)});
   }
@@ -210,8 +213,9 @@ void Search::estimate_thresholds(const Choice& state, const Candidates& candidat
     const VectorXd most = scores_of_noise(j, state, candidates);
     // Gumbel's distribution of the largest, by moments
     const double mean = most.mean(), std = std::sqrt((most.array() - mean).square().sum() / (shifts - 1));
-    const double beta = std * 0.7797, mode = mean - 0.5772 * beta;
-    result[j] = std::clamp(mode - beta * std::log(-std::log1p(-false_alarm)), least_score, most_score);
+    const double beta = std * gumbel_scale, mode = mean - gumbel_mean * beta;
+    result[j] = std::clamp(mode - beta * std::log(-std::log1p(-options().false_alarm)), options().least_score,
+                           options().most_score);
   });
   thresholds_ = Eigen::Map<const VectorXd>(result.data(), static_cast<Index>(result.size()));
 }
@@ -246,7 +250,7 @@ VectorXd Search::scores_of_noise(std::size_t joint, const Choice& state, const C
     Reduced reduced = candidates.products[g];
     for (Index k = 0; k < shifts; ++k) {
       reduced.projection = b.col(k);
-      const Gain gain = gain_of(reduced, group.lower, false);
+      const Gain gain = gain_of(reduced, group.lower, false, options().beyond_bound);
       most[k] = std::max(most[k], gain.square - penalty(g) + absorbed(group, gain));
     }
   }
@@ -261,7 +265,7 @@ std::size_t Search::refine(const Choice& state, std::size_t g) {
 void Search::find_ripples(const Choice& state, std::optional<std::size_t> joint) {
   std::vector<std::vector<Group>> found(problem_.joints());
   parallel_for(problem_.joints(), [&](std::size_t j) {
-    if (!joint || j == *joint) found[j] = ripples(problem_, j, problem_.solver().residual(j, state.fit), 3);
+    if (!joint || j == *joint) found[j] = ripples(problem_, j, problem_.solver().residual(j, state.fit), most_ripples);
   });
   std::vector<Group> fresh;
   for (const auto& of_joint : found) {
@@ -279,7 +283,7 @@ void Search::find_ripples(const Choice& state, std::optional<std::size_t> joint)
 Choice Search::run(const std::vector<std::size_t>& start, Progress& progress) {
   std::vector<Choice> beam{evaluate(start)};
   Choice best = beam.front();
-  for (int level = 0; level < 64; ++level) {
+  for (int level = 0; level < most_levels; ++level) {
     // A ripple may show only once what was larger on its joint is gone.
     if (level < 2) {
       find_ripples(beam.front(), {});
@@ -288,13 +292,13 @@ Choice Search::run(const std::vector<std::size_t>& start, Progress& progress) {
     }
     std::vector<Choice> next;
     std::set<std::vector<std::size_t>> seen;
-    const std::size_t width = level < 3 ? beam.size() : 1;
+    const std::size_t width = level < beam_levels ? beam.size() : 1;
     for (std::size_t s = 0; s < width; ++s) {
       const std::vector<Scored> scored = score_all(beam[s], s == 0);
       std::set<std::pair<std::string, std::size_t>> tried;
       for (const Scored& one : scored) {
         const Group& group = problem_.groups()[one.group];
-        if (tried.size() >= most_refined || one.score < 0.5 * threshold(one.group)) break;
+        if (tried.size() >= most_refined || one.score < options().refine_from * threshold(one.group)) break;
         if (!tried.insert({group.candidate.effect, group.on_body ? 0 : group.candidate.joint}).second) continue;
         const double needed = threshold(one.group);
         std::vector<std::size_t> groups = beam[s].groups;
@@ -311,13 +315,12 @@ Choice Search::run(const std::vector<std::size_t>& start, Progress& progress) {
     std::sort(next.begin(), next.end(), [](const Choice& a, const Choice& b) { return a.score > b.score; });
     if (next.size() > beam_width) next.resize(beam_width);
     // A longer set must be better than the best shorter one by what one effect has to bring.
-    if (next.front().score < best.score + least_score) break;
+    if (next.front().score < best.score + options().least_score) break;
     beam = std::move(next);
     best = beam.front();
   }
   // Early choices stand in for others: swap and drop, the last round drops only.
-  constexpr int rounds = 4;
-  for (int round = 0; round < rounds; ++round) {
+  for (int round = 0; round < swap_rounds; ++round) {
     bool changed = false;
     for (std::size_t i = 0; i < best.groups.size(); ++i) {
       std::vector<std::size_t> others = best.groups;
@@ -328,18 +331,18 @@ Choice Search::run(const std::vector<std::size_t>& start, Progress& progress) {
         changed = true;
         break;
       }
-      if (round == rounds - 1) continue;
+      if (round == swap_rounds - 1) continue;
       std::size_t tried = 0;
       std::set<std::pair<std::string, std::size_t>> names;
       for (const Scored& one : score_all(without, false)) {
         const Group& group = problem_.groups()[one.group];
-        if (tried >= most_refined || one.score < best.score - without.score - 20) break;
+        if (tried >= most_refined || one.score < best.score - without.score - options().swap_behind) break;
         if (!names.insert({group.candidate.effect, group.on_body ? 0 : group.candidate.joint}).second) continue;
         ++tried;
         std::vector<std::size_t> groups = others;
         groups.push_back(refine(without, one.group));
         Choice choice = evaluate(groups);
-        if (!choice.possible || choice.score <= best.score + 1) continue;
+        if (!choice.possible || choice.score <= best.score + options().swap_gain) continue;
         best = std::move(choice);
         changed = true;
       }
@@ -362,15 +365,16 @@ std::vector<Found> Search::explain(const Choice& choice) {
     std::set<std::pair<std::string, std::size_t>> names;
     names.insert({mine.candidate.effect, mine.on_body ? 0 : mine.candidate.joint});
     std::size_t tried = 0;
+    const double behind = std::max(options().alternative_behind, options().alternative_behind_share * found.score);
     for (const Scored& one : score_all(without, false)) {
       const Group group = problem_.groups()[one.group];
-      if (tried >= 4 || one.score < found.score - std::max(25.0, 0.1 * found.score)) break;
+      if (tried >= most_refined || one.score < found.score - behind) break;
       if (!names.insert({group.candidate.effect, group.on_body ? 0 : group.candidate.joint}).second) continue;
       ++tried;
       std::vector<std::size_t> groups = others;
       groups.push_back(refine(without, one.group));
       const Choice instead = evaluate(groups);
-      if (instead.possible && instead.score > choice.score - settings_.within)
+      if (instead.possible && instead.score > choice.score - options().alternative)
         found.alternatives.push_back({problem_.groups()[groups.back()].candidate, choice.score - instead.score});
     }
     std::sort(found.alternatives.begin(), found.alternatives.end(),

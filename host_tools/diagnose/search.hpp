@@ -40,7 +40,6 @@ struct SearchSettings {
   std::size_t max_effects = 3;  ///< per joint
   std::size_t robot_effects = 2;
   std::size_t most = 8;  ///< of the whole robot: what needs more is not explained by the catalogue
-  double within = 10;    ///< alternatives are no further behind
 };
 
 /// Beam search forward, swaps, backward elimination.
@@ -84,6 +83,7 @@ class Search {
   std::optional<Choice> united(const Choice& choice, const EffectInfo& info, std::size_t joint);
   double penalty(std::size_t group) const;
   double threshold(std::size_t group) const;
+  const SearchOptions& options() const { return problem_.models().options.search; }
   bool allowed(const Choice& state, std::size_t group) const;
   void find_ripples(const Choice& state, std::optional<std::size_t> joint);
   double samples() const;

@@ -19,23 +19,15 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Rows a period of the torque cut-off: two would be Nyquist's.
-constexpr double rows_per_period = 2.5;
-/// Faster than this there is nothing that these rules could name, and many rows.
-constexpr double highest_cutoff_hz = 40;
-/// A robot that rested longer has cooled.
-constexpr double longest_pause_s = 1800;
-
 /// Positions without what is faster than the motion by far: noise in regressors is taken for structure, and what a
 /// coarse encoder makes of the acceleration may be more than the torque's own noise.
-void smooth(SessionLog& entry) {
-  constexpr double above_motion = 12, lowest_hz = 2, edges = 3;
+void smooth(SessionLog& entry, const SessionOptions& options) {
   ProcessedLog& log = entry.log;
   entry.bending_hz = bending_hz(log);
   double& cutoff = log.filter.position_cutoff_hz;
-  const double wanted = std::max(above_motion * log.filter.excited_hz, lowest_hz);
+  const double wanted = std::max(options.position_band * log.filter.excited_hz, options.lowest_position_hz);
   if (log.measured_dq.size() > 0 || wanted >= std::min(cutoff, 0.4 / log.step_s)) return;
-  const auto edge = static_cast<Index>(std::ceil(edges / (wanted * log.step_s)));
+  const auto edge = static_cast<Index>(std::ceil(options.edge_periods / (wanted * log.step_s)));
   const Index first = std::max(log.first, edge), last = std::min(log.last, log.samples() - edge);
   if (last - first < (log.last - log.first) / 2) return;
   cutoff = wanted;
@@ -49,24 +41,24 @@ bool any(const std::vector<bool>& joints) { return std::find(joints.begin(), joi
 }  // namespace
 
 std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before,
-                                 std::optional<Session>& session) {
+                                 std::optional<Session>& session, const SessionOptions& options) {
   std::vector<std::array<double, 2>> windows;
   for (const ProcessedLog& log : now) windows.push_back({log.t[0], log.t[log.t.size() - 1]});
   std::sort(windows.begin(), windows.end());
   bool one = true;
   for (std::size_t i = 1; i < windows.size(); ++i) {
     const double pause = windows[i][0] - windows[i - 1][1];
-    one &= pause > -1e-9 && pause < longest_pause_s;
+    one &= pause > -1e-9 && pause < options.longest_pause_s;
   }
   if (one) session = {windows.front()[0], windows.back()[1]};
   std::vector<SessionLog> out;
   const auto add = [&](const ProcessedLog& log, bool healthy, double start) {
     SessionLog entry{log, healthy, healthy || log.role == Role::train, std::max(0.0, log.t[0] - start)};
     double& cutoff = entry.log.filter.torque_cutoff_hz;
-    cutoff = std::min({cutoff, highest_cutoff_hz, entry.log.filter.position_cutoff_hz});
-    smooth(entry);
+    cutoff = std::min({cutoff, options.highest_cutoff_hz, entry.log.filter.position_cutoff_hz});
+    smooth(entry, options);
     entry.log.decimation = std::max<Index>(log.decimation > 8 ? log.decimation / 8 : 1,
-                                           static_cast<Index>(1 / (log.step_s * rows_per_period * cutoff)));
+                                           static_cast<Index>(1 / (log.step_s * options.rows_per_period * cutoff)));
     out.push_back(std::move(entry));
   };
   for (const ProcessedLog& log : now) add(log, false, one ? windows.front()[0] : log.t[0]);
@@ -74,8 +66,7 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
   return out;
 }
 
-void check_lengths(const std::vector<SessionLog>& logs) {
-  constexpr double shortest_s = 2, shortest_block_s = 1;
+void check_lengths(const std::vector<SessionLog>& logs, const SessionOptions& options) {
   double seconds[2] = {0, 0};
   std::size_t count[2] = {0, 0}, judging = 0;
   for (const SessionLog& entry : logs) {
@@ -85,17 +76,17 @@ void check_lengths(const std::vector<SessionLog>& logs) {
     ++count[entry.healthy];
   }
   for (const bool healthy : {false, true}) {
-    if (count[healthy] == 0 || seconds[healthy] >= shortest_s) continue;
+    if (count[healthy] == 0 || seconds[healthy] >= options.shortest_s) continue;
     throw DataError(fmt::format(
         "role = \"{}\": {:.1f} s (after filtering) are too short to tell anything from; record 40 s, {:g} s at "
         "least",
-        healthy ? "baseline" : "train", seconds[healthy], shortest_s));
+        healthy ? "baseline" : "train", seconds[healthy], options.shortest_s));
   }
-  if (count[0] + judging > 1 || seconds[0] >= blocks_of_one_log * shortest_block_s) return;
-  throw DataError(
-      fmt::format("{}: {:.1f} s (after filtering) are too short to split into {} blocks that judge one another: record "
-                  "{:.0f} s or more, or add a log with role = \"validate\"",
-                  logs.front().log.name, seconds[0], blocks_of_one_log, 4 * blocks_of_one_log * shortest_block_s));
+  if (count[0] + judging > 1 || seconds[0] >= blocks_of_one_log * options.shortest_block_s) return;
+  throw DataError(fmt::format(
+      "{}: {:.1f} s (after filtering) are too short to split into {} blocks that judge one another: record "
+      "{:.0f} s or more, or add a log with role = \"validate\"",
+      logs.front().log.name, seconds[0], blocks_of_one_log, 4 * blocks_of_one_log * options.shortest_block_s));
 }
 
 void check_baseline_moves(const Robot& robot, const GateData& data, const std::vector<ProcessedLog>& baseline) {
@@ -110,13 +101,12 @@ void check_baseline_moves(const Robot& robot, const GateData& data, const std::v
   }
 }
 
-std::vector<bool> still_joints(const GateData& data) {
-  constexpr double times_noise = 6;
+std::vector<bool> still_joints(const GateData& data, const SessionOptions& options) {
   std::vector<bool> out = moving_joints(data.logs);
   const ProcessedLog& log = data.logs.front();
   for (std::size_t j = 0; j < out.size(); ++j) {
     const double noise = velocity_noise(data.filter, j, log.step_s);
-    out[j] = !out[j] || !(data.dq[static_cast<Index>(j)] > times_noise * noise);
+    out[j] = !out[j] || !(data.dq[static_cast<Index>(j)] > options.still * noise);
   }
   return out;
 }
@@ -138,8 +128,8 @@ void leave_out(std::vector<ProcessedLog>& logs, const std::vector<bool>& joints)
   }
 }
 
-void mute(std::vector<SessionLog>& logs, const IdentifiedModel& model, const std::vector<bool>& joints) {
-  constexpr double noise = 0.1;  // of rated torque
+void mute(std::vector<SessionLog>& logs, const IdentifiedModel& model, const std::vector<bool>& joints,
+          const SessionOptions& options) {
   if (!any(joints)) return;
   for (std::size_t l = 0; l < logs.size(); ++l) {
     ProcessedLog& log = logs[l].log;
@@ -149,16 +139,15 @@ void mute(std::vector<SessionLog>& logs, const IdentifiedModel& model, const std
       if (!joints[j]) continue;
       const auto k = static_cast<Index>(j);
       for (Index i = 0; i < log.samples(); ++i)
-        log.tau(i, k) = torque(i, k) + noise * model.joints[j].rated_torque * random.normal();
+        log.tau(i, k) = torque(i, k) + options.mute_noise * model.joints[j].rated_torque * random.normal();
     }
   }
 }
 
 std::vector<std::string> check_same_robot(Models models, const std::vector<SessionLog>& logs,
                                           const std::vector<bool>& still) {
-  constexpr double most = 0.2;  // of the torque's power that no fit explains
-  constexpr double apart = 4;   // .. and times the noise: where a joint carries little that is most of it
-  models.background.clear();    // explains anything
+  const SessionOptions options = models.options.session;
+  models.background.clear();  // explains anything
   Linearised problem(models, logs, std::vector<VectorXd>(models.current.joints.size(), VectorXd::Zero(1)));
   const auto first = static_cast<Index>(problem.nuisance().size());
   for (const EffectInfo& info : effect_infos()) {
@@ -183,7 +172,7 @@ std::vector<std::string> check_same_robot(Models models, const std::vector<Sessi
         whole += rows.squaredNorm();
         noise += static_cast<double>(rows.rows()) * entry.log.torque_noise[k] * entry.log.torque_noise[k];
       }
-      if (left[k] > std::max(most * whole, apart * noise)) strange[j] = true;
+      if (left[k] > std::max(options.other_robot * whole, options.other_robot_noise * noise)) strange[j] = true;
     }
   }
   std::size_t count = 0, judged = 0;
@@ -209,9 +198,8 @@ std::vector<std::string> check_same_robot(Models models, const std::vector<Sessi
 }
 
 std::vector<std::string> check_judges(const IdentifiedModel& model, const std::vector<ProcessedLog>& logs,
-                                      const std::vector<bool>& still) {
-  constexpr double alike = 0.9;  // of the torque's power is the model's times a factor
-  constexpr double factor = 3;   // more than any load or change makes of all joints
+                                      const std::vector<bool>& still, const SessionOptions& options) {
+  const double factor = options.other_units_factor;
   std::vector<std::string> notes;
   for (const ProcessedLog& log : logs) {
     if (log.role != Role::validate && log.role != Role::test) continue;
@@ -227,7 +215,7 @@ std::vector<std::string> check_judges(const IdentifiedModel& model, const std::v
       const double xy = x.dot(y), xx = x.squaredNorm(), yy = y.squaredNorm();
       const double times = xy / std::max(xx, 1e-300);
       const bool scaled = times < 1 / factor || times > factor;
-      if (!scaled || xy * xy < alike * xx * yy) continue;
+      if (!scaled || xy * xy < options.other_units * xx * yy) continue;
       ++odd;
       last = times;
       notes.push_back(

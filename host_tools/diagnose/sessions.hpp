@@ -13,15 +13,15 @@ namespace fxdyn::diagnosis {
 /// one where no two windows overlap in time and no pause is long, else every log starts its own.
 /// @param now train and validate logs @param before the healthy session's
 std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before,
-                                 std::optional<Session>& session);
+                                 std::optional<Session>& session, const SessionOptions& options);
 
 /// @throws DataError: train logs or the baseline are too short to fit anything; without a log that judges and with one
 /// trajectory only, its blocks have to, and are too short for that
-void check_lengths(const std::vector<SessionLog>& logs);
+void check_lengths(const std::vector<SessionLog>& logs, const SessionOptions& options);
 
 /// Joints that this motion says nothing of: they stand still, or as good as, beside what the encoder's noise looks
 /// like.
-std::vector<bool> still_joints(const GateData& data);
+std::vector<bool> still_joints(const GateData& data, const SessionOptions& options);
 
 /// @throws DataError: a joint that moves today rests in the baseline. That leaves open what its links weigh, and the
 /// gap would show at other joints.
@@ -32,7 +32,8 @@ void leave_out(std::vector<ProcessedLog>& logs, const std::vector<bool>& joints)
 
 /// A joint that stands still holds any torque up to its stiction: what was measured says nothing. The model's own
 /// torque takes its place, under so much white noise that the joint counts next to nothing in what all joints share.
-void mute(std::vector<SessionLog>& logs, const IdentifiedModel& model, const std::vector<bool>& joints);
+void mute(std::vector<SessionLog>& logs, const IdentifiedModel& model, const std::vector<bool>& joints,
+          const SessionOptions& options);
 
 /// Base parameters of the baseline with friction, load and tilt of their own against what both sessions measured.
 /// @returns a note for each joint at which nothing explains both @throws DataError: at half of the joints
@@ -42,6 +43,6 @@ std::vector<std::string> check_same_robot(Models models, const std::vector<Sessi
 /// A validate or test log that has the train logs' torque times some factor at a joint: other units.
 /// @returns a note for each such joint @throws DataError: it is so at every joint
 std::vector<std::string> check_judges(const IdentifiedModel& model, const std::vector<ProcessedLog>& logs,
-                                      const std::vector<bool>& still);
+                                      const std::vector<bool>& still, const SessionOptions& options);
 
 }  // namespace fxdyn::diagnosis

@@ -12,6 +12,7 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
+/// A numeric choice: bins whose median is a line's level; odd.
 constexpr Index neighbours = 31;
 
 struct Line {
@@ -50,9 +51,7 @@ double chance(double ratio, double freedom, double other) {
 }
 
 TimeStructure spectral_lines(const std::vector<SessionLog>& logs, const Blocks& blocks, const VectorXd& e,
-                             const std::vector<std::size_t>& of) {
-  constexpr double inside = 0.8;
-  constexpr double sure = 0.01;  // what noise has as seldom counts
+                             const std::vector<std::size_t>& of, const LackOfFitOptions& options) {
   std::vector<Line> lines;
   double whole = 0;
   Eigen::FFT<double> fft;
@@ -61,7 +60,8 @@ TimeStructure spectral_lines(const std::vector<SessionLog>& logs, const Blocks& 
     const ProcessedLog& log = logs[b.log].log;
     const double seconds = static_cast<double>(b.count * log.decimation) * log.step_s;
     // Towards the cut-off the filter's slope is no line.
-    const auto bins = std::min(b.count / 2, static_cast<Index>(inside * log.filter.torque_cutoff_hz * seconds));
+    const auto bins =
+        std::min(b.count / 2, static_cast<Index>(options.line_band * log.filter.torque_cutoff_hz * seconds));
     if (b.healthy || bins < neighbours) continue;
     const std::vector<double> x(e.data() + b.first, e.data() + b.first + b.count);
     std::vector<std::complex<double>> spectrum;
@@ -77,19 +77,19 @@ TimeStructure spectral_lines(const std::vector<SessionLog>& logs, const Blocks& 
   for (const Line& line : lines) {
     const double p = chance_of(line, static_cast<double>(lines.size()));
     out.p = std::min(out.p, p);
-    if (p < sure) beyond += line.power - line.level;
+    if (p < options.line) beyond += line.power - line.level;
   }
   if (whole > 0) out.share = beyond / whole;
   return out;
 }
 
 TimeStructure slow_changes(const std::vector<SessionLog>& logs, const Blocks& blocks, const VectorXd& e,
-                           const std::vector<std::size_t>& of) {
-  constexpr double stretch_s = 2, fewest = 5, sure = 1e-3;
+                           const std::vector<std::size_t>& of, const LackOfFitOptions& options) {
+  constexpr double fewest = 5;  // stretches: with fewer the F distribution's approximation is none
   double sum[2] = {0, 0}, count[2] = {0, 0}, rows = 0, whole = 0;
   const auto add = [&](const Block& b) {
     const ProcessedLog& log = logs[b.log].log;
-    const auto length = static_cast<Index>(stretch_s / (log.step_s * static_cast<double>(log.decimation)));
+    const auto length = static_cast<Index>(options.stretch_s / (log.step_s * static_cast<double>(log.decimation)));
     if (length < 2) return;
     for (Index k = 0; k + length <= b.count; k += length) {
       const double mean = e.segment(b.first + k, length).mean();
@@ -109,7 +109,7 @@ TimeStructure slow_changes(const std::vector<SessionLog>& logs, const Blocks& bl
   TimeStructure out;
   if (count[0] < fewest || count[1] < fewest || !(sum[1] > 0)) return out;
   out.p = chance(sum[0] / count[0] / (sum[1] / count[1]), count[0], count[1]);
-  if (out.p < sure) out.share = std::max(0.0, sum[0] / count[0] - sum[1] / count[1]) * rows / whole;
+  if (out.p < options.slow_change) out.share = std::max(0.0, sum[0] / count[0] - sum[1] / count[1]) * rows / whole;
   return out;
 }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "host_tools/diagnose/blocks.hpp"
+#include "host_tools/diagnose/options.hpp"
 
 namespace fxdyn::diagnosis {
 
@@ -15,11 +16,11 @@ struct TimeStructure {
 
 /// Lines in the periodograms of today's blocks against their neighbourhood.
 TimeStructure spectral_lines(const std::vector<SessionLog>& logs, const Blocks& blocks, const Eigen::VectorXd& e,
-                             const std::vector<std::size_t>& of);
+                             const std::vector<std::size_t>& of, const LackOfFitOptions& options);
 
-/// Means of today's blocks over stretches of two seconds against those of the healthy session, all of its blocks.
+/// Means of today's blocks over stretches against those of the healthy session, all of its blocks.
 TimeStructure slow_changes(const std::vector<SessionLog>& logs, const Blocks& blocks, const Eigen::VectorXd& e,
-                           const std::vector<std::size_t>& of);
+                           const std::vector<std::size_t>& of, const LackOfFitOptions& options);
 
 /// Chance of F(freedom, other) beyond `ratio` (Paulson's normal approximation).
 double chance(double ratio, double freedom, double other);

@@ -12,17 +12,6 @@ namespace {
 
 using Eigen::Index;
 
-/// Friction differs from session to session by this share of itself (standard deviation) without anything being wrong.
-constexpr double friction_change = 0.3;
-/// Likewise the offset, as a share of Coulomb friction.
-constexpr double offset_change = 0.05;
-/// What a parameter that is zero may change by, of rated torque.
-constexpr double smallest_change = 1e-3;
-/// What a rotor may have of the inertia that rated torque and largest acceleration stand for (standard deviation).
-constexpr double rotor_share = 0.3;
-/// A share that is 1 by definition.
-constexpr double share_std = 1e-3;
-
 bool is_shape_free(const EffectInfo& info, std::size_t i) {
   // A time constant from one session's start is a guess by its end: the gate chooses it.
   return info.shape[i].name != "joint" && info.shape[i].name != "ratio" && info.shape[i].name != "time_constant";
@@ -144,7 +133,8 @@ class Builder {
     u.kind = Unknown::Kind::rotor;
     u.in_base = rotor->in_base;
     u.prior = rotor->inertia;
-    u.prior_std = rotor->std > 0 ? rotor->std : rotor_share * joint.rated_torque / std::max(joint.ddq_limit, 1e-9);
+    u.prior_std = rotor->std > 0 ? rotor->std
+                                 : models_.options.prior.rotor * joint.rated_torque / std::max(joint.ddq_limit, 1e-9);
   }
 
   /// Standard deviation of a coefficient from one healthy session to the next.
@@ -152,11 +142,12 @@ class Builder {
     const JointFit& joint = now_.joints[shared.joint];
     const EffectFit* coulomb = common_.joints[shared.joint].find(Coulomb::name);
     // Of motions of unit size: a coefficient's own scale.
-    double scale = friction_change * std::fabs(shared.value);
+    const PriorOptions& prior = models_.options.prior;
+    double scale = prior.friction_change * std::fabs(shared.value);
     if (joint.effects[shared.effect].effect == Offset::name && coulomb != nullptr)
-      scale += offset_change * std::fabs(coulomb->linear[0]);
+      scale += prior.offset_change * std::fabs(coulomb->linear[0]);
     const double motion = parameter.quantity == Quantity::velocity ? joint.dq_limit : 1.0;
-    return std::hypot(scale, smallest_change * joint.rated_torque / std::max(motion, 1e-9));
+    return std::hypot(scale, prior.smallest_change * joint.rated_torque / std::max(motion, 1e-9));
   }
 
   /// @returns how many
@@ -192,7 +183,7 @@ class Builder {
       u.value = read(now_, u);
       if (info.linear[i].name == "share") {
         u.prior = 1;
-        u.prior_std = share_std;
+        u.prior_std = models_.options.prior.share;
       }
       out_.all.push_back(u);
       group.lower.push_back(info.linear[i].lower);

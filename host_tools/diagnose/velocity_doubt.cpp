@@ -14,9 +14,6 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Times white noise's: an encoder at standstill repeats its error.
-constexpr double repeats = 2;
-
 /// All friction that turns with the sign, some of it in proportion to the load.
 struct SignFriction {
   double amplitude = 0, of_load = 0;
@@ -47,11 +44,11 @@ struct VelocityError {
 
 VectorXd velocity_doubt(const ProcessedLog& log, std::size_t joint, const JointFit& friction,
                         const Eigen::Ref<const VectorXd>& velocity, const Eigen::Ref<const VectorXd>& load,
-                        double sigma) {
+                        double sigma, double velocity_error) {
   const EffectFit* coulomb = friction.find(Coulomb::name);
   if (coulomb == nullptr || log.measured_dq.size() > 0 || !(position_noise(log.filter, joint) > 0))
     return VectorXd::Zero(log.rows());
-  const VelocityError error{repeats * velocity_noise(log.filter, joint, log.step_s),
+  const VelocityError error{velocity_error * velocity_noise(log.filter, joint, log.step_s),
                             position_band(log.filter, log.step_s) * log.filter.encoder_step[joint]};
   const double width = friction.sign_width;
   const auto [amplitude, of_load] = sign_friction(friction, *coulomb);

@@ -16,9 +16,10 @@ namespace fxdyn::diagnosis {
 /// sigma_dq is what the position filter leaves of the encoder's noise. An encoder that steps more slowly than the
 /// filter is a staircase, no white noise: its velocity is wrong by sqrt(2) cutoff step.
 /// @param joint its friction @param dq, load of the joint at full rate @param sigma RMS of the residual's noise
+/// @param velocity_error of the encoder, over that of white noise
 /// @returns filtered and decimated; zeros where the velocity is measured or the joint has no friction
 Eigen::VectorXd velocity_doubt(const ProcessedLog& log, std::size_t joint, const JointFit& friction,
                                const Eigen::Ref<const Eigen::VectorXd>& dq,
-                               const Eigen::Ref<const Eigen::VectorXd>& load, double sigma);
+                               const Eigen::Ref<const Eigen::VectorXd>& load, double sigma, double velocity_error);
 
 }  // namespace fxdyn::diagnosis

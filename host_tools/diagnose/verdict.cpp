@@ -22,13 +22,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using nlohmann::json;
 
-/// Times the error before: what test logs say against a name.
-constexpr double risen = 1.05;
-/// Times the error of the logs that judged: the test logs hold something else.
-constexpr double much_larger = 2;
-/// Share of rows.
-constexpr double much_doubt = 0.1;
-
 bool is_validate(const ProcessedLog& log) { return log.role == Role::validate; }
 
 /// @param rated torque [N*m | N]
@@ -57,7 +50,10 @@ VectorXd error_of(const ProcessedLog& log, const MatrixXd& torque, std::size_t j
 /// Writes diagnosis.json.
 class ReportWriter {
  public:
-  explicit ReportWriter(const Conclusion& conclusion) : conclusion_(conclusion), problem_(*conclusion.outcome.problem) {
+  explicit ReportWriter(const Conclusion& conclusion)
+      : conclusion_(conclusion),
+        problem_(*conclusion.outcome.problem),
+        report_(conclusion.outcome.models.options.report) {
     // Figures are on logs that decided nothing, where there are any.
     for (const ProcessedLog& log : conclusion_.test) shown_.push_back(&log);
     figures_on_ = "test logs";
@@ -182,7 +178,7 @@ class ReportWriter {
     if (j != 0 || fit.effect != GravityCompensator::name) return false;
     const Robot& robot = conclusion_.model.robot;
     const Eigen::Vector3d axis = robot.joints[0].origin.linear() * robot.joints[0].axis;
-    const bool upright = axis.cross(robot.gravity).norm() < 1e-3 * robot.gravity.norm();
+    const bool upright = axis.cross(robot.gravity).norm() < report_.upright * robot.gravity.norm();
     return upright && std::any_of(conclusion_.model.body.begin(), conclusion_.model.body.end(),
                                   [](const EffectFit& body) { return body.named && body.effect == GravityTilt::name; });
   }
@@ -308,7 +304,7 @@ class ReportWriter {
   }
 
   void note_other_test_logs(std::size_t j, const Figures& figures) {
-    if (conclusion_.test.empty() || figures.after <= much_larger * figures.gate) return;
+    if (conclusion_.test.empty() || figures.after <= report_.much_larger * figures.gate) return;
     notes_.push_back(fmt::format(
         "{}: the error is {:.3g} {} on the test logs and {:.3g} on the logs that judged: another load, tool "
         "or motion that these did not have?",
@@ -326,7 +322,7 @@ class ReportWriter {
   }
 
   void note_risen_error(std::size_t j, const Figures& figures) {
-    if (conclusion_.test.empty() || figures.after <= risen * figures.before) return;
+    if (conclusion_.test.empty() || figures.after <= report_.risen * figures.before) return;
     notes_.push_back(
         fmt::format("{}: on the test logs the error rises from {:.3g} to {:.3g} {}: what was found does not carry "
                     "over to their motion",
@@ -335,7 +331,7 @@ class ReportWriter {
 
   void note_doubtful_direction(std::size_t j) {
     const double doubtful = problem_.noise().doubtful_share(j);
-    if (doubtful <= much_doubt) return;
+    if (doubtful <= report_.much_doubt) return;
     const double step = conclusion_.now.front().filter.encoder_step[j];
     notes_.push_back(fmt::format(
         "{}: in {:.0f} % of the rows the encoder{} does not tell which way it moves; what is unexplained may be "
@@ -370,8 +366,9 @@ class ReportWriter {
     const std::optional<Impacts>& impacts = conclusion_.impacts[j];
     note_impacts(j);
     const LackOfFit& lack = conclusion_.outcome.lack[j];
-    const bool unexplained = (lack.structured() && (nothing_found || conclusion_.gate.remains[j])) ||
-                             !resembles.empty() || (nothing_found && impacts);
+    const bool structured = conclusion_.outcome.structured(j);
+    const bool unexplained = (structured && (nothing_found || conclusion_.gate.remains[j])) || !resembles.empty() ||
+                             (nothing_found && impacts);
     const std::string verdict = unexplained ? "unexplained" : !effects.empty() ? "effects_found" : "nothing_missing";
     any_effect_ |= !effects.empty();
     // What only bends leaves no gap in the torque, and noise alone has nothing to close.
@@ -382,11 +379,12 @@ class ReportWriter {
     if (!effects.empty() || !resembles.empty() || reached) note_risen_error(j, of);
     std::sort(effects.begin(), effects.end(), [](const json& a, const json& b) { return a["score"] > b["score"]; });
     json regions = json::array();
-    const bool only_impacts = impacts && nothing_found && resembles.empty() && !lack.structured();
+    const bool only_impacts = impacts && nothing_found && resembles.empty() && !structured;
     if (only_impacts) {
       regions.push_back(region_of(*impacts));
-    } else if (unexplained || (verdict != "nothing_missing" && of_torque) || of.before >= much_larger * of.floor) {
-      regions = where(conclusion_.nominal, shown_, j, of.errors, std::min(of.floor, of.before));
+    } else if (unexplained || (verdict != "nothing_missing" && of_torque) ||
+               of.before >= report_.much_larger * of.floor) {
+      regions = where(conclusion_.nominal, shown_, j, of.errors, std::min(of.floor, of.before), report_);
     }
     if (unexplained) note_doubtful_direction(j);
     if (only_impacts) {
@@ -414,7 +412,7 @@ class ReportWriter {
     for (std::size_t i = 0; i < conclusion_.gate.groups.size(); ++i) {
       const Group& group = problem_.groups()[conclusion_.gate.groups[i]];
       if (group.on_body && conclusion_.model.body[group.id.effect].named &&
-          conclusion_.gate.held.alone[i][joint] > least_felt)
+          conclusion_.gate.held.alone[i][joint] > problem_.models().options.gate.least_felt)
         return true;
     }
     return false;
@@ -435,7 +433,8 @@ class ReportWriter {
       json one = effect_json(conclusion_.model.body[e], id, conclusion_.gate.robot_closure[i]);
       json which = json::array();
       for (std::size_t j = 0; j < conclusion_.model.joints.size(); ++j) {
-        if (conclusion_.gate.held.alone[i][static_cast<Index>(j)] > least_felt) which.push_back(j + 1);
+        if (conclusion_.gate.held.alone[i][static_cast<Index>(j)] > problem_.models().options.gate.least_felt)
+          which.push_back(j + 1);
       }
       one["joints"] = which;
       one["model_share"] = body_share(e);
@@ -446,6 +445,7 @@ class ReportWriter {
 
   const Conclusion& conclusion_;
   const Linearised& problem_;
+  const ReportOptions& report_;
   std::vector<const ProcessedLog*> shown_;
   std::string figures_on_, next_;
   std::vector<std::string> notes_;

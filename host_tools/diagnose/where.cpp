@@ -15,8 +15,6 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 constexpr Index bins = 24;
-/// A region is reported where its share of the gap is that much more than its share of the samples.
-constexpr double least_contrast = 0.15;
 constexpr std::size_t most_regions = 4;
 
 struct Region {
@@ -155,7 +153,7 @@ Region in_frequency(const std::vector<const ProcessedLog*>& logs, const std::vec
 }  // namespace
 
 nlohmann::json where(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs, std::size_t joint,
-                     const std::vector<VectorXd>& error, double noise) {
+                     const std::vector<VectorXd>& error, double noise, const ReportOptions& options) {
   const Samples samples = samples_of(model, logs, joint, error);
   const auto total = static_cast<double>(samples.square.size());
   const Whole all{samples.square.sum() - noise * noise * total, total};
@@ -173,7 +171,7 @@ nlohmann::json where(const IdentifiedModel& model, const std::vector<const Proce
   std::sort(regions.begin(), regions.end(), [](const Region& a, const Region& b) { return a.contrast > b.contrast; });
   nlohmann::json out = nlohmann::json::array();
   for (const Region& region : regions) {
-    if (out.size() >= most_regions || (region.contrast < least_contrast && !out.empty())) break;
+    if (out.size() >= most_regions || (region.contrast < options.least_contrast && !out.empty())) break;
     out.push_back(
         {{"signal", region.signal}, {"from", region.from}, {"to", region.to}, {"share_of_gap", region.share}});
     if (!region.log.empty()) out.back()["log"] = region.log;

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "host_tools/diagnose/options.hpp"
 #include "host_tools/effects/forward.hpp"
 #include "host_tools/regression/dataset.hpp"
 
@@ -11,6 +12,6 @@ namespace fxdyn::diagnosis {
 /// clearly more of its power than of the samples, the most telling first: [{signal, from, to, share_of_gap}].
 /// @param error filtered residual of the joint over each log, full rate @param noise its noise floor
 nlohmann::json where(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs, std::size_t joint,
-                     const std::vector<Eigen::VectorXd>& error, double noise);
+                     const std::vector<Eigen::VectorXd>& error, double noise, const ReportOptions& options);
 
 }  // namespace fxdyn::diagnosis

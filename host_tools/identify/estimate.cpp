@@ -13,9 +13,6 @@
 namespace fxdyn {
 namespace {
 
-/// A standard deviation that stands for this share of rated torque is worth a note.
-constexpr double worrying_error = 0.1;
-
 /// Of X with columns of length one, from X^T X.
 double condition_number(const Eigen::MatrixXd& information) {
   const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
@@ -60,19 +57,20 @@ auto log_formats(const std::vector<LogEntry>& logs) {
 }
 
 /// Stiffness of joints with a link encoder, of the logs that fit.
-void add_flexible_joints(IdentifiedModel& model, const std::vector<ProcessedLog>& logs) {
+void add_flexible_joints(IdentifiedModel& model, const std::vector<ProcessedLog>& logs,
+                         const FlexibleOptions& options) {
   std::vector<ProcessedLog> train;
   for (const ProcessedLog& log : logs) {
     if (log.role == Role::train && log.qlink.size() > 0) train.push_back(log);
   }
-  for (const FlexibleJoint& joint : identify_flexible({model, train})) {
+  for (const FlexibleJoint& joint : identify_flexible({model, train}, options)) {
     model.joints[joint.joint].flexible = joint;
     const Joint& place = model.robot.joints[joint.joint];
     model.notes.push_back(joint.found ? fmt::format("joint {} ({}): stiffness {:.4g} +- {:.2g} {}/{}", joint.joint + 1,
                                                     place.name, joint.stiffness, joint.stiffness_std,
                                                     place.torque_unit(), place.position_unit())
                                       : fmt::format("joint {} ({}): {}", joint.joint + 1, place.name, joint.note));
-    if (joint.found) model.joints[joint.joint].effects.push_back(elasticity_effect(joint));
+    if (joint.found) model.joints[joint.joint].effects.push_back(elasticity_effect(joint, options));
   }
 }
 
@@ -80,7 +78,8 @@ void add_flexible_joints(IdentifiedModel& model, const std::vector<ProcessedLog>
 
 std::string project_hash(const Project& project) { return hash_of(read_file(project.file) + read_file(project.urdf)); }
 
-Estimate finish_model(const Fitter& fitter, const Project& project, const GateData& data) {
+Estimate finish_model(const Fitter& fitter, const Project& project, const GateData& data,
+                      const IdentifyOptions& options) {
   const IdentifySettings& settings = project.identify;
   Estimate out;
   Solution solution = fitter.fit();
@@ -94,7 +93,7 @@ Estimate finish_model(const Fitter& fitter, const Project& project, const GateDa
     solution.beta = out.recursion->solution.beta;
     solution.theta = out.recursion->solution.theta;
   }
-  out.weak = weak_in_logs(fitter, solution, worrying_error);
+  out.weak = weak_in_logs(fitter, solution, options.structure.worrying_error);
   // With a joint at rest the bodies on either side of it can't be told apart; that is asked for.
   if (data.logs.front().left_out.empty()) check_identifiable(out.weak, project.robot);
   const Solution essential = essential_parameters(solution, equations);
@@ -114,7 +113,7 @@ Estimate finish_model(const Fitter& fitter, const Project& project, const GateDa
   model.project_hash = fxdyn::project_hash(project);
   model.logs = data.references;
   model.notes = data.notes;
-  add_flexible_joints(model, data.logs);
+  add_flexible_joints(model, data.logs, options.flexible);
   return out;
 }
 

@@ -5,6 +5,7 @@
 
 #include "host_tools/identify/excitation.hpp"
 #include "host_tools/identify/gate_data.hpp"
+#include "host_tools/identify/options.hpp"
 #include "host_tools/regression/fitter.hpp"
 #include "host_tools/regression/physical.hpp"
 
@@ -24,6 +25,7 @@ struct Estimate {
   std::optional<Fitter::Recursion> recursion;  ///< method rls
 };
 /// @throws DataError: the train logs tell nothing of some base parameters; names them and the joint to move.
-Estimate finish_model(const Fitter& fitter, const Project& project, const GateData& data);
+Estimate finish_model(const Fitter& fitter, const Project& project, const GateData& data,
+                      const IdentifyOptions& options = {});
 
 }  // namespace fxdyn

@@ -20,11 +20,7 @@
 namespace fxdyn {
 namespace {
 
-constexpr double block_s = 0.5;       // residuals further apart than this count as independent
-constexpr double significant = 5;     // standard deviations that a stiffness has to be away from "rigid"
-constexpr double least_share = 0.02;  // of the deflection's power that the load has to explain
-constexpr double worth = 0.1;         // of the residual's power that another cause has to explain
-constexpr double most_relaxation_s = 0.1;
+constexpr double most_relaxation_s = 0.1;  ///< a bound of the fit, beyond what any gear has
 
 /// Least squares with the covariance of a residual that is correlated within blocks ("sandwich").
 struct LeastSquares {
@@ -63,7 +59,7 @@ LeastSquares least_squares(Eigen::MatrixXd x, const Eigen::VectorXd& y, const st
 class JointData {
  public:
   JointData(const FlexibleInput& input, const std::vector<MotionRows>& motions,
-            const std::vector<Eigen::MatrixXd>& loads, Eigen::Index joint)
+            const std::vector<Eigen::MatrixXd>& loads, Eigen::Index joint, double block_s)
       : joint_(joint), sign_width_(input.model.joints[static_cast<std::size_t>(joint)].sign_width) {
     std::vector<Eigen::VectorXd> deltas;
     for (std::size_t l = 0; l < input.logs.size(); ++l) {
@@ -215,7 +211,8 @@ struct Cause {
 
 /// Takes out of the deflection what other causes explain, the worst first, each at most once; says so in `note`.
 GearFit without_other_causes(const JointData& data, const IdentifiedModel& model, const Regressor& regressor,
-                             bool with_rotor, bool revolute, double all, std::string& note, Eigen::MatrixXd& others) {
+                             bool with_rotor, bool revolute, double all, std::string& note, Eigen::MatrixXd& others,
+                             const FlexibleOptions& options) {
   std::vector<Cause> list;
   if (revolute) list.push_back({Eccentricity::name, {}, "an eccentric gear or encoder disc"});
   for (const double share : {0.01, 0.03, 0.1})
@@ -232,7 +229,7 @@ GearFit without_other_causes(const JointData& data, const IdentifiedModel& model
       const GearFit candidate = fit_gear(data, with_rotor, both, fit, 1);
       const double gain = fit.least_squares.power - candidate.least_squares.power;
       if (candidate.least_squares.power >= better.least_squares.power) continue;
-      if (gain < worth * fit.least_squares.power || gain < 1e-4 * all) continue;
+      if (gain < options.cause * fit.least_squares.power || gain < options.cause_of_all * all) continue;
       best = &cause;
       better = candidate;
       columns_of_best = columns;
@@ -247,7 +244,7 @@ GearFit without_other_causes(const JointData& data, const IdentifiedModel& model
         better.least_squares.covariance + data.from_load(better.least_squares, model, regressor);
     const Eigen::VectorXd tail = better.least_squares.theta.tail(own);
     const double wald = tail.dot(covariance.bottomRightCorner(own, own).ldlt().solve(tail));
-    if (wald < significant * significant * static_cast<double>(own)) break;
+    if (wald < options.significant * options.significant * static_cast<double>(own)) break;
     fit = better;
     others = both;
     add(note, fmt::format("{} of {:.2g} {} taken out", best->what, 1e3 * tail.norm(), revolute ? "mrad" : "mm"));
@@ -257,7 +254,7 @@ GearFit without_other_causes(const JointData& data, const IdentifiedModel& model
 }
 
 FlexibleJoint identify_joint(const JointData& data, const IdentifiedModel& model, const Regressor& regressor,
-                             std::size_t j, bool rotor_in_load) {
+                             std::size_t j, bool rotor_in_load, const FlexibleOptions& options) {
   const bool revolute = model.robot.joints[j].type == JointType::revolute;
   const std::string_view stiffness_unit = revolute ? "N*m/rad" : "N/m", length_unit = revolute ? "mrad" : "mm";
   const Eigen::VectorXd& delta = data.deflection();
@@ -271,7 +268,7 @@ FlexibleJoint identify_joint(const JointData& data, const IdentifiedModel& model
     return out;
   }
   Eigen::MatrixXd others(delta.size(), 0);
-  GearFit fit = without_other_causes(data, model, regressor, rotor_in_load, revolute, all, out.note, others);
+  GearFit fit = without_other_causes(data, model, regressor, rotor_in_load, revolute, all, out.note, others, options);
   LeastSquares& ls = fit.least_squares;
   ls.covariance += data.from_load(ls, model, regressor);
   out.explained = 1 - ls.power / all;
@@ -280,17 +277,17 @@ FlexibleJoint identify_joint(const JointData& data, const IdentifiedModel& model
   Eigen::MatrixXd rest(delta.size(), 1 + others.cols());
   rest << Eigen::VectorXd::Ones(delta.size()), others;
   const double share = 1 - ls.power / least_squares(rest, delta, data.block_ends()).power;  // of the load
-  if (c < -significant * c_std && share > 0.5) {
+  if (c < -options.significant * c_std && share > options.most) {
     add(out.note, "the link goes before the load: link encoder counted the wrong way, or swapped with the motor's");
     return out;
   }
-  if (!(c > significant * c_std) || share < least_share) {
+  if (!(c > options.significant * c_std) || share < options.least_share) {
     const GearFit whole = rotor_in_load ? fit_gear(data, false, others) : fit;
     const double left = std::sqrt(whole.least_squares.power), k = 1 / (std::max(0.0, whole.compliance) + 3 * c_std);
-    if (share < 0.5) {
+    if (share < options.most) {
       add(out.note, fmt::format("no elasticity to be seen: stiffer than {:.2g} {}, and {:.2g} {} remain unexplained", k,
                                 stiffness_unit, 1e3 * left, length_unit));
-    } else if (rotor_in_load && whole.least_squares.power < 0.5 * all) {
+    } else if (rotor_in_load && whole.least_squares.power < options.most * all) {
       add(out.note,
           "the gear bends, but its load cannot be distinguished from the rotor's inertia: move the joints behind it "
           "too, arm "
@@ -321,15 +318,16 @@ FlexibleJoint identify_joint(const JointData& data, const IdentifiedModel& model
     out.effective_inertia = rotor->linear[0];
     out.inertia_std = rotor->linear_std.empty() ? 0 : rotor->linear_std[0];
   }
-  if (out.damping < 2 * out.damping_std) add(out.note, "damping cannot be distinguished from none: move faster");
-  if (out.explained < 0.5)
+  if (out.damping < options.damped * out.damping_std)
+    add(out.note, "damping cannot be distinguished from none: move faster");
+  if (out.explained < options.most)
     add(out.note, "most of the deflection does not follow the load: mounting of the encoders, or error of the gear");
   return out;
 }
 
 }  // namespace
 
-std::vector<FlexibleJoint> identify_flexible(const FlexibleInput& input) {
+std::vector<FlexibleJoint> identify_flexible(const FlexibleInput& input, const FlexibleOptions& options) {
   const bool any = std::any_of(input.logs.begin(), input.logs.end(), [](const ProcessedLog& log) {
     return std::find(log.has_link.begin(), log.has_link.end(), true) != log.has_link.end();
   });
@@ -352,11 +350,11 @@ std::vector<FlexibleJoint> identify_flexible(const FlexibleInput& input) {
   std::vector<std::optional<FlexibleJoint>> all(input.model.robot.size());
   parallel_for(all.size(), [&](std::size_t j) {
     const auto joint = static_cast<Eigen::Index>(j);
-    const JointData data(input, motions, loads, joint);
+    const JointData data(input, motions, loads, joint, options.block_s);
     if (data.empty()) return;
     const bool rotor_in_load =
         rotor_of(input.model.joints[j]) == nullptr && rotor_inertia_is_absorbed(chain, base, joint);
-    all[j] = identify_joint(data, input.model, Regressor(chain), j, rotor_in_load);
+    all[j] = identify_joint(data, input.model, Regressor(chain), j, rotor_in_load, options);
   });
   std::vector<FlexibleJoint> found;
   for (std::optional<FlexibleJoint>& joint : all) {
@@ -365,8 +363,8 @@ std::vector<FlexibleJoint> identify_flexible(const FlexibleInput& input) {
   return found;
 }
 
-EffectFit elasticity_effect(const FlexibleJoint& joint) {
-  const bool damped = joint.damping > 2 * joint.damping_std;
+EffectFit elasticity_effect(const FlexibleJoint& joint, const FlexibleOptions& options) {
+  const bool damped = joint.damping > options.damped * joint.damping_std;
   const double k = joint.stiffness;
   EffectFit fit;
   fit.effect = Elasticity::name;

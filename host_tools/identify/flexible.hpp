@@ -4,6 +4,7 @@
 
 #include "host_tools/effects/forward.hpp"
 #include "host_tools/effects/joint_fit.hpp"
+#include "host_tools/identify/options.hpp"
 #include "host_tools/regression/dataset.hpp"
 
 // Flexible joints from a second encoder on the link, paper Eqs. 12 and 42 (whose sum misses J ddq):
@@ -28,9 +29,9 @@ struct FlexibleInput {
 /// independent, which is mostly too much). Play and a once-a-turn error of the gear or the encoder are taken out where
 /// the data shows them, and noted. A joint that does not bend measurably, or whose load is not known well enough, comes
 /// back with found = false.
-std::vector<FlexibleJoint> identify_flexible(const FlexibleInput& input);
+std::vector<FlexibleJoint> identify_flexible(const FlexibleInput& input, const FlexibleOptions& options = {});
 
 /// The same gear as an effect of the model: compliance 1 / K, relaxation B / K (0 where B is not told from 0).
-EffectFit elasticity_effect(const FlexibleJoint& joint);
+EffectFit elasticity_effect(const FlexibleJoint& joint, const FlexibleOptions& options = {});
 
 }  // namespace fxdyn

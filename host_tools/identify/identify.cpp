@@ -16,9 +16,6 @@
 namespace fxdyn {
 namespace {
 
-/// Of the rows at the drive's limit there is nothing to learn from.
-constexpr double most_saturated = 0.5;
-
 std::string joined(const std::vector<std::string>& names) {
   std::string out;
   for (const std::string& name : names) out += (out.empty() ? "" : ", ") + name;
@@ -28,8 +25,8 @@ std::string joined(const std::vector<std::string>& names) {
 /// One run: designs that become better stage by stage.
 class Identification {
  public:
-  Identification(const Project& project, GateData& data, Progress& progress)
-      : project_(project), data_(data), progress_(progress), joints_(project.robot.size()) {
+  Identification(const Project& project, GateData& data, Progress& progress, const IdentifyOptions& options)
+      : project_(project), data_(data), progress_(progress), options_(options), joints_(project.robot.size()) {
     if (project.identify.effects) {
       nominal_ = *project.identify.effects;
       optional_.clear();
@@ -45,7 +42,7 @@ class Identification {
     progress_.stage("building the regressor", 1);
     fitter_ = std::make_unique<Fitter>(project_.robot, data_.logs, design);
     check_saturation();
-    for (const Suspicion& suspicion : check_plausible(project_.robot, data_.logs, design)) {
+    for (const Suspicion& suspicion : check_plausible(project_.robot, data_.logs, design, options_.plausible)) {
       if (suspicion.severity == Severity::error) throw DataError(suspicion.text);
       data_.notes.push_back(suspicion.text);
     }
@@ -93,7 +90,7 @@ class Identification {
     const std::vector<Eigen::Index> saturated = fitter_->saturated_rows();
     for (std::size_t j = 0; j < joints_; ++j) {
       const double share = static_cast<double>(saturated[j]) / static_cast<double>(fitter_->rows());
-      if (share < most_saturated || is_left_out(j)) continue;
+      if (share < options_.structure.most_saturated || is_left_out(j)) continue;
       throw DataError(fmt::format(
           "torque of joint {} ({}) is at its limit for {:.0f} % of the logs: record with less load or speed, or "
           "check torque_gain",
@@ -125,7 +122,8 @@ class Identification {
     });
     for (std::size_t j = 0; j < joints_; ++j) {
       if (is_left_out(j)) continue;
-      if (always || best[j].judgement.beats(before[j], worth_keeping)) fitter_->set_design(j, best[j].design);
+      if (always || best[j].judgement.beats(before[j], options_.structure.worth_keeping))
+        fitter_->set_design(j, best[j].design);
     }
     reweight();
   }
@@ -138,14 +136,14 @@ class Identification {
     for (const std::string& effect : nominal_) {
       if (find_effect(effect)->shape.empty()) continue;
       improve("shape of " + effect, true,
-              [&](std::size_t j) { return search_effect(*fitter_, j, effect, scales_[j]); });
+              [&](std::size_t j) { return search_effect(*fitter_, j, effect, scales_[j], options_.structure); });
     }
   }
 
   void align() {
     if (project_.signals.torque_lead_s) return;
     progress_.stage("is the torque ahead of the motion?", 1);
-    find_torque_lead(*fitter_, data_.filter.torque_cutoff_hz);
+    find_torque_lead(*fitter_, data_.filter.torque_cutoff_hz, options_.structure);
     reweight();
     progress_.step();
   }
@@ -175,8 +173,9 @@ class Identification {
       for (const std::string_view effect : optional_) {
         if (joints_ == 1 && find_effect(effect)->needs_peers) continue;
         improve("is there " + std::string(effect) + "?", false, [&](std::size_t j) {
-          return is_tried(fitter_->design(j), *find_effect(effect)) ? search_effect(*fitter_, j, effect, scales_[j])
-                                                                   : Candidate{fitter_->design(j), {}};
+          return is_tried(fitter_->design(j), *find_effect(effect))
+                     ? search_effect(*fitter_, j, effect, scales_[j], options_.structure)
+                     : Candidate{fitter_->design(j), {}};
         });
       }
       fitter_->polish();
@@ -201,6 +200,7 @@ class Identification {
   const Project& project_;
   GateData& data_;
   Progress& progress_;
+  const IdentifyOptions& options_;
   std::size_t joints_;
   std::vector<std::string> nominal_ = nominal_effects();
   std::vector<std::string_view> optional_ = identified_effects();
@@ -226,8 +226,9 @@ std::string torque_lead_note(double lead_s) {
       1e3 * std::fabs(lead_s), lead_s > 0 ? "ahead of" : "behind");
 }
 
-std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progress& progress) {
-  return Identification(project, data, progress).run();
+std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progress& progress,
+                                 const IdentifyOptions& options) {
+  return Identification(project, data, progress, options).run();
 }
 
 }  // namespace fxdyn

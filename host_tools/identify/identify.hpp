@@ -6,6 +6,7 @@
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/identify/estimate.hpp"
 #include "host_tools/identify/gate_data.hpp"
+#include "host_tools/identify/options.hpp"
 #include "host_tools/project/project.hpp"
 #include "host_tools/regression/fitter.hpp"
 #include "host_tools/support/progress.hpp"
@@ -17,7 +18,8 @@ void weigh(Fitter& fitter, const IdentifySettings& settings);
 
 /// Structure and friction: widths and shapes searched on the gate data, coefficients by (weighted) least squares.
 /// Returns the fitter with the chosen designs. What it leaves out for want of data goes into data.notes.
-std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progress& progress);
+std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progress& progress,
+                                 const IdentifyOptions& options = {});
 
 /// For people: how far the torque column is ahead of the motion.
 std::string torque_lead_note(double lead_s);

@@ -27,11 +27,6 @@ using Eigen::VectorXd;
 
 constexpr auto ten = static_cast<Index>(parameters_per_link);
 constexpr Index nuisances = 2;  ///< Coulomb, offset of each joint
-/// Share of a column's square that the others must leave for it to count as identifiable.
-constexpr double least_share_left = 1e-6;
-/// A mass with a larger relative standard deviation is none.
-constexpr double largest_uncertainty = 0.3;
-
 /// Ten parameters in the URDF frame -> ten in the DH frame.
 MatrixXd to_dh_frame(const Eigen::Isometry3d& pose) {
   MatrixXd map(ten, ten);
@@ -170,7 +165,7 @@ Fit solve(const Rows& rows) {
 }
 
 /// Which of the ten no sum of the others and of friction imitates.
-std::array<bool, 10> identifiable(const Fit& fit) {
+std::array<bool, 10> identifiable(const Fit& fit, double least_share_left) {
   VectorXd scale = fit.information.diagonal().head(ten).cwiseMax(0).cwiseSqrt();
   std::array<bool, 10> out{};
   for (Index k = 0; k < ten; ++k) {
@@ -305,7 +300,7 @@ ConsistentFit possible_load(const Fit& fit, const std::array<bool, 10>& apart, I
 
 }  // namespace
 
-LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log) {
+LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log, const LoadOptions& options) {
   for (const EffectFit& effect : model.body) {
     if (effect.effect == Payload::name)
       throw InputError("the model has a payload already: take the model that was identified without load");
@@ -315,13 +310,13 @@ LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log) {
   const auto n = static_cast<Index>(model.robot.size());
   const Rows rows = build_rows(model, chain, log);
   const Fit fit = solve(rows);
-  const std::array<bool, 10> apart = identifiable(fit);
+  const std::array<bool, 10> apart = identifiable(fit, options.least_share_left);
   const double mass = fit.solution[0], mass_std = std::sqrt(std::max(0.0, fit.covariance(0, 0)));
   if (!apart[0]) {
     throw DataError(fmt::format("{}: the mass of the load cannot be identified from this motion: {}", log.name,
                                 what_to_move(model.robot, log, rows)));
   }
-  if (!(mass > 0) || mass_std > largest_uncertainty * mass) {
+  if (!(mass > 0) || mass_std > options.largest_uncertainty * mass) {
     throw DataError(fmt::format("{}: no load to be seen: mass {:.3g} kg, standard deviation {:.3g} kg; {}", log.name,
                                 mass, mass_std, what_to_move(model.robot, log, rows)));
   }

@@ -5,6 +5,7 @@
 
 #include "host_tools/effects/forward.hpp"
 #include "host_tools/effects/joint_fit.hpp"
+#include "host_tools/identify/options.hpp"
 #include "host_tools/regression/dataset.hpp"
 #include "host_tools/robot/robot.hpp"
 
@@ -34,7 +35,7 @@ struct LoadFit {
 /// Standard deviations count the residual's autocorrelation.
 /// @throws DataError: the motion does not tell the mass, or there is none to be seen. InputError: the model has a
 /// payload already, or the log has no torque.
-LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log);
+LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log, const LoadOptions& options = {});
 
 /// Content of payload.json.
 nlohmann::json load_json(const LoadFit& fit, const Robot& robot);

@@ -21,18 +21,6 @@ using Eigen::VectorXd;
 constexpr Index samples_used = 400;
 /// Coulomb, viscous, offset and, where it is not absorbed, rotor inertia.
 constexpr Index own = 4, viscous = 1, rotor = 3;
-/// Another sign has to lower the sum over joints of log(residual square) by this much: a joint's RMS by 40 %.
-constexpr double worth_a_flip = 1;
-/// Residuals below this share of the torque's RMS count as this: perfect fits are not better than perfect.
-constexpr double perfect = 1e-3;
-constexpr double sure = 5;  ///< standard deviations
-/// Shares of the torque's RMS that friction and inertia must have to be worth a word.
-constexpr double material_friction = 0.05, material_inertia = 0.2;
-/// The least mass that fits gravity and inertia, for a robot that reaches 1 m; robots of one kind grow with the cube.
-/// Real arms: 2 .. 70 kg/m^3.
-constexpr double heaviest = 1000, lightest = 0.1;
-constexpr double shortest = 0.3;  ///< what counts as the reach of anything smaller [m]
-
 struct Estimate {
   double value = 0, std = 0;
 };
@@ -40,8 +28,9 @@ struct Estimate {
 /// Rows of all joints over a few hundred samples, the columns' gravity part apart.
 class Rows {
  public:
-  Rows(const Robot& robot, const std::vector<ProcessedLog>& logs, const std::vector<JointFit>& joints)
-      : n_(static_cast<Index>(robot.size())) {
+  Rows(const Robot& robot, const std::vector<ProcessedLog>& logs, const std::vector<JointFit>& joints,
+       const PlausibleOptions& options)
+      : options_(options), n_(static_cast<Index>(robot.size())) {
     const DhChain chain = to_dh(robot);
     base_ = find_base(chain);
     Regressor regressor(chain);
@@ -154,7 +143,7 @@ class Rows {
         const VectorXd x = of_joint(fit.solution, j);
         const double whole = signs[j] * signs[j] * squares_[joint];
         const double square = whole - 2 * signs[j] * x.dot(projections[joint]) + x.dot(grams[joint] * x);
-        residual[j] = std::max(square, perfect * perfect * whole);
+        residual[j] = std::max(square, options_.perfect * options_.perfect * whole);
         fit.score += std::log(residual[j] / whole);
       }
     }
@@ -201,6 +190,7 @@ class Rows {
   }
   /// A joint that stands still holds any torque, as does its brake: nothing of it counts.
   bool is_left_out(Index j) const { return left_out_[static_cast<std::size_t>(j)]; }
+  const PlausibleOptions& options() const { return options_; }
   double acceleration_rms(Index j) const { return std::sqrt(accelerations_[j] / static_cast<double>(tau_.rows())); }
   double torque_rms(Index j) const {
     return std::sqrt(squares_[static_cast<std::size_t>(j)] / static_cast<double>(tau_.rows()));
@@ -223,6 +213,7 @@ class Rows {
     return {row.dot(fit.solution), std::sqrt(std::max(0.0, row.dot(fit.covariance * row)))};
   }
 
+  const PlausibleOptions& options_;
   Index n_;
   BaseSet base_;
   std::vector<bool> has_rotor_, left_out_;
@@ -246,7 +237,7 @@ Rows::Fit best_signs(const Rows& rows, double up, Index joints) {
       Rows::Fit candidate = rows.fit(up, signs);
       if (candidate.score < next.score) next = std::move(candidate);
     }
-    if (!(next.score < best.score - worth_a_flip)) return best;
+    if (!(next.score < best.score - rows.options().flip)) return best;
     best = std::move(next);
   }
 }
@@ -268,12 +259,13 @@ std::string title(const Robot& robot, std::size_t joint) {
 }
 
 void check_units(const Robot& robot, const Rows& rows, const Rows::Fit& fit, std::vector<Suspicion>& out) {
+  const PlausibleOptions& options = rows.options();
   const double reach = reach_of(robot, 0);
   const double strength = robot.gravity.norm();
   double mass = 0, mass_std = 0;
   for (std::size_t j = 0; j < robot.size(); ++j) {
-    const double arm = std::max(reach_of(robot, j), shortest);
-    if (robot.joints[j].type != JointType::revolute || reach_of(robot, j) < 0.2 * reach) continue;
+    const double arm = std::max(reach_of(robot, j), options.shortest);
+    if (robot.joints[j].type != JointType::revolute || reach_of(robot, j) < options.least_reach * reach) continue;
     double ignored = 0;
     const Estimate inertia = rows.inertia(fit, static_cast<Index>(j), ignored);
     const Estimate gravity = rows.gravity(fit, static_cast<Index>(j));
@@ -283,15 +275,15 @@ void check_units(const Robot& robot, const Rows& rows, const Rows::Fit& fit, std
       if (e.value > mass) mass = e.value, mass_std = e.std;
     }
   }
-  const double volume = std::pow(std::max(reach, shortest), 3);
-  if (reach > 0 && mass - sure * mass_std > heaviest * volume) {
+  const double volume = std::pow(std::max(reach, options.shortest), 3);
+  if (reach > 0 && mass - options.sure * mass_std > options.heaviest * volume) {
     out.push_back(
         {Severity::error,
          {},
          fmt::format("torques ask for a robot of at least {:.3g} kg that reaches {:.2g} m: are they in mN*m or "
                      "motor current? Set torque_gain so that they are in N*m at the joint",
                      mass, reach)});
-  } else if (reach > 0 && mass > 0 && mass + sure * mass_std < lightest * volume) {
+  } else if (reach > 0 && mass > 0 && mass + options.sure * mass_std < options.lightest * volume) {
     out.push_back(
         {Severity::error,
          {},
@@ -304,15 +296,14 @@ void check_units(const Robot& robot, const Rows& rows, const Rows::Fit& fit, std
 
 /// One joint's torque in other units than the others': with it scaled, all fit together.
 void check_one_unit(const Robot& robot, const Rows& rows, const Rows::Fit& fit, std::vector<Suspicion>& out) {
-  constexpr double worth_a_unit = 2;  // of the score, as worth_a_flip
-  constexpr double as_good = 1;
+  const double needed = fit.score - rows.options().unit;
   struct Scaled {
     std::size_t joint;
     double times;
     Rows::Fit fit;
   };
   std::vector<Scaled> all;
-  double best = fit.score - worth_a_unit;
+  double best = needed;
   for (std::size_t j = 0; j < robot.size(); ++j) {
     if (rows.is_left_out(static_cast<Index>(j))) continue;
     for (const double times : {1e-3, 1e-2, 0.1, 10.0, 100.0, 1e3}) {
@@ -322,9 +313,8 @@ void check_one_unit(const Robot& robot, const Rows& rows, const Rows::Fit& fit, 
       best = std::min(best, all.back().fit.score);
     }
   }
-  std::erase_if(all, [&](const Scaled& one) {
-    return one.fit.score > best + as_good || one.fit.score >= fit.score - worth_a_unit;
-  });
+  std::erase_if(
+      all, [&](const Scaled& one) { return one.fit.score > best + rows.options().as_good || one.fit.score >= needed; });
   if (all.empty()) return;
   // Of two joints either may be the one: rather that with which the robot weighs what it may.
   const auto possible = [&](const Scaled& one) {
@@ -342,6 +332,7 @@ void check_one_unit(const Robot& robot, const Rows& rows, const Rows::Fit& fit, 
 }
 
 void check_against_urdf(const Robot& robot, const Rows& rows, const Rows::Fit& fit, std::vector<Suspicion>& out) {
+  const PlausibleOptions& options = rows.options();
   const DhChain chain = to_dh(robot);
   const auto n = static_cast<Index>(robot.size());
   VectorXd pi(n * static_cast<Index>(parameters_per_link));
@@ -354,10 +345,10 @@ void check_against_urdf(const Robot& robot, const Rows& rows, const Rows::Fit& f
   VectorXd given(n);
   for (Index j = 0; j < n; ++j) given[j] = rows.gravity_of(pi, j);
   for (Index j = 0; j < n; ++j) {
-    if (!(given[j] > 0.1 * given.maxCoeff()) || robot.gravity.norm() == 0) continue;
+    if (!(given[j] > options.least_gravity * given.maxCoeff()) || robot.gravity.norm() == 0) continue;
     const Estimate found = rows.gravity(fit, j);
-    const double ratio = found.value / given[j], spread = sure * found.std / given[j];
-    if (ratio - spread < 10 && ratio + spread > 0.1) continue;
+    const double ratio = found.value / given[j], spread = options.sure * found.std / given[j];
+    if (ratio - spread < options.other_gravity && ratio + spread > 1 / options.other_gravity) continue;
     out.push_back(
         {Severity::warning, static_cast<std::size_t>(j),
          fmt::format("gravity on {} is {:.2g} times that of the URDF's masses: check torque_gain, or the URDF",
@@ -368,12 +359,12 @@ void check_against_urdf(const Robot& robot, const Rows& rows, const Rows::Fit& f
 }  // namespace
 
 std::vector<Suspicion> check_plausible(const Robot& robot, const std::vector<ProcessedLog>& logs,
-                                       const std::vector<JointFit>& joints) {
+                                       const std::vector<JointFit>& joints, const PlausibleOptions& options) {
   const auto n = static_cast<Index>(robot.size());
-  const Rows rows(robot, logs, joints);
+  const Rows rows(robot, logs, joints, options);
   if (!rows.enough()) return {};
   Rows::Fit fit = best_signs(rows, 1, n);
-  if (Rows::Fit other = best_signs(rows, -1, n); other.score < fit.score - worth_a_flip) fit = std::move(other);
+  if (Rows::Fit other = best_signs(rows, -1, n); other.score < fit.score - options.flip) fit = std::move(other);
 
   // The other joints can't tell which of two opposite signs all have: inertia and friction can.
   VectorXd signs = fit.signs;
@@ -386,14 +377,15 @@ std::vector<Suspicion> check_plausible(const Robot& robot, const std::vector<Pro
     const Estimate friction = rows.friction(fit, j);
     const auto at = static_cast<std::size_t>(j);
     const bool revolute = robot.joints[at].type == JointType::revolute;
-    const bool heavy = std::fabs(inertia.value) > sure * inertia.std;
-    const bool rubs = std::fabs(friction.value) > sure * friction.std &&
-                      std::fabs(friction.value) > material_friction * rows.torque_rms(j);
+    const bool heavy = std::fabs(inertia.value) > options.sure * inertia.std;
+    const bool rubs = std::fabs(friction.value) > options.sure * friction.std &&
+                      std::fabs(friction.value) > options.material_friction * rows.torque_rms(j);
     const std::string of_inertia = fmt::format("its own inertia comes out as {:.3g} +- {:.2g} {}", inertia.value,
                                                inertia.std, revolute ? "kg m^2" : "kg");
     const std::string of_friction = fmt::format("its friction comes out as {:.3g} +- {:.2g} {}", friction.value,
                                                 friction.std, robot.joints[at].torque_unit());
-    const bool light = heavy && inertia.value < 0 && share > 0.9, drives = rubs && friction.value < 0;
+    const bool light = heavy && inertia.value < 0 && share > options.negative_poses,
+               drives = rubs && friction.value < 0;
     // A turned sign turns both: where one is negative and the other is surely not, the model is what is wrong.
     if (light && !(rubs && !drives)) {
       signs[j] = -signs[j];
@@ -401,7 +393,7 @@ std::vector<Suspicion> check_plausible(const Robot& robot, const std::vector<Pro
     } else if (drives && !(heavy && !light)) {
       signs[j] = -signs[j];
       why[at] = of_friction;
-    } else if (light && -inertia.value * rows.acceleration_rms(j) > material_inertia * rows.torque_rms(j)) {
+    } else if (light && -inertia.value * rows.acceleration_rms(j) > options.material_inertia * rows.torque_rms(j)) {
       out.push_back({Severity::warning, at,
                      fmt::format("{}: {}, though its friction has the right sign: is the kinematics that of the robot, "
                                  "or an effect missing?",

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "host_tools/effects/forward.hpp"
+#include "host_tools/identify/options.hpp"
 #include "host_tools/regression/dataset.hpp"
 #include "host_tools/robot/robot.hpp"
 
@@ -26,6 +27,6 @@ struct Suspicion {
 /// - does the mass that gravity and inertia ask for at least go with the size of the robot, and with its URDF?
 /// `joints` gives the widths of the Coulomb sign. Empty where nothing is suspicious.
 std::vector<Suspicion> check_plausible(const Robot& robot, const std::vector<ProcessedLog>& logs,
-                                       const std::vector<JointFit>& joints);
+                                       const std::vector<JointFit>& joints, const PlausibleOptions& options = {});
 
 }  // namespace fxdyn

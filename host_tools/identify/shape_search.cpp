@@ -61,7 +61,8 @@ std::vector<std::vector<double>> further_shapes(const EffectInfo& info, double s
 }
 
 /// The joint's design with the motor that it shares with a neighbour, at the best of neighbours, directions and widths.
-Candidate search_coupling(const Fitter& fitter, std::size_t joint, std::string_view effect, const Scales& scales) {
+Candidate search_coupling(const Fitter& fitter, std::size_t joint, std::string_view effect, const Scales& scales,
+                          const StructureOptions& options) {
   if (fitter.joints() < 2) throw InputError(fmt::format("effect '{}' needs a second joint", effect));
   const EffectInfo& info = *find_effect(effect);
   const int refined = info.refined_shape();
@@ -82,7 +83,7 @@ Candidate search_coupling(const Fitter& fitter, std::size_t joint, std::string_v
   }
   if (refined < 0 || best.design.effects.empty() || best.design.effects.back().effect != effect) return best;
   // only what comes near being kept is worth a search
-  if (best.judgement.rmse > (1 - 0.5 * worth_keeping) * now) return best;
+  if (best.judgement.rmse > (1 - options.worth_a_search * options.worth_keeping) * now) return best;
   const auto index = static_cast<std::size_t>(refined);
   const ShapeRange range = info.shape[index].values.fitted(motion_scales(scales));
   Candidate better = search(fitter, joint, best.design, range.from, range.to,
@@ -146,10 +147,11 @@ Candidate search_width(const Fitter& fitter, std::size_t joint, const Scales& sc
                 [](JointFit& design, double value) { design.sign_width = value; });
 }
 
-Candidate search_effect(const Fitter& fitter, std::size_t joint, std::string_view effect, const Scales& scales) {
+Candidate search_effect(const Fitter& fitter, std::size_t joint, std::string_view effect, const Scales& scales,
+                        const StructureOptions& options) {
   JointFit design = fitter.design(joint);
   const EffectInfo& info = *find_effect(effect);
-  if (info.needs_peers) return search_coupling(fitter, joint, effect, scales);
+  if (info.needs_peers) return search_coupling(fitter, joint, effect, scales, options);
   std::erase_if(design.effects, [&](const EffectFit& one) {
     return std::find(info.unites.begin(), info.unites.end(), one.effect) != info.unites.end();
   });

@@ -2,12 +2,10 @@
 
 #include <string_view>
 
+#include "host_tools/identify/options.hpp"
 #include "host_tools/regression/fitter.hpp"
 
 namespace fxdyn {
-
-/// An effect must lower the joint's held-out error by this share to be kept.
-inline constexpr double worth_keeping = 0.02;
 
 /// A joint's design and how it did on the rows that judge.
 struct Candidate {
@@ -26,6 +24,7 @@ Candidate search_width(const Fitter& fitter, std::size_t joint, const Scales& sc
 /// The joint's design with the effect added, at its best shape; in place of those that it unites
 /// (EffectTraits::unites), at whose shapes the search begins.
 /// @throws InputError: the effect needs a second joint
-Candidate search_effect(const Fitter& fitter, std::size_t joint, std::string_view effect, const Scales& scales);
+Candidate search_effect(const Fitter& fitter, std::size_t joint, std::string_view effect, const Scales& scales,
+                        const StructureOptions& options);
 
 }  // namespace fxdyn

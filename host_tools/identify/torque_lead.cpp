@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host_tools/identify/shape_search.hpp"
-
 namespace fxdyn {
 namespace {
 
@@ -18,7 +16,7 @@ Eigen::VectorXd logarithms(const std::vector<Judgement>& judgements) {
 
 }  // namespace
 
-void find_torque_lead(Fitter& fitter, double cutoff_hz) {
+void find_torque_lead(Fitter& fitter, double cutoff_hz, const StructureOptions& options) {
   constexpr int half = 6;
   const std::vector<Eigen::MatrixXd> torque = fitter.filtered_torque();
   const auto judge = [&](double lead) {
@@ -52,11 +50,13 @@ void find_torque_lead(Fitter& fitter, double cutoff_hz) {
     const double below = attempt(centre - step), above = attempt(centre + step), bend = below - 2 * middle + above;
     if (bend > 0) attempt(centre + std::clamp(0.5 * (below - above) / bend, -1.0, 1.0) * step);
   }
-  const double worth = -std::log(1 - worth_keeping);
-  Eigen::Index agree = 0;
+  const double worth = -std::log(1 - options.worth_keeping);
+  double agree = 0;
   for (Eigen::Index j = 0; j < none.size(); ++j)
-    agree += none[j] - best[j] > worth && std::fabs(own_lead[j] - best_lead) < 0.2 * std::fabs(best_lead) + 0.1 * grid;
-  const bool keep = !at_end && (none - best).mean() > worth && 5 * agree >= 4 * none.size();
+    agree += none[j] - best[j] > worth &&
+             std::fabs(own_lead[j] - best_lead) < options.same_lead * std::fabs(best_lead) + 0.1 * grid;
+  const bool keep =
+      !at_end && (none - best).mean() > worth && agree >= options.agreeing * static_cast<double>(none.size());
   fitter.set_torque_lead(keep ? best_lead : 0, torque);
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "host_tools/identify/options.hpp"
 #include "host_tools/regression/fitter.hpp"
 
 namespace fxdyn {
@@ -10,6 +11,6 @@ namespace fxdyn {
 /// so a lead is kept only where, against none, the mean falls by the share that an effect has to bring, the best point
 /// is not at the end of the grid, and at least four joints in five gain that much and would choose nearly the same lead
 /// (within a fifth) for themselves. One number for all joints does not overfit, so blocks of one log ask for no more.
-void find_torque_lead(Fitter& fitter, double cutoff_hz);
+void find_torque_lead(Fitter& fitter, double cutoff_hz, const StructureOptions& options);
 
 }  // namespace fxdyn

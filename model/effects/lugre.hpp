@@ -16,7 +16,7 @@ namespace fxdyn {
 ///   y <- y e + n s (1 - e),   e = exp(-|mean| tick / (distance n)).
 /// It is stable for every tick, since y stays between its last value and n s. The mean makes the path of a tick right
 /// to second order; with the velocity at its end alone the error is 20 to 80 times as large.
-struct LuGre {
+struct Lugre {
   static constexpr std::string_view name = "lugre";
   static constexpr std::string_view equation =
       "static (y - share s) + damping (dq - |dq| y / n), dy/dt = (dq - |dq| y / n) / distance, "

@@ -16,8 +16,9 @@ struct TestRobot {
   std::string name, urdf;  ///< urdf: path within the sources
   std::vector<double> rated_torque, acceleration, viscous, coulomb, width, offset, rotor_inertia;
 };
-/// Two arms with turning joints, one with a lift.
+/// Two arms with turning joints, one with a lift: the campaign's. Then a small arm of two joints.
 const std::vector<TestRobot>& test_robots();
+inline constexpr std::size_t campaign_robots = 3, small_arm = 3;
 
 /// An effect that a case asks for. What is not given is drawn from the case's seed.
 struct Wanted {
@@ -43,6 +44,13 @@ enum class Group {
 };
 std::string to_string(Group group);
 
+/// How each role is recorded: four logs, each another kind of motion.
+struct Recording {
+  double log_s = 10;  ///< length of a log
+  double sample_s = 0.002;
+  int encoder_bits = 17;
+};
+
 struct Case {
   std::string name;  ///< its folder
   Group group = Group::single;
@@ -53,6 +61,7 @@ struct Case {
   bool mujoco = false, closed_loop = false;
   bool baseline = true;
   bool link_encoders = false;
+  Recording recording;
   double friction_change = 0;  ///< every friction coefficient by up to this share, between baseline and the rest
   double clock_s = 0;          ///< time of the session's first sample
 };

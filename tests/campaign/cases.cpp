@@ -49,7 +49,7 @@ class List {
     cases_.push_back(one);
     return cases_.back();
   }
-  std::size_t next_robot() { return robot_++ % test_robots().size(); }
+  std::size_t next_robot() { return robot_++ % campaign_robots; }
   std::vector<Case> take() { return std::move(cases_); }
 
  private:
@@ -72,7 +72,7 @@ void add_singles(List& list) {
 
 void add_mujoco(List& list) {
   for (std::size_t e = 0; e < effects.size(); ++e) {
-    for (std::size_t robot = 0; robot < test_robots().size(); ++robot) {
+    for (std::size_t robot = 0; robot < campaign_robots; ++robot) {
       const double share = (e + robot) % 3 == 2 ? 0.02 : 0.006;
       Case& one = list.add(Group::mujoco, robot, {{effects[e], share}}, label(effects[e], share));
       one.mujoco = true;
@@ -124,7 +124,7 @@ void add_others(List& list) {
     const std::string& effect = changes[i % changes.size()];
     const std::vector<Wanted> wanted = quiet ? std::vector<Wanted>{} : std::vector<Wanted>{{effect, 0.006}};
     Case& one =
-        list.add(Group::background, (i + i / 3) % test_robots().size(), wanted, quiet ? "quiet" : label(effect, 0.006));
+        list.add(Group::background, (i + i / 3) % campaign_robots, wanted, quiet ? "quiet" : label(effect, 0.006));
     one.background = {{"ripple", 0.006}, {"stribeck", 0.01}};
   }
 
@@ -132,7 +132,7 @@ void add_others(List& list) {
     const std::string effect = i % 3 == 0 ? "elasticity" : (i % 3 == 1 ? "eccentricity" : "backlash");
     Wanted wanted{effect};
     wanted.deflection = std::vector{1e-4, 2e-4, 5e-4, 1e-4, 2e-4}[i / 3];
-    list.add(Group::dual_encoder, (i + i / 3) % test_robots().size(), {wanted},
+    list.add(Group::dual_encoder, (i + i / 3) % campaign_robots, {wanted},
              fmt::format("{}_{:g}mrad", effect, 1e3 * wanted.deflection))
         .link_encoders = true;
   }
@@ -141,7 +141,7 @@ void add_others(List& list) {
 /// What the healthy robot has already, at least twice as large today: wear.
 void add_grown(List& list) {
   for (const char* effect : {"ripple", "spring", "joint_coupling"}) {
-    for (std::size_t robot = 0; robot < test_robots().size(); ++robot) {
+    for (std::size_t robot = 0; robot < campaign_robots; ++robot) {
       Wanted more{effect, 0.006};
       more.grows = true;
       list.add(Group::background, robot, {more}, label(std::string("grown_") + effect, 0.006)).background = {

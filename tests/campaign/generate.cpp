@@ -20,7 +20,7 @@ using Eigen::Index;
 using nlohmann::json;
 
 const fs::path source_dir = FXDYN_SOURCE_DIR;
-constexpr double role_duration_s = 4 * log_duration_s;
+double role_duration_s(const Case& wanted) { return 4 * wanted.recording.log_s; }
 
 /// Seeds of the trajectories: no two roles and no two cases share one.
 std::uint64_t motion_seed(const Case& wanted, std::uint64_t role) { return (wanted.seed * 10 + role) * 10; }
@@ -31,8 +31,9 @@ std::vector<SessionLog> measured_logs(const Case& wanted) {
   double start = 0;
   std::uint64_t role = 1;
   for (const char* name : {"train", "validate", "test"}) {
-    for (const SessionLog& log : recording(name, motion_seed(wanted, role), start)) logs.push_back(log);
-    start += role_duration_s;
+    for (const SessionLog& log : recording(name, motion_seed(wanted, role), start, wanted.recording.log_s))
+      logs.push_back(log);
+    start += role_duration_s(wanted);
     ++role;
   }
   return logs;
@@ -213,7 +214,7 @@ json truth_json(const Case& wanted, const Ground& ground) {
            {"background", json::array()},
            {"rated_torque", robot.rated_torque}};
   for (const auto& [joint, fit] : ground.background) out["background"].push_back(effect_json(joint, fit));
-  const NoiseLevel noise{.pole = healthy_session(wanted).ar_pole};
+  const NoiseLevel noise{.pole = healthy_session(wanted).ar_pole, .step_s = wanted.recording.sample_s};
   const auto add = [&](json entry, const std::vector<Eigen::MatrixXd>& change, std::optional<std::size_t> joint,
                        const std::string& name, const Wanted& asked) {
     Index feels = 0;
@@ -264,7 +265,7 @@ Ground plan_case(const Case& wanted, const fs::path& folder) {
     bends |= info != nullptr && info->acts_on == ActsOn::position;
   }
   session.sample_s = bends ? 0.002 : 0.005;
-  session.logs = recording("train", motion_seed(wanted, 1), 0);
+  session.logs = recording("train", motion_seed(wanted, 1), 0, wanted.recording.log_s);
   const auto files = play(session, folder / "plan.toml", folder / "plan");
   const IdentifiedModel healthy = read_model(folder / "plan" / "truth.json");
 
@@ -310,7 +311,7 @@ void generate(const Case& wanted, const fs::path& data, const fs::path& truth) {
     Session session = healthy_session(wanted);
     session.effects = ground.background;
     session.seed = wanted.seed * 2;
-    session.logs = recording("baseline", motion_seed(wanted, 0), 0);
+    session.logs = recording("baseline", motion_seed(wanted, 0), 0, wanted.recording.log_s);
     for (const fs::path& file : play(session, truth / "baseline.toml", made))
       logs.emplace_back(file.filename().string(), "baseline");
     part("baseline", made, data, truth);
@@ -328,7 +329,7 @@ void generate(const Case& wanted, const fs::path& data, const fs::path& truth) {
     session.noise = false;
     session.exact_motion = true;
     session.link_encoders = false;
-    session.logs = recording("test", motion_seed(wanted, 3), 2 * role_duration_s);
+    session.logs = recording("test", motion_seed(wanted, 3), 2 * role_duration_s(wanted), wanted.recording.log_s);
     play(session, truth / "exact.toml", truth / "exact");
   }
   fs::copy_file(truth / "robot.urdf", data / "robot.urdf");

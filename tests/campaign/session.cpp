@@ -34,15 +34,19 @@ std::string effect_toml(std::optional<std::size_t> joint, const EffectFit& fit) 
 
 }  // namespace
 
-std::vector<SessionLog> recording(const std::string& role, std::uint64_t seed, double start_s) {
+std::vector<SessionLog> recording(const std::string& role, std::uint64_t seed, double start_s, double log_s) {
   // Fourier series: order / period is the highest frequency. The scale is set by the tightest limit, so a high order is
   // bound by acceleration and a low one by velocity or range.
   std::vector<SessionLog> logs{{role + "_fast", 10, 1, 0, 5, 0},
                                {role + "_mid", 5, 0.9, 0, 17, 0},
                                {role + "_slow", 10, 0.12, 0, 5, 0},
                                {role + "_reversals", 5, 0.03, 0, 8, 0}};
+  // The same frequencies in shorter logs: as much shorter periods of as much lower orders.
+  const double shorter = log_s / 10;
   for (std::size_t i = 0; i < logs.size(); ++i) {
-    logs[i].start_s = start_s + static_cast<double>(i) * log_duration_s;
+    logs[i].period_s *= shorter;
+    logs[i].order = static_cast<int>(std::lround(shorter * logs[i].order));
+    logs[i].start_s = start_s + static_cast<double>(i) * log_s;
     logs[i].seed = seed * 100 + i;
   }
   return logs;
@@ -58,6 +62,9 @@ Session healthy_session(const Case& wanted) {
   session.mujoco = wanted.mujoco;
   session.closed_loop = wanted.closed_loop;
   session.link_encoders = wanted.link_encoders;
+  session.log_s = wanted.recording.log_s;
+  session.sample_s = wanted.recording.sample_s;
+  session.encoder_bits = wanted.recording.encoder_bits;
   Random random(wanted.seed * 31 + wanted.robot);
   const auto moved = [&](std::vector<double> values, double by) {
     for (double& value : values) value *= random.uniform(1 - by, 1 + by);
@@ -82,7 +89,7 @@ std::string to_toml(const Session& s) {
   text += fmt::format("start_s = {:.6f}\n", s.clock_s);
   if (s.exact_motion) text += "exact_motion = true\n";
   if (s.noise) {
-    text += "encoder_bits = 17\ntorque_noise = 0.01\n";
+    text += fmt::format("encoder_bits = {}\ntorque_noise = 0.01\n", s.encoder_bits);
     text += fmt::format("ar_noise = 0.003\nar_pole = {:.6f}\n", s.ar_pole);
     if (s.link_encoders) text += "link_encoders = \"all\"\nlink_encoder_bits = 19\n";
   }
@@ -96,7 +103,7 @@ std::string to_toml(const Session& s) {
   for (const SessionLog& log : s.logs) {
     text += fmt::format(
         "\n[[log]]\nname = \"{}\"\nduration_s = {:.6f}\nperiod_s = {:.6f}\nspeed = {:.6f}\norder = {}\nseed = {}\n",
-        log.name, log_duration_s, log.period_s, log.speed, log.order, log.seed);
+        log.name, s.log_s, log.period_s, log.speed, log.order, log.seed);
     text += fmt::format("start_s = {:.6f}\n", log.start_s);
   }
   return text;

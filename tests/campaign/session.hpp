@@ -8,17 +8,16 @@
 
 namespace fxdyn::campaign {
 
-inline constexpr double log_duration_s = 10;
-
-/// One recording of one role: four logs of ten seconds, each another kind of motion.
+/// One log of a role.
 struct SessionLog {
   std::string name;
   double period_s = 10, speed = 1, start_s = 0;
   int order = 5;
   std::uint64_t seed = 0;
 };
-/// fast, mid (up to 3.5 Hz), slow, and reversals (creeping to and fro). Every role has trajectories of its own.
-std::vector<SessionLog> recording(const std::string& role, std::uint64_t seed, double start_s);
+/// fast, mid (up to 3.5 Hz), slow, and reversals (creeping to and fro), each log_s long. Every role has trajectories of
+/// its own.
+std::vector<SessionLog> recording(const std::string& role, std::uint64_t seed, double start_s, double log_s);
 
 /// What a scenario file is made of.
 struct Session {
@@ -29,6 +28,8 @@ struct Session {
   std::vector<SessionLog> logs;
   std::uint64_t seed = 1;
   double clock_s = 0, sample_s = 0.002, ar_pole = 0.95;
+  double log_s = 10;
+  int encoder_bits = 17;
   bool mujoco = false, closed_loop = false, link_encoders = false;
   bool noise = true;          ///< and encoders; else signals are exact
   bool exact_motion = false;  ///< dq and ddq in the logs

@@ -16,6 +16,7 @@ using Eigen::VectorXd;
 class EliminatedBackground : public testing::Test {
  protected:
   static constexpr Index rows = 60;
+  static constexpr double prior = 3;
 
   EliminatedBackground() {
     Random random(7);
@@ -35,14 +36,14 @@ class EliminatedBackground : public testing::Test {
 };
 
 TEST_F(EliminatedBackground, LeavesTheCoefficientsOfTheWholeProblem) {
-  const Background background(5 * b_, blocks_);  // scaled to RMS 1 again
+  const Background background(5 * b_, blocks_, prior);  // scaled to RMS 1 again
   const MatrixXd x = background.eliminate(x_), y = background.eliminate(y_);
   ASSERT_EQ(x.rows(), rows + 3);
   const VectorXd reduced = (x.transpose() * x).ldlt().solve(x.transpose() * y);
   MatrixXd all(rows, 5);
   all << x_, b_;
   MatrixXd gram = all.transpose() * all;
-  gram.diagonal().tail(3).array() += Background::prior;
+  gram.diagonal().tail(3).array() += prior;
   const VectorXd whole = gram.ldlt().solve(all.transpose() * y_);
   EXPECT_LT((reduced - whole.head(2)).norm(), 1e-9);
   // .. and what remains, less the background's part, is the residual of the whole problem.
@@ -54,9 +55,9 @@ TEST_F(EliminatedBackground, LeavesTheCoefficientsOfTheWholeProblem) {
 
 TEST_F(EliminatedBackground, KnowsOnlyTheRowsThatFit) {
   blocks_.all = {{0, 0, 30, false, true}, {0, 30, 30, false, false}};
-  const Background background(b_, blocks_);
+  const Background background(b_, blocks_, prior);
   const MatrixXd mine = b_.topRows(30);
-  const MatrixXd gram = mine.transpose() * mine + Background::prior * MatrixXd::Identity(3, 3);
+  const MatrixXd gram = mine.transpose() * mine + prior * MatrixXd::Identity(3, 3);
   EXPECT_LT((background.inverse() - gram.inverse()).norm(), 1e-9);
 }
 

@@ -35,7 +35,7 @@ class DeflectionOfAGear : public testing::Test {
   }
   /// The load as the model has it.
   Deflections find(const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before = {}) {
-    return find_deflections(model_, MatrixXd(), now, before, background_);
+    return find_deflections(model_, MatrixXd(), now, before, background_, {});
   }
 
   IdentifiedModel model_;

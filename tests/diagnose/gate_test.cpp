@@ -70,6 +70,18 @@ TEST_F(NamesAtTheGate, OnlyWhatBringsSomethingStays) {
   EXPECT_EQ(report.at("joints").at(2).at("verdict"), "nothing_missing");
 }
 
+TEST_F(NamesAtTheGate, NothingStaysBelowItsThresholds) {
+  outcome_.models.options.gate.least_gain = 1e6;
+  EXPECT_TRUE(pass(outcome_, nominal_, logs_, still_).groups.empty());
+}
+
+TEST_F(NamesAtTheGate, NothingIsBelievedThatClosesTooLittle) {
+  outcome_.models.options.gate.least_closure = outcome_.models.options.gate.sure_closure = 1.1;
+  const Gate gate = pass(outcome_, nominal_, logs_, still_);
+  ASSERT_EQ(gate.groups.size(), 1U);
+  EXPECT_FALSE(gate.accepted[1]);
+}
+
 TEST(WhatJudges, IsNamed) {
   ProcessedLog train, validate;
   validate.role = Role::validate;

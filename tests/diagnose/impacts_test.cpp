@@ -17,6 +17,7 @@ constexpr Index joint = 2;
 class ImpactsTest : public testing::Test {
  protected:
   IdentifiedModel model_ = test::plant_of(read_urdf(test::puma560));
+  ImpactOptions options_;
 
   /// A log with an impact of `size` N*m, one sample long, on one joint every half second.
   ProcessedLog log(Role role, std::uint64_t seed, double size = 0) const {
@@ -25,7 +26,7 @@ class ImpactsTest : public testing::Test {
     return out;
   }
   auto find(const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before) const {
-    return find_impacts(model_, now, model_, before);
+    return find_impacts(model_, now, model_, before, options_);
   }
 };
 
@@ -41,6 +42,11 @@ TEST_F(ImpactsTest, AreFoundOnTheirJoint) {
 TEST_F(ImpactsTest, AreNoneInNoise) {
   for (const auto& found : find({log(Role::train, 1), log(Role::validate, 2)}, {log(Role::baseline, 3)}))
     EXPECT_FALSE(found.has_value());
+}
+
+TEST_F(ImpactsTest, AreBeyondTheirThreshold) {
+  options_.beyond = 100;
+  EXPECT_FALSE(find({log(Role::train, 1, 2), log(Role::validate, 2, 2)}, {log(Role::baseline, 3)})[joint]);
 }
 
 TEST_F(ImpactsTest, AreNoFindingWhereTheHealthySessionHasThem) {

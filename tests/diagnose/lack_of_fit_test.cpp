@@ -41,15 +41,15 @@ class StructureInAResidual : public testing::Test {
 
 TEST_F(StructureInAResidual, IsNoneInNoise) {
   look([](double, double) { return 0.0; });
-  EXPECT_FALSE(here_.structured()) << here_.state_p << " " << here_.time_p;
-  EXPECT_FALSE(elsewhere_.structured());
+  EXPECT_FALSE(here_.structured({})) << here_.state_p << " " << here_.time_p;
+  EXPECT_FALSE(elsewhere_.structured({}));
   EXPECT_LT(share_, 0.3);
 }
 
 TEST_F(StructureInAResidual, AFunctionOfThePositionIsFoundAtItsJoint) {
   look([](double q, double) { return 0.5 * std::cos(12 * q); });
   EXPECT_LT(here_.state_p, 1e-8);
-  EXPECT_FALSE(elsewhere_.structured());
+  EXPECT_FALSE(elsewhere_.structured({}));
   EXPECT_GT(share_, 0.7);
   EXPECT_LT(share_elsewhere_, 0.3);
 }
@@ -58,7 +58,7 @@ TEST_F(StructureInAResidual, AHumIsAMatterOfTime) {
   look([](double, double t) { return 0.2 * std::sin(2 * std::numbers::pi * 6.3 * t); });
   EXPECT_LT(here_.time_p, 1e-6);
   EXPECT_GT(here_.state_p, 1e-8);
-  EXPECT_FALSE(elsewhere_.structured());
+  EXPECT_FALSE(elsewhere_.structured({}));
 }
 
 TEST(FamiliesOfFeatures, FollowOneAnother) {
@@ -71,6 +71,14 @@ TEST(FamiliesOfFeatures, FollowOneAnother) {
   EXPECT_EQ(all.size(), 5U + 5);  // other positions; velocities, own position, own motion, friction, time
   EXPECT_EQ(all.back().count, time_features);
   EXPECT_EQ(families(1).size(), 4U);  // a joint alone has no others
+}
+
+TEST(Structure, IsWhatNoiseHardlyResembles) {
+  const LackOfFit of_state{1e-9, 1}, of_time{1, 1e-7};
+  EXPECT_TRUE(of_state.structured({}));
+  EXPECT_TRUE(of_time.structured({}));
+  EXPECT_FALSE(of_state.structured({.state = 1e-10}));
+  EXPECT_FALSE(of_time.structured({.time = 1e-8}));
 }
 
 }  // namespace

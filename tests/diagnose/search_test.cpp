@@ -23,7 +23,9 @@ class SearchOfEffects : public testing::Test {
     IdentifiedModel robot = model_;
     for (const EffectFit& fit : more) robot.joints[joint].effects.push_back(fit);
     logs_ = {test::small_session_log(robot, Role::train, 1), test::small_session_log(robot, Role::train, 2)};
-    problem_ = std::make_unique<Linearised>(test::around(model_), logs_, test::no_whitening());
+    Models models = test::around(model_);
+    models.options = options_;
+    problem_ = std::make_unique<Linearised>(models, logs_, test::no_whitening());
     std::vector<Group> groups;
     for (const EffectCandidate& candidate : candidates) {
       Group group;
@@ -34,7 +36,7 @@ class SearchOfEffects : public testing::Test {
     }
     problem_->add_all(groups);
     Search search(*problem_, {});
-    Choice choice = search.run({}, progress_);
+    Choice choice = search.unite(search.run({}, progress_));
     if (!choice.groups.empty()) found_ = search.explain(choice);
     return choice;
   }
@@ -53,6 +55,7 @@ class SearchOfEffects : public testing::Test {
   }
 
   IdentifiedModel model_;
+  Options options_;
   std::vector<SessionLog> logs_;
   std::unique_ptr<Linearised> problem_;
   std::vector<Found> found_;
@@ -66,6 +69,11 @@ const std::vector<EffectCandidate> stribeck_grid{{"stribeck", 1, {0.05}},
                                                  {"viscous_cubic", 1, {}}};
 
 TEST_F(SearchOfEffects, FindsNothingInNoise) { EXPECT_EQ(names(run(0, {}, stribeck_grid)), ""); }
+
+TEST_F(SearchOfEffects, FindsNothingBelowItsThresholds) {
+  options_.search.least_score = options_.search.most_score = 1e6;
+  EXPECT_EQ(names(run(1, {test::effect("ripple", {14}, {0.3, 0.2})}, stribeck_grid)), "");
+}
 
 TEST_F(SearchOfEffects, FindsARippleWithItsWavenumber) {
   const Choice choice = run(1, {test::effect("ripple", {14}, {0.3, 0.2})}, stribeck_grid);
@@ -94,6 +102,23 @@ TEST_F(SearchOfEffects, RefinesAShapeBetweenThoseOfTheGrid) {
   EXPECT_NEAR(candidate(choice, 0).shape[0], 0.2, 0.05);
   ASSERT_EQ(found_.size(), 1U);
   EXPECT_GT(found_[0].score, 25);
+}
+
+TEST_F(SearchOfEffects, OneLawTakesThePlaceOfThoseThatItUnites) {
+  const std::vector<EffectCandidate> parts{
+      {"presliding", 1, {0.005}}, {"presliding", 1, {0.015}}, {"stribeck", 1, {0.1}}, {"stribeck", 1, {0.3}}};
+  const Choice choice = run(1, {test::effect("lugre", {0.014, 0.2, 0.7}, {6, 30})}, parts);
+  ASSERT_EQ(names(choice).substr(0, 6), "lugre ") << names(choice);
+  EXPECT_EQ(choice.groups.size(), 1U) << names(choice);
+  EXPECT_NEAR(candidate(choice, 0).shape[0], 0.014, 0.004);
+  EXPECT_NEAR(candidate(choice, 0).shape[1], 0.2, 0.06);
+  EXPECT_NEAR(candidate(choice, 0).shape[2], 0.7, 0.1);
+}
+
+TEST_F(SearchOfEffects, OneOfTheUnitedStaysWhereTheOtherDoesNotShow) {
+  const Choice choice = run(1, {test::effect("stribeck", {0.2}, {1.5})}, stribeck_grid);
+  ASSERT_EQ(choice.groups.size(), 1U) << names(choice);
+  EXPECT_EQ(candidate(choice, 0).effect, "stribeck");
 }
 
 TEST_F(SearchOfEffects, NeedsLongerSetsToBringMore) {

@@ -44,20 +44,20 @@ class StructureInTime : public testing::Test {
 };
 
 TEST_F(StructureInTime, IsNoneInNoise) {
-  EXPECT_GT(spectral_lines(logs_, blocks_, noise_, {1}).p, 1e-3);
-  EXPECT_GT(slow_changes(logs_, blocks_, noise_, {1}).p, 1e-3);
+  EXPECT_GT(spectral_lines(logs_, blocks_, noise_, {1}, {}).p, 1e-3);
+  EXPECT_GT(slow_changes(logs_, blocks_, noise_, {1}, {}).p, 1e-3);
 }
 
 TEST_F(StructureInTime, ALineIsFoundWithItsShare) {
   const TimeStructure found =
-      spectral_lines(logs_, blocks_, with([](double t) { return std::sin(2 * std::numbers::pi * 4 * t); }), {1});
+      spectral_lines(logs_, blocks_, with([](double t) { return std::sin(2 * std::numbers::pi * 4 * t); }), {1}, {});
   EXPECT_LT(found.p, 1e-6);
   EXPECT_NEAR(found.share, 0.5 / (0.5 + 16.0 / 25), 0.1);  // of the power below 16 of 25 Hz
 }
 
 TEST_F(StructureInTime, WandersWhereMeansDo) {
   const VectorXd e = with([](double t) { return t < 20 ? 0.5 : -0.5; });
-  const TimeStructure found = slow_changes(logs_, blocks_, e, {1});
+  const TimeStructure found = slow_changes(logs_, blocks_, e, {1}, {});
   EXPECT_LT(found.p, 1e-6);
   EXPECT_NEAR(found.share, 0.25 / 1.25, 0.05);
 }

@@ -61,6 +61,17 @@ TEST_F(UnknownsOfAModel, FrictionMayChangeALittleFromSessionToSession) {
   EXPECT_EQ(change->prior, 0);
 }
 
+TEST_F(UnknownsOfAModel, HowMuchIsAThreshold) {
+  models_.has_baseline = true;
+  models_.healthy = models_.current;
+  models_.options.prior = {.friction_change = 0.5, .smallest_change = 0};
+  const Unknowns unknowns = make_unknowns(models_);
+  const auto change = std::find_if(unknowns.all.begin(), unknowns.all.end(),
+                                   [](const Unknown& u) { return u.change && u.joint == 0 && u.effect == 1; });
+  ASSERT_NE(change, unknowns.all.end());
+  EXPECT_NEAR(change->prior_std, 0.5 * 2, 1e-12);
+}
+
 TEST_F(UnknownsOfAModel, AFitMovesTheModel) {
   const Unknowns unknowns = make_unknowns(models_);
   const std::size_t coulomb = models_.current.base.size() + 2;  // behind width and viscous

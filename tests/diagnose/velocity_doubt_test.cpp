@@ -56,7 +56,7 @@ class Doubt : public testing::Test {
     joint_.effects = {test::effect("coulomb", {}, {2})};
     dq_.tail(samples / 2).setConstant(0.5);
   }
-  VectorXd doubt(double sigma = 0.1) const { return velocity_doubt(log_, 0, joint_, dq_, load_, sigma); }
+  VectorXd doubt(double sigma = 0.1) const { return velocity_doubt(log_, 0, joint_, dq_, load_, sigma, 2); }
 
   ProcessedLog log_;
   JointFit joint_;
@@ -82,10 +82,10 @@ TEST_F(Doubt, IsNoneWithoutFrictionOrNoiseOrWithAMeasuredVelocity) {
   const VectorXd none = VectorXd::Zero(log_.rows());
   ProcessedLog measured = log_;
   measured.measured_dq = dq_;
-  EXPECT_EQ(velocity_doubt(measured, 0, joint_, dq_, load_, 0.1), none);
+  EXPECT_EQ(velocity_doubt(measured, 0, joint_, dq_, load_, 0.1, 2), none);
   ProcessedLog exact = log_;
   exact.filter.position_noise = {0};
-  EXPECT_EQ(velocity_doubt(exact, 0, joint_, dq_, load_, 0.1), none);
+  EXPECT_EQ(velocity_doubt(exact, 0, joint_, dq_, load_, 0.1, 2), none);
   joint_.effects.clear();
   EXPECT_EQ(doubt(), none);
 }

@@ -29,7 +29,7 @@ class Where : public testing::Test {
     const MotionRows motion = log_.joint_motion(static_cast<Index>(joint));
     VectorXd error(log_.samples());
     for (Index k = 0; k < error.size(); ++k) error[k] = inside(motion.q(k, 0), motion.dq(k, 0), log_.t[k]) ? 1 : 0.1;
-    return where(model_, {&log_}, joint, {error}, 0.1);
+    return where(model_, {&log_}, joint, {error}, 0.1, {});
   }
   static const json& region(const json& all, const std::string& signal) {
     const auto found = std::find_if(all.begin(), all.end(), [&](const json& r) { return r.at("signal") == signal; });

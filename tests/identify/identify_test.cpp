@@ -166,6 +166,31 @@ TEST(Identify, FindsPreslidingWhereThereIsNoOtherFriction) {
   EXPECT_GE(found, 5);  // joint 2 reverses too seldom in one short log
 }
 
+TEST(Identify, LugreTakesThePlaceOfPreslidingAndStribeck) {
+  // The plant integrates it as a differential equation.
+  std::string effects = "[sensors]\nencoder_bits = 19\ntorque_noise = 0.002\n";
+  for (int j = 1; j <= 6; ++j) {
+    const std::string head = "joint = " + std::to_string(j) + "\nparameters = ";
+    effects += "[[effect]]\nname = \"coulomb\"\n" + head + "{ amplitude = 4.0 }\n";
+    effects += "[[effect]]\nname = \"lugre\"\n" + head +
+               "{ distance = 0.01, velocity = 0.1, share = 0.666667, static = 6.0, damping = 10.0 }\n";
+  }
+  const fs::path out = test::folder() / "lugre";
+  Pipeline(project("lugre.toml", scenario("lugre_s.toml", effects), ""), out).identify();
+  const IdentifiedModel model = read_model(out / "model.json");
+  int found = 0;
+  for (const JointFit& joint : model.joints) {
+    const EffectFit* fit = joint.find("lugre");
+    if (fit == nullptr) continue;
+    EXPECT_EQ(joint.find("presliding"), nullptr);
+    EXPECT_EQ(joint.find("stribeck"), nullptr);
+    found += std::fabs(fit->shape[0] - 0.01) < 0.002 && std::fabs(fit->shape[1] - 0.1) < 0.02 &&
+             std::fabs(fit->shape[2] - 0.667) < 0.05 && std::fabs(fit->linear[0] - 6) < 0.4 &&
+             std::fabs(fit->linear[1] - 10) < 1.5;
+  }
+  EXPECT_GE(found, 5);  // joint 2 reverses too seldom in one short log
+}
+
 TEST(Export, FixedPredictionRunsAtTheDrivesTicks) {
   // Log at 1 ms, drive at 4 ms: presliding must not run at the log's rate.
   const fs::path s = scenario(

@@ -49,11 +49,11 @@ class Step {
   explicit Step(const Joint& joint) : joint_(joint) {
     const std::array shape{joint.distance, joint.velocity, share};
     for (std::size_t i = 0; i < shape.size(); ++i) {
-      const double stored = LuGre::stored_shape(i, shape[i], tick_s);
+      const double stored = Lugre::stored_shape(i, shape[i], tick_s);
       if constexpr (std::is_same_v<N, Real>)
         words_[i] = stored;
       else
-        words_[i] = to_raw(stored, Fixed32::bits(LuGre::shape[i].quantity));
+        words_[i] = to_raw(stored, Fixed32::bits(Lugre::shape[i].quantity));
     }
   }
   double operator()(double dq) {
@@ -63,7 +63,7 @@ class Step {
     else
       u.dq = {to_raw(dq, TestFormats::velocity)};
     double sum = 0;
-    LuGre::basis<N>(u, Words<N>{words_.data()}, state_, saturations_, [&](auto tag, std::size_t i, auto phi) {
+    Lugre::basis<N>(u, Words<N>{words_.data()}, state_, saturations_, [&](auto tag, std::size_t i, auto phi) {
       const double coefficient = i == 0 ? joint_.static_friction : joint_.damping;
       if constexpr (std::is_same_v<N, Real>)
         sum += coefficient * phi;
@@ -76,7 +76,7 @@ class Step {
  private:
   Joint joint_;
   std::array<typename N::Word, 3> words_{};
-  LuGre::State<N> state_{};
+  Lugre::State<N> state_{};
   Saturations saturations_;
 };
 

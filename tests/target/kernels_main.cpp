@@ -201,7 +201,7 @@ std::uint32_t effect_of() {
   report("ramp_40", ramp_of_nodes<40>());
   report("stribeck", effect_of<Stribeck>());
   report("presliding", effect_of<Presliding>());
-  report("lugre", effect_of<LuGre>());
+  report("lugre", effect_of<Lugre>());
 }
 
 }  // namespace

@@ -1,0 +1,195 @@
+#pragma once
+
+namespace fxdyn::diagnosis {
+
+/// Thresholds of the diagnosis: what decides, and not what makes a computation finer. They are no settings of a
+/// project. A line each: unit; meaning; where the value comes from.
+///   theory          the formula is given
+///   hand            set by hand while the diagnosis was developed on the campaign's cases and the real logs
+///                   (docs/findings/2026-11-21-diagnosis.md); no other reason is recorded
+/// What halving and doubling does to those that decide a verdict: docs/findings/thresholds.md. An entry in
+/// tests/campaign/thresholds.cpp each.
+
+/// Noise of the rows.
+struct NoiseOptions {
+  /// -; velocity error of an encoder over that of white noise; hand: an encoder at standstill repeats its error
+  double velocity_error = 2;
+  /// noise variances; doubt of friction from which a row shows no direction; theory: doubt equals noise
+  double doubtful = 1;
+  /// rows; prior |b|^2 of a background's function of RMS 1, in noise variances; hand
+  double background_prior = 4;
+  /// times the noise; a residual from there on is mostly gap and gives no colour; hand, decision 0005
+  double mostly_gap = 3;
+};
+
+/// What is known of parameters before the logs are looked at. All but `changed` are standard deviations.
+struct PriorOptions {
+  /// share of itself; change of a nominal coefficient between two healthy sessions; hand, decision 0005
+  double friction_change = 0.3;
+  /// share of Coulomb friction; change of the offset, beside that of itself; hand
+  double offset_change = 0.05;
+  /// share of rated torque; change of a coefficient that is zero; hand
+  double smallest_change = 1e-3;
+  /// share of rated torque over largest acceleration; inertia of a rotor that nothing shows; hand
+  double rotor = 0.3;
+  /// share of itself; inertia of a rotor that a link encoder shows; hand
+  double link_rotor = 0.1;
+  /// -; a share that is 1 by definition; theory: any value far below the data's own deviation holds it at 1
+  double share = 1e-3;
+  /// standard deviations; a coefficient that moved further has changed; theory: 2 Phi(-2) = 4.6 % of healthy ones
+  double changed = 2;
+};
+
+/// Logs, before anything is fitted.
+struct SessionOptions {
+  /// rows a period of the torque cut-off; decimation; theory: Nyquist's 2, and room for the filter's slope
+  double rows_per_period = 2.5;
+  /// Hz; torque cut-off at most; hand: faster there is nothing that has a name, and many rows
+  double highest_cutoff_hz = 40;
+  /// s; a robot that rested longer begins a new session; hand: it has cooled
+  double longest_pause_s = 1800;
+  /// times the band of the motion; cut-off of the positions; hand, decision 0005
+  double position_band = 12;
+  /// Hz; cut-off of the positions at least; hand
+  double lowest_position_hz = 2;
+  /// periods of the cut-off; dropped at both ends, where the filter swings; hand
+  double edge_periods = 3;
+  /// s; train logs or baseline at least, after filtering; hand
+  double shortest_s = 2;
+  /// s; a block of a single log at least; hand
+  double shortest_block_s = 1;
+  /// times the encoder's noise in the velocity; a joint whose largest velocity is less stands still; hand
+  double still = 6;
+  /// share of rated torque; white noise on the torque of a joint that stands still; hand: it counts next to nothing
+  double mute_noise = 0.1;
+  /// share of the torque's power; what no fit explains in two sessions of one robot; hand
+  double other_robot = 0.2;
+  /// times the noise's power; .. and at least that, where a joint carries little; hand
+  double other_robot_noise = 4;
+  /// share of the torque's power; what is the model's torque times a factor; hand
+  double other_units = 0.9;
+  /// -; such a factor, or one over it; hand: more than any load or change makes of all joints
+  double other_units_factor = 3;
+};
+
+/// Search for effects. Scores are differences of -BIC, that is 2 ln of the Bayes factor (Schwarz 1978).
+struct SearchOptions {
+  /// score; what an effect must gain; theory: a Bayes factor of exp(4) = 55; the level by hand
+  double least_score = 8;
+  /// score; the most that is asked for; hand: a residual full of structure looks like more than noise at other times
+  double most_score = 25;
+  /// chance; noise passes the threshold of a joint, per level; theory: Gumbel's quantile; the level by hand
+  double false_alarm = 1e-3;
+  /// -; coefficient of an effect that is 1 by definition (delay, saturation); hand
+  double least_share = 0.4, most_share = 2;
+  /// standard deviations; a coefficient further below its bound is another effect; theory: Phi(-3) = 0.13 %
+  double beyond_bound = 3;
+  /// share of the threshold; candidates whose first score is less are not refined; hand: refining rarely doubles it
+  double refine_from = 0.5;
+  /// score; a swap's candidate may begin so far behind; hand
+  double swap_behind = 20;
+  /// score; a swap must gain; hand: so that swaps end
+  double swap_gain = 1;
+  /// share of the wavenumber; ripples that are nearer are the same; hand
+  double same_ripple = 0.1;
+  /// score; an alternative is at most so far behind; theory: a Bayes factor of exp(5) = 150; the level by hand
+  double alternative = 10;
+  /// score, share of the finding's; an alternative's candidate may begin so far behind; hand
+  double alternative_behind = 25, alternative_behind_share = 0.1;
+};
+
+/// Structure in what a fit leaves.
+struct LackOfFitOptions {
+  /// chance; noise resembles a function of the state as much; hand: F's tail is used far beyond where it is exact
+  double state = 1e-8;
+  /// chance; noise resembles something periodic or slow in time as much; hand
+  double time = 1e-6;
+  /// chance; lines that noise makes as seldom count as a share of the residual; hand
+  double line = 0.01;
+  /// chance; slow changes likewise; hand
+  double slow_change = 1e-3;
+  /// s; means over such stretches are compared for slow changes; hand
+  double stretch_s = 2;
+  /// share of the torque cut-off; lines are looked for below; theory: the filter's slope, 1 / (1 + 0.8^8) = 0.86
+  double line_band = 0.8;
+  /// share of the functions' rank; fewer free rows than that say nothing; hand
+  double free_rows = 0.3;
+};
+
+/// What judges names on data that fitted no coefficient.
+struct GateOptions {
+  /// noise variances; what an effect must bring; theory: chi^2 of one coefficient, 4.6 % of noise brings more
+  double least_gain = 4;
+  /// share of the gap at its joint; .. and at least that; hand, decision 0005
+  double least_share = 0.01;
+  /// share of the gap at its joint; .. where the joint has structure left; hand, decision 0005: it is no noise
+  double least_share_in_structure = 0.02;
+  /// times the plain error before; a name may raise it so far; hand
+  double worse = 1.02;
+  /// share of the gap above the noise; what a name closes; hand: more than is left
+  double least_closure = 0.5;
+  /// share of the gap above the noise; .. where structure remains; hand: another effect may only resemble it
+  double sure_closure = 0.8;
+  /// share of the gap with the healthy session's own structure; .. beside a background; hand, decision 0005
+  double beside_background = 0.25;
+  /// noise variances; from there on a joint feels an effect on the robot; hand
+  double least_felt = 6;
+};
+
+/// Impacts that are shorter than the torque's band shows.
+struct ImpactOptions {
+  /// standard deviations; an impact; theory: noise at 500 Hz does so once in 12 days, 2 Phi(-6) = 2e-9
+  double beyond = 6;
+  /// s; samples that are nearer are one impact; hand
+  double together_s = 0.02;
+  /// times the healthy session's rate; structure; hand
+  double times = 3;
+  /// impacts; added to those of the healthy session; theory: with none seen there are below 3 at 95 % (Poisson)
+  double added = 3;
+};
+
+/// What link encoders show.
+struct DeflectionOptions {
+  /// score; what an effect must gain; theory: a Bayes factor of exp(6) = 400; the level by hand
+  double least_score = 12;
+  /// share of the deflection's power on data that did not fit it; what a set of effects closes; hand
+  double least_closure = 0.5;
+  /// share of all parts' power; a smaller part is no finding; hand: errors of the torque show too
+  double least_part = 0.05;
+  /// share of the healthy session's size; a part that differs by less has not changed; hand
+  double same = 0.33;
+  /// times the noise's power; a deflection without a name that gets a note; hand
+  double noted = 2;
+  /// share of the load; uncertainty of the load in a direction that is not followed; hand
+  double load_uncertainty = 1e-3;
+  /// -; closure that the second fit, with what else was missing, may lose; hand
+  double lost_closure = 0.01;
+};
+
+/// What is said beside the verdict: notes and regions.
+struct ReportOptions {
+  /// times the error before; on test logs, for a note; hand
+  double risen = 1.05;
+  /// times the error of the logs that judged; on test logs, for a note; hand
+  double much_larger = 2;
+  /// share of the rows; without a direction, for a note; hand
+  double much_doubt = 0.1;
+  /// -; sine between the first axis and gravity below which a robot stands upright; hand
+  double upright = 1e-3;
+  /// share of the gap less share of the samples; a region that is listed beside the first; hand
+  double least_contrast = 0.15;
+};
+
+struct Options {
+  NoiseOptions noise;
+  PriorOptions prior;
+  SessionOptions session;
+  SearchOptions search;
+  LackOfFitOptions lack_of_fit;
+  GateOptions gate;
+  ImpactOptions impact;
+  DeflectionOptions deflection;
+  ReportOptions report;
+};
+
+}  // namespace fxdyn::diagnosis
