@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/identify/identify.hpp"
 
 namespace fxdyn {

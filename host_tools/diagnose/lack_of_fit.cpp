@@ -161,7 +161,7 @@ VectorXd residual_with_background(const Linearised& problem, std::size_t joint, 
 TimeStructure in_time(const Linearised& problem, const VectorXd& residual, const std::vector<std::size_t>& blocks,
                       const VectorXd& with_healthy) {
   TimeStructure out = spectral_lines(problem.logs(), problem.blocks(), residual, blocks);
-  if (!problem.models().has_baseline) return out;
+  if (!problem.has_baseline()) return out;
   const TimeStructure slow = slow_changes(problem.logs(), problem.blocks(), with_healthy, blocks);
   return {std::min(out.p, slow.p), std::max(out.share, slow.share)};
 }
