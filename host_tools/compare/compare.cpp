@@ -16,6 +16,7 @@
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
+#include "host_tools/identify/estimate.hpp"
 #include "host_tools/identify/structure.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
 #include "host_tools/project/provenance.hpp"

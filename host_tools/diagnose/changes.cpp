@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 
+#include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/effects.hpp"
 
 namespace fxdyn::diagnosis {

@@ -8,6 +8,7 @@
 
 #include "host_tools/diagnose/deflection_fit.hpp"
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn::diagnosis {

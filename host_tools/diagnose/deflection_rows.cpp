@@ -4,6 +4,7 @@
 
 #include "host_tools/diagnose/autoregression.hpp"
 #include "host_tools/diagnose/models.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/parallel.hpp"

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host_tools/diagnose/models.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn::diagnosis {

@@ -15,6 +15,7 @@
 #include "host_tools/diagnose/verdict.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/identify/estimate.hpp"
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/error.hpp"

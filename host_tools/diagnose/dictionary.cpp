@@ -1,8 +1,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host_tools/diagnose/base_parameters.hpp"
 #include "host_tools/diagnose/search.hpp"
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn::diagnosis {
@@ -28,14 +30,15 @@ std::vector<std::vector<double>> grids(const EffectInfo& info, const Linearised&
 
 MotionScales scales_of(const Linearised& problem, std::size_t joint) {
   MotionScales s;
-  const std::vector<Joint>& joints = problem.models().current.robot.joints;
-  const auto alike = [&](std::size_t other) { return joints[other].type == joints[joint].type; };
-  s.turns = joints[joint].type == JointType::revolute;
+  const LogColumns& columns = problem.log_columns();
+  const JointType type = columns.joint_of_robot(joint).type;
+  const auto alike = [&](std::size_t other) { return columns.joint_of_robot(other).type == type; };
+  s.turns = type == JointType::revolute;
   s.joint = static_cast<unsigned>(joint);
   s.joints = static_cast<unsigned>(problem.joints());
   s.like_previous = joint > 0 && alike(joint - 1);
-  s.like_next = joint + 1 < joints.size() && alike(joint + 1);
-  s.sign_width = problem.models().current.joints[joint].sign_width;
+  s.like_next = joint + 1 < problem.joints() && alike(joint + 1);
+  s.sign_width = columns.joint(joint).sign_width;
   const auto j = static_cast<Index>(joint);
   double lower = 1e300, upper = -1e300, last = 0;
   for (std::size_t l = 0; l < problem.logs().size(); ++l) {
@@ -65,10 +68,10 @@ std::vector<Group> dictionary(const Linearised& problem, const std::vector<Effec
   std::vector<const MatrixXd*> positions;
   for (std::size_t l = 0; l < problem.logs().size(); ++l) positions.push_back(&problem.motion(l).q);
   for (std::size_t j = 0; j < n; ++j) {
-    const VectorXd in_base = hidden_rotor(problem.models().current, j);
+    const VectorXd in_base = hidden_rotor(problem.log_columns().current(), j);
     if (in_base.size() == 0) continue;
     rotors[j] = std::make_shared<const Rotor>(Rotor{j, in_base});
-    inertia[j] = least_inertia(problem.models().current, j, positions);
+    inertia[j] = least_inertia(problem.log_columns().current(), j, positions);
   }
   for (const EffectInfo& info : effect_infos()) {
     if (info.nominal || info.of_spectrum() || info.unites_others()) continue;

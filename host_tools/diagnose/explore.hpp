@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "host_tools/diagnose/lack_of_fit.hpp"
+#include "host_tools/diagnose/models.hpp"
 #include "host_tools/diagnose/search.hpp"
 
 namespace fxdyn::diagnosis {

@@ -7,6 +7,7 @@
 
 #include "host_tools/diagnose/linearised.hpp"
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/support/random.hpp"
 #include "model/effects/presliding.hpp"
 
@@ -108,9 +109,8 @@ class Functions {
   }
 
   MatrixXd of_model(const Place& place) {
-    const IdentifiedModel& model = columns_.models().current;
-    const bool turns = model.robot.joints[joint_].type == JointType::revolute;
-    const double sign_width = model.joints[joint_].sign_width;
+    const bool turns = columns_.joint_of_robot(joint_).type == JointType::revolute;
+    const double sign_width = columns_.joint(joint_).sign_width;
     const ArrayXd load = columns_.robot(log_).structural().col(j()).array() / scales_.load[j()],
                   sign = (motion_.dq.col(j()).array() / sign_width).tanh();
     made_.push_back(load);
@@ -180,8 +180,7 @@ void renew(RowCache::AllFeatures& kept, const LogColumns& columns, const Scales&
   }
   // The load moves a little with each fit; these functions need not.
   VectorXd now(scales.load.size() + 3);
-  now << scales.load, columns.models().current.joints[joint].sign_width, static_cast<double>(first),
-      static_cast<double>(whole);
+  now << scales.load, columns.joint(joint).sign_width, static_cast<double>(first), static_cast<double>(whole);
   if (nearly(kept.of_model.scales, now)) return;
   const auto count = static_cast<double>(l.rows());
   const Place place{static_cast<double>(first) / static_cast<double>(whole), count / static_cast<double>(whole)};

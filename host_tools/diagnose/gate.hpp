@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "host_tools/diagnose/explore.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/forward.hpp"
 
 namespace fxdyn::diagnosis {
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn::diagnosis {
@@ -55,7 +54,7 @@ std::vector<std::optional<Impacts>> find_impacts(const IdentifiedModel& model, c
                                                  const IdentifiedModel& healthy,
                                                  const std::vector<ProcessedLog>& before,
                                                  const ImpactOptions& options) {
-  const std::size_t n = model.joints.size();
+  const auto n = static_cast<std::size_t>(now.front().tau.cols());
   std::vector<std::optional<Impacts>> out(n);
   if (before.empty()) return out;
   std::vector<Count> train(n), judges(n), old(n);

@@ -22,7 +22,8 @@ struct Impacts {
 /// that strike as a gap closes, a loose connector. Of the error h = e - lowpass(e), e = tau - predict(model), what is
 /// beyond 6 standard deviations (of the log, from its median) counts once every 20 ms. Today's train logs and the
 /// validate logs, where there are any, must each have three times as many a second as the healthy session.
-/// @param healthy the model of `before` @returns by joint; nothing without a healthy session
+/// @param now at least one log @param healthy the model of `before`
+/// @returns by joint; nothing without a healthy session
 std::vector<std::optional<Impacts>> find_impacts(const IdentifiedModel& model, const std::vector<ProcessedLog>& now,
                                                  const IdentifiedModel& healthy,
                                                  const std::vector<ProcessedLog>& before, const ImpactOptions& options);

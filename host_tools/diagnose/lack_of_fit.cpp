@@ -169,7 +169,7 @@ TimeStructure in_time(const Linearised& problem, const VectorXd& residual, const
                       const VectorXd& with_healthy) {
   const LackOfFitOptions& options = problem.models().options.lack_of_fit;
   TimeStructure out = spectral_lines(problem.logs(), problem.blocks(), residual, blocks, options);
-  if (!problem.models().has_baseline) return out;
+  if (!problem.has_baseline()) return out;
   const TimeStructure slow = slow_changes(problem.logs(), problem.blocks(), with_healthy, blocks, options);
   return {std::min(out.p, slow.p), std::max(out.share, slow.share)};
 }

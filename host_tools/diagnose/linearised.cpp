@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <numeric>
 
+#include "host_tools/diagnose/base_parameters.hpp"
 #include "host_tools/diagnose/design_matrix.hpp"
 #include "host_tools/diagnose/features.hpp"
+#include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/parallel.hpp"
 
@@ -18,13 +20,14 @@ Linearised::Linearised(const Models& models, const std::vector<SessionLog>& logs
     : log_columns_(models, logs),
       unknowns_(make_unknowns(models)),
       groups_(unknowns_.named),
-      background_(models.current.joints.size()) {
+      background_(log_columns_.joints()) {
   const Blocks blocks = make_blocks(logs);
   solver_ = std::make_unique<BlockSolver>(blocks, design_matrix(log_columns_, unknowns_.all, blocks),
                                           static_cast<Index>(unknowns_.all.size()), unknowns_.priors());
   noise_ = estimate_noise(log_columns_, *solver_, solver_->estimate_weights(), std::move(whitening));
   parallel_for(joints(), [&](std::size_t j) { whiten(j); });
-  parallel_for(models.background.size(), [&](std::size_t k) { add_background(models.background[k]); });
+  const std::vector<std::size_t>& structured = log_columns_.background();
+  parallel_for(structured.size(), [&](std::size_t k) { add_background(structured[k]); });
   solver_->estimate_weights();
 }
 
@@ -65,7 +68,7 @@ bool Linearised::rotor_is_separated(std::size_t joint, const std::vector<std::si
   };
   if (std::any_of(groups.begin(), groups.end(), separates)) return true;
   // What the model has of them beside the groups: a background's, a link encoder's.
-  const auto& effects = models().current.joints[joint].effects;
+  const auto& effects = log_columns_.joint(joint).effects;
   const auto all =
       std::count_if(effects.begin(), effects.end(), [](const EffectFit& fit) { return separates_rotor(fit.effect); });
   std::ptrdiff_t named = 0;
@@ -134,7 +137,7 @@ void Linearised::add_all(std::vector<Group> groups) {
 }
 
 MatrixXd base_covariance(const Linearised& problem) {
-  const auto n = static_cast<Index>(problem.models().current.base.size());
+  const Index n = problem.log_columns().base_parameters();
   const LinearFit fit = problem.solver().solve(problem.unknown_columns());
   return SymmetricSolver(fit.information).inverse().topLeftCorner(n, n);
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/support/parallel.hpp"
 #include "model/effects/rotor_inertia.hpp"
@@ -15,10 +16,10 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 LogColumns::LogColumns(const Models& models, const std::vector<SessionLog>& logs)
-    : models_(models),
+    : models_(std::make_shared<const Models>(models)),
       logs_(&logs),
-      chain_(to_dh(models_.current.robot)),
-      base_(base_of(models_.current)),
+      chain_(to_dh(models.current.robot)),
+      base_(base_of(models.current)),
       motions_(logs.size()),
       slow_(logs.size()),
       robot_(logs.size()) {
@@ -36,6 +37,16 @@ LogColumns::LogColumns(const Models& models, const std::vector<SessionLog>& logs
     robot_[l] = std::make_shared<RobotColumns>(with_load_of(log, model(l)), *motions_[l]);
   });
 }
+
+std::size_t LogColumns::joints() const { return models_->current.joints.size(); }
+bool LogColumns::has_baseline() const { return models_->has_baseline; }
+const std::vector<std::size_t>& LogColumns::background() const { return models_->background; }
+const IdentifiedModel& LogColumns::current() const { return models_->current; }
+const Joint& LogColumns::joint_of_robot(std::size_t joint) const { return current().robot.joints[joint]; }
+const JointFit& LogColumns::joint(std::size_t joint) const { return current().joints[joint]; }
+const IdentifiedModel& LogColumns::model(std::size_t log) const { return models_->of((*logs_)[log].healthy); }
+const JointFit& LogColumns::joint(std::size_t log, std::size_t joint) const { return model(log).joints[joint]; }
+bool LogColumns::bends_slowly(std::size_t log) const { return slow_[log] && stiffened(model(log)); }
 
 Index LogColumns::first_base(std::size_t joint) const {
   const auto first = std::lower_bound(base_.columns.begin(), base_.columns.end(),
@@ -127,7 +138,7 @@ std::shared_ptr<const RobotColumns> LogColumns::robot_with(std::size_t log, cons
     const std::lock_guard lock(for_group_mutex_);
     if (const auto known = for_group_.find(key); known != for_group_.end()) return known->second;
   }
-  IdentifiedModel model = models_.current;
+  IdentifiedModel model = models_->current;
   if (rotor) {
     EffectFit fit;
     fit.effect = RotorInertia::name;

@@ -7,7 +7,6 @@
 #include <tuple>
 #include <vector>
 
-#include "host_tools/diagnose/models.hpp"
 #include "host_tools/diagnose/session_log.hpp"
 #include "host_tools/diagnose/unknowns.hpp"
 #include "host_tools/effects/robot_columns.hpp"
@@ -22,11 +21,19 @@ class LogColumns {
  public:
   LogColumns(const Models& models, const std::vector<SessionLog>& logs);
 
-  const Models& models() const { return models_; }
+  const Models& models() const { return *models_; }
   const std::vector<SessionLog>& logs() const { return *logs_; }
-  std::size_t joints() const { return models_.current.joints.size(); }
+  std::size_t joints() const;
+  bool has_baseline() const;
+  /// Joints whose healthy session has structure (Models::background).
+  const std::vector<std::size_t>& background() const;
+  /// The robot today, and one of its joints as URDF and fit know it.
+  const IdentifiedModel& current() const;
+  const Joint& joint_of_robot(std::size_t joint) const;
+  const JointFit& joint(std::size_t joint) const;
   /// The model of a log's session.
-  const IdentifiedModel& model(std::size_t log) const { return models_.of((*logs_)[log].healthy); }
+  const IdentifiedModel& model(std::size_t log) const;
+  const JointFit& joint(std::size_t log, std::size_t joint) const;
   const Motion& motion(std::size_t log) const { return *motions_[log]; }
   const RobotColumns& robot(std::size_t log) const { return *robot_[log]; }
 
@@ -47,14 +54,14 @@ class LogColumns {
   /// What a model says of a log's motion [N*m | N]; its gears bend by what is not noise.
   Eigen::MatrixXd torque_of(std::size_t log, IdentifiedModel model) const;
   /// Whether torque_of() differs from RobotColumns::torque() for that.
-  bool bends_slowly(std::size_t log) const { return slow_[log] && stiffened(model(log)); }
+  bool bends_slowly(std::size_t log) const;
 
  private:
   EffectColumns of(std::size_t log, const EffectCandidate& candidate, const RobotColumns& columns) const;
   std::vector<Eigen::MatrixXd> base_columns(std::size_t log, const std::vector<std::size_t>& joints) const;
   std::shared_ptr<const RobotColumns> robot_with(std::size_t log, const Group& group) const;
 
-  Models models_;
+  std::shared_ptr<const Models> models_;
   const std::vector<SessionLog>* logs_;
   DhChain chain_;
   BaseSet base_;

@@ -87,11 +87,10 @@ NoiseModel estimate_noise(const LogColumns& columns, const BlockSolver& solver, 
     std::vector<VectorXd> parts;
     for (std::size_t l = 0; l < columns.logs().size(); ++l) {
       const Block& b = blocks.of_log[l];
-      const VectorXd u =
-          velocity_doubt(columns.logs()[l].log, j, columns.model(l).joints[j], columns.motion(l).dq.col(k),
-                         columns.robot(l).structural().col(k), sigma, options.velocity_error);
+      const VectorXd u = velocity_doubt(columns.logs()[l].log, j, columns.joint(l, j), columns.motion(l).dq.col(k),
+                                        columns.robot(l).structural().col(k), sigma, options.velocity_error);
       doubts[j].segment(b.first, b.count) = u;
-      const bool use = columns.models().has_baseline ? b.healthy : b.fits;
+      const bool use = columns.has_baseline() ? b.healthy : b.fits;
       if (use) parts.emplace_back((e.segment(b.first, b.count).array() / (1 + u.array()).sqrt()).matrix());
     }
     coefficients[j] = autoregression(parts);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 
+#include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/solver.hpp"

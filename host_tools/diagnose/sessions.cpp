@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/regression/encoder_noise.hpp"
 #include "host_tools/regression/row_ranges.hpp"

@@ -1,4 +1,6 @@
 #include "host_tools/diagnose/unknowns.hpp"
+#include "host_tools/diagnose/base_parameters.hpp"
+#include "host_tools/diagnose/models.hpp"
 #include "model/effects/coulomb.hpp"
 #include "model/effects/offset.hpp"
 #include "model/effects/payload.hpp"
@@ -208,6 +210,16 @@ std::vector<Prior> Unknowns::priors() const {
 }
 
 Unknowns make_unknowns(const Models& models) { return Builder(models).build(); }
+
+std::pair<double, double> shape_limits(const Models& models, std::size_t joint, const EffectInfo& info,
+                                       const ParameterInfo& shape) {
+  const FilterFit& filter = models.current.filter;
+  if (shape.values.seen_by_encoder && joint < filter.position_noise.size()) {
+    const double step = std::max(filter.encoder_step[joint], std::sqrt(12.0) * filter.position_noise[joint]);
+    return {std::clamp(step, shape.lower, 0.1 * shape.upper), shape.upper};
+  }
+  return {shape.lower, upper_bound(info, shape, models.smallest_step_s)};
+}
 
 const EffectFit& effect_of(const IdentifiedModel& model, const Unknown& u) {
   return u.body ? model.body[u.effect] : model.joints[u.joint].effects[u.effect];

@@ -2,12 +2,25 @@
 
 #include <Eigen/Dense>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "host_tools/diagnose/block_solver.hpp"
-#include "host_tools/diagnose/models.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/forward.hpp"
+#include "host_tools/effects/robot_columns.hpp"
 
 namespace fxdyn::diagnosis {
+
+struct Models;
+struct Rotor;
+
+/// An effect of Models::current: of joints[joint].effects, or of body.
+struct EffectId {
+  bool body = false;
+  std::size_t joint = 0, effect = 0;
+  bool operator==(const EffectId&) const = default;
+};
 
 /// One scalar that is fitted.
 struct Unknown {
@@ -57,6 +70,11 @@ struct Unknowns {
 };
 
 Unknowns make_unknowns(const Models& models);
+
+/// Bounds of a shape parameter, as far as these logs can show it: a delay is so many steps of the finest log, and what
+/// happens within a step of the encoder does not show.
+std::pair<double, double> shape_limits(const Models& models, std::size_t joint, const EffectInfo& info,
+                                       const ParameterInfo& shape);
 
 /// The effect of an unknown that is neither base parameter nor width.
 const EffectFit& effect_of(const IdentifiedModel& model, const Unknown& unknown);

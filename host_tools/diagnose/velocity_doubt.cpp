@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/regression/encoder_noise.hpp"
 #include "model/effects/coulomb.hpp"
 

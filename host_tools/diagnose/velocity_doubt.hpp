@@ -2,7 +2,7 @@
 
 #include <Eigen/Dense>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/regression/dataset.hpp"
 
 namespace fxdyn::diagnosis {

@@ -9,6 +9,7 @@
 #include "host_tools/diagnose/where.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/excite/sight.hpp"
 #include "host_tools/support/parallel.hpp"
 #include "model/effects/gravity_compensator.hpp"
@@ -101,9 +102,8 @@ class ReportWriter {
     for (const std::string& effect : conclusion_.outcome.not_identifiable.back()) {
       // What of a load or a tilt is not part of the base parameters, the poses show.
       advise(fmt::format("{}: {}", effect,
-                         problem_.models().has_baseline
-                             ? "other poses and loads"
-                             : "the same motions recorded without it (role = \"baseline\")"));
+                         problem_.has_baseline() ? "other poses and loads"
+                                                 : "the same motions recorded without it (role = \"baseline\")"));
     }
     const auto any = [&](const char* verdict) {
       return std::any_of(joints.begin(), joints.end(), [&](const json& joint) { return joint["verdict"] == verdict; });
@@ -121,7 +121,7 @@ class ReportWriter {
             {"next_experiment", next_},
             {"gate", gate_of(conclusion_.now)},
             {"figures_on", figures_on_},
-            {"baseline", problem_.models().has_baseline},
+            {"baseline", problem_.has_baseline()},
             {"notes", notes_}};
   }
 

@@ -6,6 +6,7 @@
 
 #include "host_tools/effects/broad_learning_types.hpp"
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/link_parameters.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
 #include "model/version.hpp"

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -9,6 +8,7 @@
 
 #include "host_tools/effects/filter_fit.hpp"
 #include "host_tools/effects/joint_fit.hpp"
+#include "host_tools/effects/log_reference.hpp"
 #include "host_tools/numbers/formats.hpp"
 #include "host_tools/robot/robot.hpp"
 #include "host_tools/signals/log.hpp"
@@ -22,11 +22,6 @@ struct BaseParameter {
   double value = 0, std = 0;
   bool essential = true;   ///< the data would be explained worse without it
   std::string expression;  ///< the sum of standard parameters that it is, e.g. "Jzz1 + Jxx2 + 0.18 m3"
-};
-
-struct LogReference {
-  std::string file, role, hash;
-  double from_s = 0, to_s = 0;
 };
 
 /// What the layout of exported tables takes from the values in them, beside the formats: it stays when an update
@@ -91,13 +86,5 @@ nlohmann::json flexible_json(const FlexibleJoint& joint, const Robot& robot);
 nlohmann::json formats_json(const Formats& formats);
 /// @throws InputError naming the file and the missing or wrong key.
 IdentifiedModel read_model(const std::filesystem::path& file);
-
-/// The parameters of one link as ten numbers, the order of the regressor's columns.
-inline std::array<double, parameters_per_link> to_array(const LinkInertia<Real>& link) {
-  return {link.m, link.h.x, link.h.y, link.h.z, link.xx, link.yy, link.zz, link.xy, link.xz, link.yz};
-}
-inline LinkInertia<Real> to_inertia(const std::array<double, parameters_per_link>& v) {
-  return {v[0], {v[1], v[2], v[3]}, v[4], v[5], v[6], v[7], v[8], v[9]};
-}
 
 }  // namespace fxdyn

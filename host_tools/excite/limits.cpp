@@ -114,7 +114,10 @@ std::optional<IdentifiedModel> torque_model(const Project& project, const std::f
 }
 
 LimitCheck::LimitCheck(const Robot& robot, MotionLimits limits, std::optional<IdentifiedModel> model, double margin)
-    : robot_(robot), limits_(std::move(limits)), model_(std::move(model)), margin_(margin) {
+    : robot_(robot),
+      limits_(std::move(limits)),
+      model_(model ? std::make_shared<const IdentifiedModel>(*std::move(model)) : nullptr),
+      margin_(margin) {
   const Eigen::VectorXd range = limits_.upper - limits_.lower;
   lower_ = limits_.lower + 0.5 * margin * range;
   upper_ = limits_.upper - 0.5 * margin * range;

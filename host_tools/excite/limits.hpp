@@ -2,11 +2,12 @@
 
 #include <Eigen/Dense>
 #include <array>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/project/project.hpp"
 #include "host_tools/signals/motion.hpp"
 
@@ -43,7 +44,7 @@ class LimitCheck {
   LimitCheck(const Robot& robot, MotionLimits limits, std::optional<IdentifiedModel> model, double margin);
 
   const MotionLimits& limits() const { return limits_; }
-  bool knows_torque() const { return model_.has_value(); }
+  bool knows_torque() const { return model_ != nullptr; }
   double margin() const { return margin_; }
   /// Position limits with the margin taken off at both ends, margin / 2 of the range each.
   const Eigen::VectorXd& lower() const { return lower_; }
@@ -69,7 +70,7 @@ class LimitCheck {
 
   Robot robot_;
   MotionLimits limits_;
-  std::optional<IdentifiedModel> model_;
+  std::shared_ptr<const IdentifiedModel> model_;  ///< null: the torque is not known
   double margin_;
   Eigen::VectorXd lower_, upper_;
   std::vector<std::string> point_links_;  ///< of each point of link_origins()

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "host_tools/identify/flexible.hpp"
+#include "host_tools/project/provenance.hpp"
 #include "host_tools/regression/essential.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
@@ -75,8 +76,6 @@ void add_flexible_joints(IdentifiedModel& model, const std::vector<ProcessedLog>
 }
 
 }  // namespace
-
-std::string project_hash(const Project& project) { return hash_of(read_file(project.file) + read_file(project.urdf)); }
 
 Estimate finish_model(const Fitter& fitter, const Project& project, const GateData& data,
                       const IdentifyOptions& options) {

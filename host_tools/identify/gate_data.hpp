@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/filter_fit.hpp"
+#include "host_tools/effects/joint_fit.hpp"
+#include "host_tools/effects/log_reference.hpp"
 #include "host_tools/project/project.hpp"
 #include "host_tools/regression/dataset.hpp"
 

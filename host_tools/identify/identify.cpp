@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "host_tools/effects/effects.hpp"
-#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/identify/plausible.hpp"
 #include "host_tools/identify/shape_search.hpp"
 #include "host_tools/identify/torque_lead.hpp"

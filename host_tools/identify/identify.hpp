@@ -3,8 +3,6 @@
 #include <memory>
 #include <string>
 
-#include "host_tools/effects/identified_model.hpp"
-#include "host_tools/identify/estimate.hpp"
 #include "host_tools/identify/gate_data.hpp"
 #include "host_tools/identify/options.hpp"
 #include "host_tools/project/project.hpp"

@@ -9,6 +9,7 @@
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/link_parameters.hpp"
 #include "host_tools/regression/physical.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/error.hpp"

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/link_parameters.hpp"
 #include "host_tools/regression/physical.hpp"
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/regression/solver.hpp"

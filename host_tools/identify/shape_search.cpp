@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "host_tools/effects/effects.hpp"
-#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/error.hpp"
 
 namespace fxdyn {

@@ -2,6 +2,7 @@
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/identify/estimate.hpp"
 
 namespace fxdyn {
 

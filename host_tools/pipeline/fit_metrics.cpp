@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "host_tools/identify/fit_figures.hpp"
 namespace fxdyn {
 
 using nlohmann::json;
@@ -26,7 +27,7 @@ json recursion_json(const Fitter::Recursion& recursion, double forgetting) {
 
 }  // namespace
 
-json fit_metrics(const Project& project, const Fitter& fitter, const Estimate& estimate,
+json fit_metrics(const Project& project, const Fitter& fitter, const FitFigures& estimate,
                  const std::vector<std::string>& notes, const std::vector<StageErrors>& stages) {
   json metrics = {{"schema", "fxdyn.metrics/1"},
                   {"gate", fitter.gate()},

@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/identify/payload.hpp"
 #include "host_tools/regression/metrics.hpp"

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/signals/log.hpp"
 
 namespace fxdyn {

@@ -10,8 +10,10 @@
 #include "host_tools/diagnose/plots.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
+#include "host_tools/identify/identify.hpp"
 #include "host_tools/pipeline/fit_metrics.hpp"
 #include "host_tools/pipeline/tables_export.hpp"
+#include "host_tools/pipeline/training.hpp"
 #include "host_tools/project/provenance.hpp"
 #include "host_tools/regression/metrics.hpp"
 #include "host_tools/report/report.hpp"
@@ -36,6 +38,8 @@ Pipeline::Pipeline(const fs::path& project, fs::path directory)
     : project_(read_project(project)), directory_(std::move(directory)) {
   check_writable(directory_);
 }
+
+Pipeline::~Pipeline() = default;
 
 GateData& Pipeline::data() {
   if (!data_) {
@@ -117,7 +121,7 @@ StageErrors Pipeline::stage_errors(const IdentifiedModel& model, const std::stri
   return out;
 }
 
-Trainer::ErrorsOf Pipeline::stage_errors() {
+std::function<StageErrors(const IdentifiedModel&, const std::string&)> Pipeline::stage_errors() {
   return [this](const IdentifiedModel& model, const std::string& stage) { return stage_errors(model, stage); };
 }
 
@@ -241,6 +245,8 @@ IdentifiedModel Pipeline::model() {
   train();
   return read_model(directory_ / "model.json");
 }
+
+std::optional<IdentifiedModel> Pipeline::trained() { return written({"trained"}); }
 
 IdentifiedModel Pipeline::exported() {
   const fs::path file = directory_ / "model.json";

@@ -1,19 +1,33 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
+#include <functional>
+#include <initializer_list>
+#include <memory>
 #include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
-#include "host_tools/identify/identify.hpp"
-#include "host_tools/pipeline/training.hpp"
+#include "host_tools/effects/forward.hpp"
+#include "host_tools/effects/log_reference.hpp"
+#include "host_tools/project/project.hpp"
+#include "host_tools/regression/metrics.hpp"
+#include "host_tools/support/progress.hpp"
 
 namespace fxdyn {
+
+struct Estimate;
+struct Formats;
+struct GateData;
 
 /// The stages of `fxdyn run`, each continuing from DIR/model.json where project and logs are still those it was made
 /// from, and running the missing stages first otherwise.
 class Pipeline {
  public:
   Pipeline(const std::filesystem::path& project, std::filesystem::path directory);
+  ~Pipeline();
 
   void identify();
   /// Always from base parameters and nominal effects; needs nothing of the stages before.
@@ -31,7 +45,7 @@ class Pipeline {
   /// DIR/model.json, made by the stages up to training if it is missing or out of date.
   IdentifiedModel model();
   /// DIR/model.json, if training made it from project and logs as they are now; makes nothing.
-  std::optional<IdentifiedModel> trained() { return written({"trained"}); }
+  std::optional<IdentifiedModel> trained();
   /// DIR/model.json with the tables that a drive may run on; makes nothing.
   /// @throws InputError: the verb that has to come first
   IdentifiedModel exported();
@@ -54,7 +68,8 @@ class Pipeline {
   std::optional<std::pair<int, std::string>> not_excited() const;
   /// @throws DataError: there is one
   void check_excited() const;
-  Trainer::ErrorsOf stage_errors();
+  /// The same as a function, for training.
+  std::function<StageErrors(const IdentifiedModel& model, const std::string& stage)> stage_errors();
   /// The stages before training that DIR/metrics.json holds.
   std::vector<StageErrors> diagnosed_stages() const;
   /// DIR/identified.urdf, where the estimate has bodies.

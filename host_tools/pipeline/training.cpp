@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/effects/broad_learning_types.hpp"
+#include "host_tools/identify/identify.hpp"
 #include "host_tools/support/files.hpp"
 
 namespace fxdyn {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/identify/identify.hpp"
+#include "host_tools/identify/estimate.hpp"
 #include "host_tools/regression/metrics.hpp"
 #include "host_tools/train/kept_effects.hpp"
 #include "host_tools/train/search.hpp"

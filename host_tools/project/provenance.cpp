@@ -28,6 +28,8 @@ json read_seconds(const fs::path& directory) {
 
 }  // namespace
 
+std::string project_hash(const Project& project) { return hash_of(read_file(project.file) + read_file(project.urdf)); }
+
 json made_from(const Project& project, const fs::path& directory, bool of_model) {
   json out{{"logs", json::object()}};
   for (const LogEntry& entry : project.logs) {

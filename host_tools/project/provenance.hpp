@@ -3,11 +3,15 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
 
 #include "host_tools/project/project.hpp"
 #include "model/table_page.hpp"
 
 namespace fxdyn {
+
+/// Of the project file and its URDF.
+std::string project_hash(const Project& project);
 
 /// What a result was made from: {"logs": {file relative to DIR: hash}, "model": hash of DIR/model.json without its
 /// tables, where the result is of that model}.

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/filter_fit.hpp"
 
 namespace fxdyn {
 

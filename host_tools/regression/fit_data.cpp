@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/link_parameters.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/parallel.hpp"
 

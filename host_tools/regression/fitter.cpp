@@ -8,6 +8,7 @@
 #include "host_tools/effects/broad_learning_types.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/link_parameters.hpp"
 #include "host_tools/regression/bls_rows.hpp"
 #include "host_tools/regression/own_columns.hpp"
 #include "host_tools/regression/solver.hpp"

@@ -1,6 +1,7 @@
 #include "host_tools/regression/judgement.hpp"
 
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/joint_fit.hpp"
 
 namespace fxdyn {
 

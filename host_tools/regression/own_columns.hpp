@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "host_tools/effects/effects.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/regression/dataset.hpp"
 
 namespace fxdyn {

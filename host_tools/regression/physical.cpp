@@ -7,7 +7,6 @@
 #include <numbers>
 
 #include "host_tools/effects/effects.hpp"
-#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/consistent.hpp"
 #include "host_tools/regression/pseudo_inertia.hpp"
 #include "host_tools/regression/solver.hpp"

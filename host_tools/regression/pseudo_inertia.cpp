@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/link_parameters.hpp"
 
 namespace fxdyn {
 

@@ -3,7 +3,7 @@
 #include <array>
 #include <numbers>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/link_parameters.hpp"
 #include "host_tools/support/random.hpp"
 
 namespace fxdyn {

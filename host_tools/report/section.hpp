@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/regression/dataset.hpp"
 #include "host_tools/report/results.hpp"
 
@@ -14,14 +14,15 @@ namespace fxdyn {
 
 /// What a section may draw from.
 struct ReportInput {
-  const IdentifiedModel& fitted;
-  const nlohmann::json model;              ///< content of model.json
-  const std::vector<ProcessedLog>& logs;   ///< to draw
-  const Results& results;                  ///< all of them
+  const IdentifiedModel& fitted;           ///< include effects/identified_model.hpp to look into it
+  const nlohmann::json model;              ///< the same as in model.json, enough for most sections
+  const std::vector<ProcessedLog>& logs;   ///< to draw: the test logs, else validate, else train
+  const Results& results;                  ///< all result files that a section needs
   const std::filesystem::path& directory;  ///< where the results are
 };
 
-/// A part of report.html. One more: a file NAME_section.cpp with its function, and a line in sections.cpp.
+/// A part of report.html. One more: a file NAME_section.cpp with its function, and a line in sections.cpp
+/// (docs/guide/report-section.md).
 struct ReportSection {
   std::string_view name;
   ResultFile needs;  ///< "" : the model alone

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/page/page.hpp"
 #include "host_tools/page/plot.hpp"
 #include "host_tools/report/section.hpp"

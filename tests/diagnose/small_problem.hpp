@@ -3,6 +3,8 @@
 #include <vector>
 
 #include "host_tools/diagnose/linearised.hpp"
+#include "host_tools/diagnose/models.hpp"
+#include "host_tools/effects/link_parameters.hpp"
 #include "tests/diagnose/small_log.hpp"
 
 namespace fxdyn::test {

@@ -1,6 +1,8 @@
 // The scalars that are fitted, their priors, and what a fit makes of the models.
 
 #include "host_tools/diagnose/unknowns.hpp"
+#include "host_tools/diagnose/models.hpp"
+#include "host_tools/effects/link_parameters.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,6 @@
 #include "host_tools/identify/identify.hpp"
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/link_parameters.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,5 @@
 #include "host_tools/regression/physical.hpp"
+#include "host_tools/effects/link_parameters.hpp"
 #include "host_tools/regression/solver.hpp"
 
 #include <gtest/gtest.h>

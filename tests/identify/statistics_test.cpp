@@ -7,6 +7,7 @@
 
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/link_parameters.hpp"
 #include "host_tools/identify/identify.hpp"
 #include "host_tools/regression/essential.hpp"
 #include "host_tools/regression/solver.hpp"

@@ -2,6 +2,7 @@
 
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/link_parameters.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/export/proof.hpp"
 #include "host_tools/regression/regressor.hpp"

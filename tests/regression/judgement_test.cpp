@@ -1,4 +1,5 @@
 #include "host_tools/regression/judgement.hpp"
+#include "host_tools/effects/joint_fit.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,23 +1,16 @@
-#include "host_tools/diagnose/models.hpp"
+#include "host_tools/diagnose/base_parameters.hpp"
 
 #include <algorithm>
-#include <cmath>
+
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/link_parameters.hpp"
 
 namespace fxdyn::diagnosis {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-std::pair<double, double> shape_limits(const Models& models, std::size_t joint, const EffectInfo& info,
-                                       const ParameterInfo& shape) {
-  const FilterFit& filter = models.current.filter;
-  if (shape.values.seen_by_encoder && joint < filter.position_noise.size()) {
-    const double step = std::max(filter.encoder_step[joint], std::sqrt(12.0) * filter.position_noise[joint]);
-    return {std::clamp(step, shape.lower, 0.1 * shape.upper), shape.upper};
-  }
-  return {shape.lower, upper_bound(info, shape, models.smallest_step_s)};
-}
 
 BaseSet base_of(const IdentifiedModel& model) {
   BaseSet base;
