@@ -239,6 +239,13 @@ TEST_F(FdcanTest, OverrunsAreCounted) {
   EXPECT_EQ(can.errors().lost, 5U);
 }
 
+TEST_F(FdcanTest, ARestartWithoutBusOffLosesNothing) {
+  ASSERT_EQ(can.start(fast_timing), Status::ok);
+  ASSERT_EQ(can.send({.id = 1}), Status::ok);
+  EXPECT_EQ(can.restart(), Status::ok);
+  EXPECT_EQ(model.waiting(), 1);
+}
+
 TEST_F(FdcanTest, BusOffRecoversAfterTheSequencesAndSendsNothingOld) {
   ASSERT_EQ(can.start(fast_timing), Status::ok);
   for (const std::uint32_t id : {0x181U, 0x581U, 0x701U}) ASSERT_EQ(can.send({.id = id}), Status::ok);
