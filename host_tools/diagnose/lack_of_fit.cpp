@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host_tools/diagnose/models.hpp"
 #include "host_tools/diagnose/shifted_residual.hpp"
 #include "host_tools/diagnose/time_structure.hpp"
 #include "host_tools/regression/solver.hpp"

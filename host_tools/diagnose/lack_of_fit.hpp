@@ -2,6 +2,7 @@
 
 #include "host_tools/diagnose/features.hpp"
 #include "host_tools/diagnose/linearised.hpp"
+#include "host_tools/diagnose/options.hpp"
 
 namespace fxdyn::diagnosis {
 

@@ -6,6 +6,7 @@
 #include "host_tools/diagnose/base_parameters.hpp"
 #include "host_tools/diagnose/design_matrix.hpp"
 #include "host_tools/diagnose/features.hpp"
+#include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/parallel.hpp"

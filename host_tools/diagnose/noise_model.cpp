@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "host_tools/diagnose/autoregression.hpp"
+#include "host_tools/diagnose/models.hpp"
 #include "host_tools/diagnose/velocity_doubt.hpp"
 #include "host_tools/support/parallel.hpp"
 

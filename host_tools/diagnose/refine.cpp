@@ -5,6 +5,7 @@
 
 #include "host_tools/diagnose/dictionary.hpp"
 #include "host_tools/diagnose/gain.hpp"
+#include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/regression/solver.hpp"
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 
+#include "host_tools/diagnose/models.hpp"
 #include "host_tools/diagnose/refine.hpp"
 #include "host_tools/diagnose/shifted_residual.hpp"
 #include "host_tools/effects/effects.hpp"
@@ -36,6 +37,8 @@ constexpr double no_bound = -1e5;
 bool of_spectrum(const Group& group) { return find_effect(group.candidate.effect)->of_spectrum(); }
 
 }  // namespace
+
+const SearchOptions& Search::options() const { return problem_.models().options.search; }
 
 double Search::samples() const {
   double rows = 0;

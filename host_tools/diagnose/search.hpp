@@ -7,6 +7,7 @@
 #include "host_tools/diagnose/dictionary.hpp"
 #include "host_tools/diagnose/gain.hpp"
 #include "host_tools/diagnose/linearised.hpp"
+#include "host_tools/diagnose/options.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/support/progress.hpp"
 
@@ -83,7 +84,7 @@ class Search {
   std::optional<Choice> united(const Choice& choice, const EffectInfo& info, std::size_t joint);
   double penalty(std::size_t group) const;
   double threshold(std::size_t group) const;
-  const SearchOptions& options() const { return problem_.models().options.search; }
+  const SearchOptions& options() const;
   bool allowed(const Choice& state, std::size_t group) const;
   void find_ripples(const Choice& state, std::optional<std::size_t> joint);
   double samples() const;

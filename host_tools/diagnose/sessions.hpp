@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "host_tools/diagnose/linearised.hpp"
+#include "host_tools/diagnose/options.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/identify/identify.hpp"
 

@@ -1,3 +1,4 @@
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/excite/motions.hpp"
 
 #include <gtest/gtest.h>
