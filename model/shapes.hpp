@@ -126,9 +126,8 @@ inline constexpr ShapeValues relaxation{
 inline constexpr ShapeValues small_load{
     .tried = detail::loads, .judged = detail::usual_loads, .of_link = detail::link_loads};
 /// Coulomb's friction as a share of the static one.
-inline constexpr ShapeValues friction_share{.tried = detail::friction_shares,
-                                            .judged = detail::friction_shares,
-                                            .fitted = detail::friction_share_range};
+inline constexpr ShapeValues friction_share{
+    .tried = detail::friction_shares, .judged = detail::friction_shares, .fitted = detail::friction_share_range};
 /// Same or opposite.
 inline constexpr ShapeValues direction{
     .tried = detail::both_directions, .judged = detail::both_directions, .search = ShapeSearch::list};

@@ -463,8 +463,9 @@ ComparisonResult compare_methods(const Project& project, const fs::path& directo
 
 ComparisonResult compare(const fs::path& project, const fs::path& directory) {
   Comparison comparison(read_project(project), directory, true);
-  const ComparisonResult result = comparison.run({"rigid_ls", "friction_ls", "rls", "mlp", "bls_default", "bls_pso",
-                                                  "bls_pso_friction", "bls_pso_physical", "dahl_stribeck", "lugre", "named_bls", "oracle", "noise_floor"});
+  const ComparisonResult result =
+      comparison.run({"rigid_ls", "friction_ls", "rls", "mlp", "bls_default", "bls_pso", "bls_pso_friction",
+                      "bls_pso_physical", "dahl_stribeck", "lugre", "named_bls", "oracle", "noise_floor"});
   write_comparison_plots(comparison.shown(), directory);
   write_file(directory / "compare.json", to_json(result).dump(1) + "\n");
   comparison.drop_searches();

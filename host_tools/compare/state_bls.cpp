@@ -38,7 +38,8 @@ StateBls::StateBls(const StateBlsShape& shape, const MatrixXd& examples, std::ui
   inverse_range_ = centred.cwiseAbs().colwise().maxCoeff().array().max(1e-12).inverse();
   Random random(seed);
   const Index features = shape_.windows * shape_.nodes;
-  feature_ = sparse_feature_weights(centred.array().rowwise() * inverse_range_.array(), shape_.windows, shape_.nodes, random);
+  feature_ =
+      sparse_feature_weights(centred.array().rowwise() * inverse_range_.array(), shape_.windows, shape_.nodes, random);
   enhancement_ = random_matrix(random, features + 1, shape_.enhancement,
                                shape_.scale * 3 / std::sqrt(static_cast<double>(features)));
 }

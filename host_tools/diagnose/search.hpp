@@ -50,8 +50,8 @@ class Search {
 
   /// @param start groups to begin with (named effects of the model)
   Choice run(const std::vector<std::size_t>& start, Progress& progress);
-  /// The choice with an effect that unites others (EffectTraits::unites) in place of those of them that it has, joint by
-  /// joint, where that scores better.
+  /// The choice with an effect that unites others (EffectTraits::unites) in place of those of them that it has, joint
+  /// by joint, where that scores better.
   Choice unite(Choice best);
   std::vector<Found> explain(const Choice& choice);
   Choice evaluate(const std::vector<std::size_t>& groups) const;

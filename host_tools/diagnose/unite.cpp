@@ -53,8 +53,7 @@ std::optional<Choice> Search::united(const Choice& choice, const EffectInfo& inf
   std::vector<Group> members;
   for (const std::size_t g : choice.groups) {
     const Group& group = problem_.groups()[g];
-    const bool member =
-        !group.on_body && group.candidate.joint == joint && is_united(info, group.candidate.effect);
+    const bool member = !group.on_body && group.candidate.joint == joint && is_united(info, group.candidate.effect);
     if (member) members.push_back(group);
     if (!member) others.push_back(g);
   }

@@ -128,7 +128,8 @@ Candidate search_shapes(const Fitter& fitter, std::size_t joint, JointFit design
       double ratio = sweep == 0 ? 1.5 : 1.2;
       for (int round = 0; round < rounds; ++round, ratio = std::sqrt(ratio)) {
         const std::vector<double> centre = best.design.effects.back().shape;
-        for (const double value : {std::max(ranges[i].from, centre[i] / ratio), std::min(ranges[i].to, centre[i] * ratio)}) {
+        for (const double value :
+             {std::max(ranges[i].from, centre[i] / ratio), std::min(ranges[i].to, centre[i] * ratio)}) {
           std::vector<double> shape = centre;
           shape[i] = value;
           attempt(shape);

@@ -42,8 +42,7 @@ std::vector<UnknownShape> unknown_shapes(JointFit& design) {
     const auto infos = find_effect(fit.effect)->shape;
     for (std::size_t i = 0; i < infos.size(); ++i) {
       if (!is_continuous(infos[i])) continue;
-      out.push_back(
-          {&fit.shape[i], std::max(smallest_shape, infos[i].lower), std::min(largest_shape, infos[i].upper)});
+      out.push_back({&fit.shape[i], std::max(smallest_shape, infos[i].lower), std::min(largest_shape, infos[i].upper)});
     }
   }
   return out;

@@ -49,8 +49,10 @@ std::string paper_table(const json& methods) {
   return subsection("Beside the paper's Table 2") + table.html() +
          paragraph(
              "RMSE is the mean over the joints in N m; the paper gives no unit, no robot and no test data, defines "
-             "neither its smoothness nor what its time is of. BLS-PSO is the paper's, on q, dq, ddq. Eq. 8 has viscous and "
-             "Coulomb friction in its structure, as the MLP and RLS have here; the other row learns what the rigid body "
+             "neither its smoothness nor what its time is of. BLS-PSO is the paper's, on q, dq, ddq. Eq. 8 has viscous "
+             "and "
+             "Coulomb friction in its structure, as the MLP and RLS have here; the other row learns what the rigid "
+             "body "
              "alone leaves. Only the order of the methods can be compared.");
 }
 

@@ -58,7 +58,8 @@ MatrixXd lugre_torque(const IdentifiedModel& plant, const MatrixXd& dq, double s
     if (fit == nullptr) continue;
     LuGreBristles bristles(*fit);
     for (Index k = 0; k < dq.rows(); ++k) {
-      const double force = k > 0 ? bristles.advance(dq(k - 1, j), dq(k, j), step_s) : bristles.advance(dq(0, j), dq(0, j), 0);
+      const double force =
+          k > 0 ? bristles.advance(dq(k - 1, j), dq(k, j), step_s) : bristles.advance(dq(0, j), dq(0, j), 0);
       tau(k, j) = force - bristles.coulomb() * std::tanh(dq(k, j) / joint.sign_width);
     }
   }

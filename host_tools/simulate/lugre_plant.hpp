@@ -13,8 +13,8 @@ class LuGreBristles {
  public:
   /// @param effect fit of the effect `lugre`
   explicit LuGreBristles(const EffectFit& effect);
-  /// Over `seconds` in which the velocity goes from v0 to v1 linearly: fourth-order Runge-Kutta, steps of at most 20 us,
-  /// one of them ending where the velocity turns. @return F at the end [N*m | N]
+  /// Over `seconds` in which the velocity goes from v0 to v1 linearly: fourth-order Runge-Kutta, steps of at most 20
+  /// us, one of them ending where the velocity turns. @return F at the end [N*m | N]
   double advance(double v0, double v1, double seconds);
   double coulomb() const { return coulomb_; }  ///< Fc [N*m | N]
 

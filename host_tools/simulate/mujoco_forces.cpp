@@ -21,9 +21,9 @@ using Eigen::VectorXd;
 double soft_sign(double v, double width) { return v / std::sqrt(v * v + width * width); }
 
 /// Effects that are no torque of force(): MuJoCo's own, those of the body, of the gears and of the sensors.
-constexpr std::array<std::string_view, 13> elsewhere{"lugre", "viscous",      "coulomb",     "rotor_inertia", "elasticity",
-                                                     "backlash",     "presliding",  "eccentricity",  "payload",
-                                                     "gravity_tilt", "torque_gain", "saturation",    "delay"};
+constexpr std::array<std::string_view, 13> elsewhere{
+    "lugre",        "viscous", "coulomb",      "rotor_inertia", "elasticity", "backlash", "presliding",
+    "eccentricity", "payload", "gravity_tilt", "torque_gain",   "saturation", "delay"};
 
 /// Torque of an effect with no memory on joint j [N*m | N].
 /// @throws InputError: an effect that this plant has no formula for

@@ -28,13 +28,12 @@ struct Lugre {
       .identified = 5,
       .replaces = "coulomb",
       .unites = {"presliding", "stribeck"}};
-  static constexpr std::array shape{
-      ParameterInfo{"distance", "rad", "m", 1e-7, 0.03, Quantity::inverse_path, "Han, Wu, Hui 2025, Eq. 20",
-                    shapes::distance},
-      ParameterInfo{"velocity", "rad/s", "m/s", 1e-5, 1e3, Quantity::inverse_velocity, "Han, Wu, Hui 2025, Eq. 21",
-                    shapes::velocity},
-      ParameterInfo{"share", "1", "1", 0.25, 0.99, Quantity::unit, "Han, Wu, Hui 2025, Eq. 21: Fc / Fs",
-                    shapes::friction_share}};
+  static constexpr std::array shape{ParameterInfo{"distance", "rad", "m", 1e-7, 0.03, Quantity::inverse_path,
+                                                  "Han, Wu, Hui 2025, Eq. 20", shapes::distance},
+                                    ParameterInfo{"velocity", "rad/s", "m/s", 1e-5, 1e3, Quantity::inverse_velocity,
+                                                  "Han, Wu, Hui 2025, Eq. 21", shapes::velocity},
+                                    ParameterInfo{"share", "1", "1", 0.25, 0.99, Quantity::unit,
+                                                  "Han, Wu, Hui 2025, Eq. 21: Fc / Fs", shapes::friction_share}};
   static constexpr std::array linear{
       ParameterInfo{"static", "N*m", "N", 0, unbounded, Quantity::unit, "Han, Wu, Hui 2025, Eq. 21"},
       ParameterInfo{"damping", "N*m*s/rad", "N*s/m", 0, unbounded, Quantity::velocity, "Han, Wu, Hui 2025, Eq. 20"}};

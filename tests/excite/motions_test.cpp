@@ -1,5 +1,5 @@
-#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/excite/motions.hpp"
+#include "host_tools/effects/identified_model.hpp"
 
 #include <gtest/gtest.h>
 

@@ -15,8 +15,8 @@ std::vector<double> list(const ValueList& values) { return {values.begin(), valu
 
 TEST(EffectDeclarations, ListsAreThoseOfTheTraits) {
   EXPECT_EQ(nominal_effects(), (std::vector<std::string>{"viscous", "coulomb", "offset", "rotor_inertia"}));
-  EXPECT_EQ(identified_effects(),
-            (std::vector<std::string_view>{"motor_coupling", "asymmetric_friction", "presliding", "stribeck", "lugre"}));
+  EXPECT_EQ(identified_effects(), (std::vector<std::string_view>{"motor_coupling", "asymmetric_friction", "presliding",
+                                                                 "stribeck", "lugre"}));
   const auto named = [](auto&& has) {
     std::vector<std::string_view> names;
     for (const EffectInfo& info : effect_infos()) {
@@ -36,7 +36,8 @@ TEST(EffectDeclarations, ListsAreThoseOfTheTraits) {
 
 TEST(EffectDeclarations, WhatIsNamedElsewhereIsInTheCatalogue) {
   for (const EffectInfo& info : effect_infos()) {
-    for (const std::string_view other : {info.replaces, info.warms_into[0], info.warms_into[1], info.unites[0], info.unites[1]})
+    for (const std::string_view other :
+         {info.replaces, info.warms_into[0], info.warms_into[1], info.unites[0], info.unites[1]})
       EXPECT_TRUE(other.empty() || find_effect(other) != nullptr) << info.name << ": " << other;
     if (info.acts_on == ActsOn::position) {
       for (const ParameterInfo& shape : info.shape) EXPECT_TRUE(shape.values.of_link.given()) << info.name;

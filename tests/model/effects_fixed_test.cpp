@@ -130,7 +130,10 @@ template <class E, class N>
 std::vector<double> run(const std::vector<Tick>& ticks, double varied) {
   std::vector<typename N::Word> words;
   for (std::size_t i = 0; i < E::shape.size(); ++i) {
-    const double shape = i == 0 ? varied : (E::shape[i].name == "ratio" ? -0.7 : E::shape[i].name == "share" ? 0.95 : 0.05);
+    const double shape = i == 0 ? varied
+                                : (E::shape[i].name == "ratio"   ? -0.7
+                                   : E::shape[i].name == "share" ? 0.95
+                                                                 : 0.05);
     const std::int32_t raw = to_raw(E::stored_shape(i, shape, step_s), Fixed32::bits(E::shape[i].quantity));
     if constexpr (std::is_same_v<N, Real>) {
       words.push_back(from_raw(raw, Fixed32::bits(E::shape[i].quantity)));
