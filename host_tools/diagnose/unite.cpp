@@ -78,7 +78,8 @@ Choice Search::unite(Choice best) {
   for (const EffectInfo& info : effect_infos()) {
     for (std::size_t j = 0; info.unites_others() && j < problem_.joints(); ++j) {
       std::optional<Choice> tried = united(best, info, j);
-      if (tried && tried->score > best.score) best = std::move(*tried);
+      // As any effect it has to bring more than noise does: it holds its parts as special cases.
+      if (tried && tried->score > best.score + threshold(tried->groups.back())) best = std::move(*tried);
     }
   }
   return best;

@@ -171,6 +171,11 @@ class Identification {
       const std::size_t before = effect_count();
       for (const std::string_view effect : optional_) {
         if (joints_ == 1 && find_effect(effect)->needs_peers) continue;
+        // What it takes the place of has to be at its best: a shape that is off by the grid's step looks like more.
+        if (find_effect(effect)->unites_others()) {
+          fitter_->polish();
+          reweight();
+        }
         improve("is there " + std::string(effect) + "?", false, [&](std::size_t j) {
           return is_tried(fitter_->design(j), *find_effect(effect))
                      ? search_effect(*fitter_, j, effect, scales_[j], options_.structure)
