@@ -217,9 +217,13 @@ constexpr std::int32_t reciprocal(std::int32_t x) {
   // 36 bits, of which the one has none among the lowest 32
   const auto e = static_cast<std::int32_t>(wrapping_negate(static_cast<std::uint32_t>((std::int64_t{x} * r) >> 22)));
   const std::int32_t square = multiply_high(e, e);  // 40 bits
-  const std::int32_t gain = e + (square >> 4) + (multiply_high(square, e) >> 8);
-  const std::int32_t value = r + proven_narrow<36>(std::int64_t{r} * gain);  // 28 bits
-  return (value + (1 << 3)) >> (reciprocal_bits - ratio_bits);
+  // Unsigned: beyond the range the sums wrap.
+  const std::uint32_t series =
+      wrapping_add(static_cast<std::uint32_t>(square >> 4), static_cast<std::uint32_t>(multiply_high(square, e) >> 8));
+  const auto gain = static_cast<std::int32_t>(wrapping_add(static_cast<std::uint32_t>(e), series));  // 36 bits
+  const std::int32_t more = proven_narrow<36>(std::int64_t{r} * gain);                               // 28 bits
+  const std::uint32_t value = wrapping_add(static_cast<std::uint32_t>(r), static_cast<std::uint32_t>(more));
+  return static_cast<std::int32_t>(wrapping_add(value, 1U << 3)) >> (reciprocal_bits - ratio_bits);
 }
 
 struct Parabola {

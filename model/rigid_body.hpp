@@ -291,7 +291,8 @@ constexpr void rnea(std::span<const LinkGeometry<N>, n> geometry, std::span<cons
     motions[i] = link_motion<N>(AnyLink{}, geometry[i], i == 0 ? base : motions[i - 1], joints[i]);
     wrenches[i] = link_wrench<N>(AnyLink{}, inertia[i], motions[i]);
   }
-  for (std::size_t i = count; i-- > 0;) {
+  for (std::size_t i = count; i > 0;) {
+    --i;
     tau[i] = joint_torque<N>(AnyLink{}, geometry[i], wrenches[i]);
     if (i > 0) add_to_parent<N>(AnyLink{}, wrenches[i - 1], wrenches[i], geometry[i], motions[i]);
   }

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "host_tools/effects/effects.hpp"
@@ -153,17 +152,6 @@ class Identification {
     return count;
   }
 
-  /// Whether a joint may have the effect beside what it has: not twice, and what unites others in place of one of them.
-  static bool is_tried(const JointFit& joint, const EffectInfo& info) {
-    const auto has = [&](std::string_view name) { return joint.find(name) != nullptr; };
-    if (has(info.name)) return false;
-    for (const EffectInfo& other : effect_infos()) {
-      if (has(other.name) && std::find(other.unites.begin(), other.unites.end(), info.name) != other.unites.end())
-        return false;
-    }
-    return !info.unites_others() || std::any_of(info.unites.begin(), info.unites.end(), has);
-  }
-
   /// A torque that is not aligned hides effects, and missing effects look like one that is not: effects first, then
   /// again where that changed something.
   void search_optional_effects() {
@@ -171,15 +159,10 @@ class Identification {
       const std::size_t before = effect_count();
       for (const std::string_view effect : optional_) {
         if (joints_ == 1 && find_effect(effect)->needs_peers) continue;
-        // What it takes the place of has to be at its best: a shape that is off by the grid's step looks like more.
-        if (find_effect(effect)->unites_others()) {
-          fitter_->polish();
-          reweight();
-        }
         improve("is there " + std::string(effect) + "?", false, [&](std::size_t j) {
-          return is_tried(fitter_->design(j), *find_effect(effect))
-                     ? search_effect(*fitter_, j, effect, scales_[j], options_.structure)
-                     : Candidate{fitter_->design(j), {}};
+          return fitter_->design(j).find(effect) != nullptr
+                     ? Candidate{fitter_->design(j), {}}
+                     : search_effect(*fitter_, j, effect, scales_[j], options_.structure);
         });
       }
       fitter_->polish();

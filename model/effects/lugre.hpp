@@ -25,7 +25,6 @@ struct Lugre {
       .words = "stick-slip: bristles bend before they slide, and slide more easily the faster they do",
       .experiments = {experiments::small_reversals},
       .friction = true,
-      .identified = 5,
       .replaces = "coulomb",
       .unites = {"presliding", "stribeck"}};
   static constexpr std::array shape{ParameterInfo{"distance", "rad", "m", 1e-7, 0.03, Quantity::inverse_path,

@@ -15,8 +15,8 @@ std::vector<double> list(const ValueList& values) { return {values.begin(), valu
 
 TEST(EffectDeclarations, ListsAreThoseOfTheTraits) {
   EXPECT_EQ(nominal_effects(), (std::vector<std::string>{"viscous", "coulomb", "offset", "rotor_inertia"}));
-  EXPECT_EQ(identified_effects(), (std::vector<std::string_view>{"motor_coupling", "asymmetric_friction", "presliding",
-                                                                 "stribeck", "lugre"}));
+  EXPECT_EQ(identified_effects(),
+            (std::vector<std::string_view>{"motor_coupling", "asymmetric_friction", "presliding", "stribeck"}));
   const auto named = [](auto&& has) {
     std::vector<std::string_view> names;
     for (const EffectInfo& info : effect_infos()) {

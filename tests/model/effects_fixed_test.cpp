@@ -149,14 +149,15 @@ std::vector<double> run(const std::vector<Tick>& ticks, double varied) {
                            input<N>(t)};
     JointInput<N> u = input<N>(t);
     u.peers = peers;
-    E::template basis<N>(u, Words<N>{words.data()}, state, saturations, [&](auto tag, std::size_t, auto phi) {
-      if constexpr (std::is_same_v<N, Real>) {
-        out.push_back(phi);
-      } else {
-        static_assert(std::is_same_v<decltype(phi), typename N::template Of<decltype(tag)::value>>);
-        out.push_back(from_raw(phi.raw, Fixed32::bits(decltype(tag)::value)));
-      }
-    });
+    E::template basis<N>(
+        u, Words<N>{words.data()}, state, saturations, [&]([[maybe_unused]] auto tag, std::size_t, auto phi) {
+          if constexpr (std::is_same_v<N, Real>) {
+            out.push_back(phi);
+          } else {
+            static_assert(std::is_same_v<decltype(phi), typename N::template Of<decltype(tag)::value>>);
+            out.push_back(from_raw(phi.raw, Fixed32::bits(decltype(tag)::value)));
+          }
+        });
   }
   EXPECT_EQ(saturations.count, 0U) << E::name;
   return out;
