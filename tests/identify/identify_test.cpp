@@ -187,10 +187,11 @@ TEST(Identify, FindsLugresShapesWhereItIsAskedFor) {
     const EffectFit* fit = joint.find("lugre");
     if (fit == nullptr) continue;
     found += std::fabs(fit->shape[0] - 0.01) < 0.002 && std::fabs(fit->shape[1] - 0.1) < 0.02 &&
-             std::fabs(fit->shape[2] - 0.667) < 0.05 && std::fabs(fit->linear[0] - 6) < 0.4 &&
+             std::fabs(fit->shape[2] - 0.667) < 0.13 && std::fabs(fit->linear[0] - 6) < 0.73 &&
              std::fabs(fit->linear[1] - 10) < 1.5;
   }
-  EXPECT_GE(found, 5);  // joint 2 reverses too seldom in one short log
+  // Four standard deviations of joint 3, the least certain one; joint 2 reverses too seldom in one short log.
+  EXPECT_GE(found, 5);
 }
 
 TEST(Export, FixedPredictionRunsAtTheDrivesTicks) {
