@@ -82,6 +82,8 @@ class Search {
   std::vector<Scored> score_all(const Choice& state, bool with_thresholds);
   std::size_t refine(const Choice& state, std::size_t group);
   std::optional<Choice> united(const Choice& choice, const EffectInfo& info, std::size_t joint);
+  bool is_better_held_out(const std::vector<std::size_t>& groups, const std::vector<std::size_t>& than,
+                          std::size_t joint) const;
   double penalty(std::size_t group) const;
   double threshold(std::size_t group) const;
   const SearchOptions& options() const;

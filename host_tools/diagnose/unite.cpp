@@ -74,12 +74,25 @@ std::optional<Choice> Search::united(const Choice& choice, const EffectInfo& inf
   return best;
 }
 
+/// More shapes fit more of a log's own noise: every fold's judge has to be better off as well.
+bool Search::is_better_held_out(const std::vector<std::size_t>& groups, const std::vector<std::size_t>& than,
+                                std::size_t joint) const {
+  const BlockSolver& solver = problem_.solver();
+  const auto error = [&](const std::vector<std::size_t>& of, const Fold& fold) {
+    return solver.square(solver.solve(problem_.columns_of(of), fold.fit), fold.judge)[static_cast<Eigen::Index>(joint)];
+  };
+  const std::vector<Fold>& folds = problem_.blocks().folds;
+  return std::all_of(folds.begin(), folds.end(),
+                     [&](const Fold& fold) { return error(groups, fold) < error(than, fold); });
+}
+
 Choice Search::unite(Choice best) {
   for (const EffectInfo& info : effect_infos()) {
     for (std::size_t j = 0; info.unites_others() && j < problem_.joints(); ++j) {
       std::optional<Choice> tried = united(best, info, j);
       // As any effect it has to bring more than noise does: it holds its parts as special cases.
-      if (tried && tried->score > best.score + threshold(tried->groups.back())) best = std::move(*tried);
+      if (!tried || tried->score <= best.score + threshold(tried->groups.back())) continue;
+      if (is_better_held_out(tried->groups, best.groups, j)) best = std::move(*tried);
     }
   }
   return best;

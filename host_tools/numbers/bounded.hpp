@@ -248,6 +248,8 @@ struct BoundedNumbers {
     const double in_the_end = from_target + own * (forgets ? 1 / share.value.low : creeping_ticks);
     out.error = std::fmax(kept, in_the_end);
     if (!forgets && current_bounding.creeps) out.error = std::fmax(kept, from_target) + own * creeping_ticks;
+    // Both states stay between what they were and their targets.
+    out.error = std::fmin(out.error, out.high - out.low + from_target + unit<T>());
     return {out};
   }
   /// Largest slope of a curve that is steepest at zero.
