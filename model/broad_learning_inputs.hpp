@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <string_view>
 
+#include "model/effects/bristle.hpp"
 #include "model/effects/dahl.hpp"
 
 // What the nodes of a joint's Broad Learning System see: one of these sets, each an even number of inputs in [-1, 1].
@@ -21,6 +22,8 @@ struct BroadLearningScales {
   double velocity = 1;                                ///< velocity that counts as 1 [rad/s | m/s]
   double acceleration = 1;                            ///< likewise, above 1/16 [rad/s^2 | m/s^2]
   double middle = 0, half_range = 1;                  ///< position that counts as 0; as 1, from there [rad | m]
+  double stribeck = 0.02;                             ///< Stribeck velocity of the bristles [rad/s | m/s]
+  double share = 0.7;                                 ///< Coulomb's of static friction, Fc / Fs [-]
 };
 
 /// A number as an input: 16 bits, saturated at +-1.
@@ -62,6 +65,58 @@ struct PhysicalInputs {
           state.dahl[i - 1].step(joint.dq, words.template number<Quantity::inverse_path>(1 + i), saturations);
       u[i] = as_feature<N>(z);
     }
+    return u;
+  }
+};
+
+/// What LuGre friction depends on: Dahl's states, but of bristles that slide more easily the faster they do; how fast
+/// the middle one bends; and how much of static friction is there.
+///   u = [asinh(dq / reference velocity) / span, y_1, y_2, y_3, distance_2 dy_2/dt / velocity, 2 bell - 1]
+///   bell = exp(-(dq / stribeck)^2)
+struct BristlesInputs {
+  static constexpr std::string_view name = "bristles";
+  static constexpr std::size_t size = 6, distances = 3;
+  static constexpr std::array shape{Quantity::inverse_velocity,
+                                    Quantity::unit,
+                                    Quantity::inverse_path,
+                                    Quantity::inverse_path,
+                                    Quantity::inverse_path,
+                                    Quantity::inverse_velocity,
+                                    Quantity::unit,
+                                    Quantity::inverse_velocity};
+  static constexpr bool needs_structural = false;
+
+  template <class N>
+  struct State {
+    std::array<Bristle<N>, distances> bristles{};
+    Velocity<N> dq{};  ///< of the tick before
+  };
+  static constexpr std::array<double, shape.size()> stored(const BroadLearningScales& s, double tick_s) {
+    const auto physical = PhysicalInputs::stored(s, tick_s);
+    std::array<double, shape.size()> out{};
+    for (std::size_t i = 0; i < physical.size(); ++i) out[i] = physical[i];
+    out[5] = 1 / s.stribeck;
+    out[6] = 1 - s.share;
+    out[7] = 1 / s.velocity;
+    return out;
+  }
+  template <class N>
+  static constexpr std::array<Feature<N>, size> values(const JointInput<N>& joint, Words<N> words, State<N>& state,
+                                                       Saturations&) {
+    const auto level = SlidingLevel<N>::at(joint.dq, words.template number<Quantity::inverse_velocity>(5),
+                                           words.template number<Quantity::unit>(6));
+    const auto way = joint.dq + state.dq;
+    state.dq = joint.dq;
+    std::array<Feature<N>, size> u{};
+    u[0] = curved_velocity<N>(joint.dq, words, 0);
+    for (std::size_t i = 0; i < distances; ++i) {
+      state.bristles[i].step(way, words.template number<Quantity::inverse_path>(2 + i), level);
+      u[1 + i] = as_feature<N>(state.bristles[i].y);
+    }
+    const auto rate = state.bristles[1].rate(joint.dq, level);
+    const auto rest = N::template proven_narrow<Unit<N>>(N::one() - level.bell);
+    u[4] = N::feature(rate * words.template number<Quantity::inverse_velocity>(7));
+    u[5] = as_feature<N>(N::template proven_narrow<Unit<N>>(level.bell - rest));
     return u;
   }
 };

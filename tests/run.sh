@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # run.sh [LABEL...]: builds and runs the tests, all of them or those with one of the labels
-#   format unit target hil real diagnosis fuzz bench
+#   format unit target hil real diagnosis fuzz bench findings
+# findings: every figure of docs/findings made anew and compared with its page, for an hour or two. Only where it is named.
 # Without a label the unit tests also run with address and undefined-behaviour sanitizers.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
-labels=(format unit target hil real diagnosis fuzz bench)
+labels=(format unit target hil real diagnosis fuzz bench findings)
 for label in "$@"; do
   if [[ " ${labels[*]} " != *" $label "* ]]; then
     echo "run.sh: unknown label '$label'; known: ${labels[*]}" >&2
@@ -26,6 +27,15 @@ build() {
 step "packages"
 toolchains/setup.sh
 build host
+
+if [[ " $* " == *" findings "* ]]; then
+  step "figures of docs/findings"
+  tests/findings/figures.py --program build/host/host_tools/cli/fxdyn
+  others=()
+  for label in "$@"; do [ "$label" = findings ] || others+=("$label"); done
+  [ ${#others[@]} -gt 0 ] || exit 0
+  set -- "${others[@]}"
+fi
 
 for label in "$@"; do
   if ctest --test-dir build/host -N -L "^$label\$" | grep -q '^Total Tests: 0$'; then

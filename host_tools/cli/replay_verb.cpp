@@ -19,11 +19,11 @@ void replay_on_bus(Pipeline& pipeline, ReplayOptions& options) {
   options.can.most_ticks = options.ticks;
   options.can.nodes.assign(options.nodes.begin(), options.nodes.end());
   const CanReplay done = replay_on_can(pipeline, options.can);
-  fmt::print("{}", can_replay_table(done.result));
-  if (const auto disabled = done.result.at("disabled_ticks").get<std::uint64_t>(); disabled > 0)
+  fmt::print("{}", can_replay_table(done));
+  if (const std::uint64_t disabled = done.drives.disabled_ticks; disabled > 0)
     throw DataError(fmt::format(
         "the enable input was low in {} ticks, and no torque goes out then: set it high and replay again", disabled));
-  if (!done.same)
+  if (!done.drives.bit_exact())
     throw DataError(fmt::format("drives and host differ: see {}", (pipeline.directory() / "can_replay.json").string()));
 }
 

@@ -407,7 +407,8 @@ class Comparison {
     GateData data = data_;
     const auto fitter = identify(project, data, progress_);
     TrainSettings settings = project_.train;
-    settings.inputs = PhysicalInputs::name;
+    // The state alone is what the methods above have; this one has memory.
+    if (settings.inputs == StateInputs::name) settings.inputs = PhysicalInputs::name;
     if (!by_swarm) settings.pso.reset();
     if (by_swarm && !settings.pso) settings.pso = PsoSettings{.particles = 12, .iterations = 15};
     const auto resume = by_swarm ? resume_file(name) : std::nullopt;

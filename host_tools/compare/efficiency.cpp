@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include <nlohmann/json.hpp>
 
 #include "host_tools/compare/compare.hpp"
@@ -29,6 +32,25 @@ struct Source {
   double from_s = 0, length_s = 0, speed = 0;
 };
 
+/// Fast and slow logs part where two groups of log(speed) are tightest, least sum of squares about their means (Otsu
+/// 1979): the speed of the slowest fast one. 0: the fast ones are not twice as fast as the slow ones.
+double speed_between(const std::vector<Source>& sources) {
+  std::vector<double> speeds;
+  for (const Source& source : sources) speeds.push_back(std::log(source.speed));
+  std::sort(speeds.begin(), speeds.end());
+  const Eigen::Map<const Eigen::VectorXd> all(speeds.data(), static_cast<Eigen::Index>(speeds.size()));
+  const auto spread = [](const auto& part) { return (part.array() - part.mean()).square().sum(); };
+  double tightest = 1e300, between = 0;
+  for (Eigen::Index slow = 1; slow < all.size(); ++slow) {
+    const auto low = all.head(slow), high = all.tail(all.size() - slow);
+    const double both = spread(low) + spread(high);
+    if (both >= tightest) continue;
+    tightest = both;
+    between = high.mean() - low.mean() > std::log(2) ? std::exp(all[slow]) : 0;
+  }
+  return between * (1 - 1e-9);
+}
+
 class Efficiency {
  public:
   Efficiency(const fs::path& project, const fs::path& directory)
@@ -44,10 +66,9 @@ class Efficiency {
           (log.q.bottomRows(rows - 1) - log.q.topRows(rows - 1)).norm() / step / std::sqrt(static_cast<double>(rows));
       sources_.push_back({entry, log.t[0], step * static_cast<double>(rows), speed});
     }
-    double fastest = 0;
-    for (const Source& source : sources_) fastest = std::max(fastest, source.speed);
-    for (const Source& source : sources_) (source.speed < 0.5 * fastest ? slow_ : fast_).push_back(source);
-    if (slow_.empty() || fast_.empty()) {
+    const double between = speed_between(sources_);
+    for (const Source& source : sources_) (source.speed < between ? slow_ : fast_).push_back(source);
+    if (slow_.empty()) {
       throw DataError(fmt::format("{}: efficiency needs fast and slow train logs (less than half as fast)",
                                   project_.file.string()));
     }

@@ -158,6 +158,27 @@ void try_likely_load(const DeflectionRows& rows, const VectorXd& a, const std::v
   }
 }
 
+/// Standard deviations where the load is as uncertain as the base parameters make it, in all directions: a compliance
+/// is deflection over load, and link encoders know the deflection far better than torque knows the load.
+///   Cov = s^2 (X^T X + s^2 diag(0, 1))^-1, X = [columns, d deflection / d z], s^2 the variance of the whitened rows
+void add_load_deviations(DeflectionRows rows, const VectorXd& a, const IdentifiedModel& model,
+                         const MatrixXd& covariance, DeflectionOptions options, bool with_rotor, DeflectionSet& set) {
+  options.load_uncertainty = 0;
+  rows.add_uncertainty(model, covariance, options, with_rotor);
+  const Index directions = rows.z().size();
+  if (directions == 0) return;
+  const MatrixXd own = design(rows, set.parts);
+  VectorXd theta = VectorXd::Zero(own.cols());
+  theta.tail(set.theta.size()) = set.theta;
+  MatrixXd x(own.rows(), own.cols() + directions);
+  x << own, slopes(rows, set, theta);
+  x = rows.whiten(x, a);
+  MatrixXd gram = x.transpose() * x;
+  gram.diagonal().tail(directions).array() += set.noise;
+  const VectorXd variances = SymmetricSolver(gram).inverse().diagonal() * set.noise;
+  set.std = variances.segment(own.cols() - set.theta.size(), set.theta.size()).cwiseMax(0).cwiseSqrt();
+}
+
 /// A set with each of the parts that it does not have.
 std::vector<Moved> extended(const DeflectionRows& rows, const VectorXd& a, const Moved& best,
                             const std::vector<DeflectionPart>& full) {
@@ -247,6 +268,8 @@ DeflectionSet best_set(DeflectionRows& rows, const IdentifiedModel& model, const
     best = *chosen;
     if (best.z.size() > 0) rows.move(best.z);
   }
+  if (covariance.size() > 0 && any_bends(best.set))
+    add_load_deviations(rows, a, model, covariance, options, with_rotor, best.set);
   return best.set;
 }
 

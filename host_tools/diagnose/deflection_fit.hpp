@@ -18,7 +18,7 @@ struct DeflectionPart {
 struct DeflectionSet {
   std::vector<DeflectionPart> parts;
   Eigen::VectorXd theta;  ///< coefficients of the parts, in their order
-  Eigen::VectorXd std;
+  Eigen::VectorXd std;    ///< of best_set() with the load's uncertainty, else of rows with the load as it is
   double square = 1e300, score = -1e300;
   double likelihood = -1e300;  ///< score whatever the signs of the coefficients
   double noise = 0;            ///< variance of the whitened residual

@@ -175,7 +175,7 @@ class Diagnoser {
     } else {
       for (const DeflectionEffect& effect : deflections_.found) {
         models_.current.joints[effect.joint].effects.push_back(effect.fit);
-        add_rotor(models_, effect);
+        add_rotor(models_, effect, options().prior.link_rotor);
       }
       refit(models_, logs_, plain(), 8);
     }
@@ -214,8 +214,8 @@ class Diagnoser {
       result.model.joints[j].effects.clear();
       result.nominal.joints[j].effects.clear();
     }
-    for (const auto& note : result.report["notes"]) notes_.push_back(note);
-    result.report["notes"] = notes_;
+    add_notes(result.report.notes);
+    result.report.notes = notes_;
     return result;
   }
   const std::vector<std::string>& notes() const { return notes_; }
@@ -228,11 +228,12 @@ class Diagnoser {
   const std::string& name_of(std::size_t j) const { return project_.robot.joints[j].name; }
 
   /// The rotor that a link encoder separates from the link.
-  static void add_rotor(Models& models, const DeflectionEffect& effect) {
+  /// @param share standard deviation of what is known of it, of itself
+  static void add_rotor(Models& models, const DeflectionEffect& effect, double share) {
     if (effect.rotor <= 0 || rotor_of(models.current.joints[effect.joint]) != nullptr) return;
     const IdentifiedModel& model = models.current;
     Rotor rotor{effect.joint, rotor_in_base(to_dh(model.robot), base_of(model), static_cast<Index>(effect.joint)),
-                effect.rotor, models.options.prior.link_rotor * effect.rotor};
+                effect.rotor, share * effect.rotor};
     bring_rotor(models, rotor, effect.rotor);
   }
 
@@ -332,7 +333,7 @@ class Diagnoser {
       for (EffectCandidate& fixed : models.fixed) {
         if (fixed.effect == effect.fit.effect && fixed.joint == effect.joint) fixed.shape = effect.fit.shape;
       }
-      add_rotor(models, effect);
+      add_rotor(models, effect, options().prior.refitted_rotor);
     }
     kept.found.insert(kept.found.end(), taken.found.begin(), taken.found.end());
     deflections_.found = kept.found;
@@ -371,7 +372,7 @@ class Diagnoser {
     alone.fixed = models_.fixed;
     alone.options = options();
     alone.smallest_step_s = models_.smallest_step_s;
-    for (const DeflectionEffect& effect : bent_already_) add_rotor(alone, effect);
+    for (const DeflectionEffect& effect : bent_already_) add_rotor(alone, effect, options().prior.link_rotor);
     for (int round = 0; round < 2; ++round) refit(alone, before, {}, 4);
     Outcome background;
     background.models = alone;

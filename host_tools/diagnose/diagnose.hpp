@@ -1,9 +1,9 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <vector>
 
+#include "host_tools/diagnose/diagnosis_result.hpp"
 #include "host_tools/diagnose/options.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/identify/identify.hpp"
@@ -13,7 +13,7 @@ namespace fxdyn {
 struct Diagnosis {
   IdentifiedModel nominal;  ///< base parameters and nominal effects (what a healthy session has beside them too)
   IdentifiedModel model;    ///< with the effects that were named
-  nlohmann::json report;    ///< diagnosis.json
+  DiagnosisResult report;
   std::vector<bool> still;  ///< joints that stand still: neither model has anything of their own
 };
 

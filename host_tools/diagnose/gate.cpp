@@ -126,8 +126,10 @@ bool holds(const Outcome& outcome, const Group& group, const HeldOut& held, std:
   if (group.on_body) return true;
   const std::size_t j = group.candidate.joint;
   if (held.alone[i][static_cast<Index>(j)] <= 0) return false;  // whatever it does at others
-  const double share = outcome.structured(j) ? options.least_share_in_structure : options.least_share;
-  return brings > share * gap_of(held)[static_cast<Index>(j)];
+  const double gap = gap_of(held)[static_cast<Index>(j)];
+  // With nothing left over the noise is what it says it is, and a small effect beside a large one is no less sure.
+  if (!outcome.structured(j)) return brings > std::min(options.sure_gain, options.least_share * gap);
+  return brings > options.least_share_in_structure * gap;
 }
 
 /// Mean squares of the filtered error on the logs that judge; empty: there are none.

@@ -89,7 +89,7 @@ NoiseModel estimate_noise(const LogColumns& columns, const BlockSolver& solver, 
     for (std::size_t l = 0; l < columns.logs().size(); ++l) {
       const Block& b = blocks.of_log[l];
       const VectorXd u = velocity_doubt(columns.logs()[l].log, j, columns.joint(l, j), columns.motion(l).dq.col(k),
-                                        columns.robot(l).structural().col(k), sigma, options.velocity_error);
+                                        columns.robot(l).structural().col(k), sigma);
       doubts[j].segment(b.first, b.count) = u;
       const bool use = columns.has_baseline() ? b.healthy : b.fits;
       if (use) parts.emplace_back((e.segment(b.first, b.count).array() / (1 + u.array()).sqrt()).matrix());

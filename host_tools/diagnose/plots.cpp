@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <numeric>
 
 #include "host_tools/effects/identified_model.hpp"
@@ -20,7 +19,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using nlohmann::json;
 namespace fs = std::filesystem;
 
 // Before in blue, after in orange; the cloud of the samples is mostly transparent behind their means.
@@ -125,18 +123,16 @@ Chart spectra(const Residuals& log, Index joint, const std::string& unit) {
 }
 
 /// On which joints there is something to see.
-std::vector<std::size_t> shown_joints(const json& diagnosis, std::size_t joints) {
+std::vector<std::size_t> shown_joints(const DiagnosisResult& diagnosis, std::size_t joints) {
   std::vector<bool> shown(joints, false);
-  const auto mark = [&](const json& index) {
-    if (index.is_number_integer() && index >= 1 && index <= joints) shown[index.get<std::size_t>() - 1] = true;
+  const auto mark = [&](std::size_t index) {
+    if (index >= 1 && index <= joints) shown[index - 1] = true;
   };
-  const json entries = diagnosis.value("joints", json::array());
-  for (std::size_t j = 0; j < entries.size(); ++j) {
-    const std::string verdict = entries[j].value("verdict", "");
-    if (verdict == "effects_found" || verdict == "unexplained") mark(entries[j].value("index", json(j + 1)));
+  for (const JointDiagnosis& joint : diagnosis.joints) {
+    if (joint.verdict == Verdict::effects_found || joint.verdict == Verdict::unexplained) mark(joint.index);
   }
-  for (const json& effect : diagnosis.value("robot_effects", json::array())) {
-    for (const json& index : effect.value("joints", json::array())) mark(index);
+  for (const NamedEffect& effect : diagnosis.robot_effects) {
+    for (const std::size_t index : effect.joints.value_or(std::vector<std::size_t>{})) mark(index);
   }
   std::vector<std::size_t> out;
   for (std::size_t j = 0; j < joints; ++j) {
@@ -148,7 +144,7 @@ std::vector<std::size_t> shown_joints(const json& diagnosis, std::size_t joints)
 }  // namespace
 
 std::vector<fs::path> write_diagnosis_plots(const IdentifiedModel& nominal, const IdentifiedModel& diagnosed,
-                                            const std::vector<ProcessedLog>& held_out, const json& diagnosis,
+                                            const std::vector<ProcessedLog>& held_out, const DiagnosisResult& diagnosis,
                                             const fs::path& directory) {
   for (std::size_t j = 0; j < diagnosed.robot.size(); ++j) fs::remove(diagnosis_plot(directory, j));
   std::vector<Residuals> logs;

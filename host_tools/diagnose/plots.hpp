@@ -1,9 +1,9 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json_fwd.hpp>
 #include <vector>
 
+#include "host_tools/diagnose/diagnosis_result.hpp"
 #include "host_tools/effects/forward.hpp"
 #include "host_tools/regression/dataset.hpp"
 
@@ -19,7 +19,7 @@ namespace fxdyn {
 std::vector<std::filesystem::path> write_diagnosis_plots(const IdentifiedModel& nominal,
                                                          const IdentifiedModel& diagnosed,
                                                          const std::vector<ProcessedLog>& held_out,
-                                                         const nlohmann::json& diagnosis,
+                                                         const DiagnosisResult& diagnosis,
                                                          const std::filesystem::path& directory);
 
 }  // namespace fxdyn

@@ -7,6 +7,7 @@
 #include "host_tools/diagnose/gain.hpp"
 #include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/regression/search_beside.hpp"
 #include "host_tools/regression/solver.hpp"
 
 namespace fxdyn::diagnosis {
@@ -33,19 +34,16 @@ class ShapeSearch {
   /// @param value of group(), see below
   void search(double& value, double ratio, double least, double most) {
     std::vector<MatrixXd> made;
-    for (int round = 0; round < rounds_; ++round, ratio = std::sqrt(ratio)) {
-      const double centre = value;
-      double next = centre;
-      for (const double there : {std::max(least, centre / ratio), std::min(most, centre * ratio)}) {
-        value = there;
-        const double square = gain(made);
-        if (square <= best_) continue;
-        best_ = square;
-        next = there;
-        best_columns_ = made;
-      }
-      value = next;
-    }
+    double best = value;
+    search_beside(best, ratio, rounds_, least, most, [&](double there) {
+      value = there;
+      const double square = gain(made);
+      if (square <= best_) return false;
+      best_ = square;
+      best_columns_ = made;
+      return true;
+    });
+    value = best;
   }
 
   /// The candidate as it is tried next.

@@ -45,11 +45,11 @@ struct VelocityError {
 
 VectorXd velocity_doubt(const ProcessedLog& log, std::size_t joint, const JointFit& friction,
                         const Eigen::Ref<const VectorXd>& velocity, const Eigen::Ref<const VectorXd>& load,
-                        double sigma, double velocity_error) {
+                        double sigma) {
   const EffectFit* coulomb = friction.find(Coulomb::name);
   if (coulomb == nullptr || log.measured_dq.size() > 0 || !(position_noise(log.filter, joint) > 0))
     return VectorXd::Zero(log.rows());
-  const VelocityError error{velocity_error * velocity_noise(log.filter, joint, log.step_s),
+  const VelocityError error{velocity_noise(log.filter, joint, log.step_s),
                             position_band(log.filter, log.step_s) * log.filter.encoder_step[joint]};
   const double width = friction.sign_width;
   const auto [amplitude, of_load] = sign_friction(friction, *coulomb);

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "host_tools/diagnose/where.hpp"
 #include "host_tools/effects/effects.hpp"
@@ -21,21 +20,19 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using nlohmann::json;
-
 bool is_validate(const ProcessedLog& log) { return log.role == Role::validate; }
 
 /// @param rated torque [N*m | N]
-json parameters_json(const EffectFit& fit, const Joint& joint, double rated) {
-  json out = json::array();
+std::vector<NamedParameter> parameters_of(const EffectFit& fit, const Joint& joint, double rated) {
+  std::vector<NamedParameter> out;
   const EffectInfo& info = *find_effect(fit.effect);
   const auto add = [&](const ParameterInfo& p, double value, const std::vector<double>& std, std::size_t i) {
     const bool turns = joint.type == JointType::revolute;
-    json one = {{"name", p.name}, {"value", value}, {"unit", turns ? p.unit : p.unit_prismatic}};
+    NamedParameter one{std::string(p.name), std::string(turns ? p.unit : p.unit_prismatic), value, {}};
     // A torque that is less known than the joint's whole is shared with another effect, as a spring's offset.
     const bool known = i < std.size() && std[i] > 0 && !(p.unit == "N*m" && rated > 0 && std[i] > rated);
-    one["std"] = known ? json(std[i]) : json(nullptr);
-    out.push_back(one);
+    if (known) one.std = std[i];
+    out.push_back(std::move(one));
   };
   for (std::size_t i = 0; i < info.shape.size(); ++i) add(info.shape[i], fit.shape[i], fit.shape_std, i);
   for (std::size_t i = 0; i < info.linear.size(); ++i) add(info.linear[i], fit.linear[i], fit.linear_std, i);
@@ -48,7 +45,7 @@ VectorXd error_of(const ProcessedLog& log, const MatrixXd& torque, std::size_t j
   return log.filter_columns(log.tau.col(j) - torque.col(j)).col(0);
 }
 
-/// Writes diagnosis.json.
+/// Makes the result of what was concluded.
 class ReportWriter {
  public:
   explicit ReportWriter(const Conclusion& conclusion)
@@ -86,18 +83,17 @@ class ReportWriter {
     });
   }
 
-  json all() {
-    json joints = json::array();
+  DiagnosisResult all() {
+    DiagnosisResult out;
     for (std::size_t j = 0; j < conclusion_.model.joints.size(); ++j)
-      joints.push_back(conclusion_.still[j] ? still(j) : moving(j));
-    json resembles = json::array();
-    const json robot = of_robot(resembles);
+      out.joints.push_back(conclusion_.still[j] ? still(j) : moving(j));
+    out.robot_effects = of_robot(out.resembles);
     // A joint whose gap a load closes is explained by it.
-    for (json& joint : joints) {
-      const bool reached = std::any_of(robot.begin(), robot.end(), [&](const json& r) {
-        return std::find(r["joints"].begin(), r["joints"].end(), joint["index"]) != r["joints"].end();
+    for (JointDiagnosis& joint : out.joints) {
+      const bool reached = std::any_of(out.robot_effects.begin(), out.robot_effects.end(), [&](const NamedEffect& e) {
+        return std::find(e.joints->begin(), e.joints->end(), joint.index) != e.joints->end();
       });
-      if (reached && joint["verdict"] == "nothing_missing") joint["verdict"] = "effects_found";
+      if (reached && joint.verdict == Verdict::nothing_missing) joint.verdict = Verdict::effects_found;
     }
     for (const std::string& effect : conclusion_.outcome.not_identifiable.back()) {
       // What of a load or a tilt is not part of the base parameters, the poses show.
@@ -105,24 +101,22 @@ class ReportWriter {
                          problem_.has_baseline() ? "other poses and loads"
                                                  : "the same motions recorded without it (role = \"baseline\")"));
     }
-    const auto any = [&](const char* verdict) {
-      return std::any_of(joints.begin(), joints.end(), [&](const json& joint) { return joint["verdict"] == verdict; });
+    const auto any = [&](Verdict verdict) {
+      return std::any_of(out.joints.begin(), out.joints.end(),
+                         [&](const JointDiagnosis& joint) { return joint.verdict == verdict; });
     };
-    const char* verdict = any("unexplained") || !resembles.empty()                ? "unexplained"
-                          : any("effects_found") || any_effect_ || !robot.empty() ? "effects_found"
-                          : any("not_excited")                                    ? "not_excited"
-                                                                                  : "nothing_missing";
-    return {{"schema", "fxdyn.diagnosis/1"},
-            {"verdict", verdict},
-            {"joints", joints},
-            {"robot_effects", robot},
-            {"resembles", resembles},
-            {"not_identifiable", conclusion_.outcome.not_identifiable.back()},
-            {"next_experiment", next_},
-            {"gate", gate_of(conclusion_.now)},
-            {"figures_on", figures_on_},
-            {"baseline", problem_.has_baseline()},
-            {"notes", notes_}};
+    const bool found = any(Verdict::effects_found) || any_effect_ || !out.robot_effects.empty();
+    out.verdict = any(Verdict::unexplained) || !out.resembles.empty() ? Verdict::unexplained
+                  : found                                             ? Verdict::effects_found
+                  : any(Verdict::not_excited)                         ? Verdict::not_excited
+                                                                      : Verdict::nothing_missing;
+    out.not_identifiable = conclusion_.outcome.not_identifiable.back();
+    out.next_experiment = next_;
+    out.gate = gate_of(conclusion_.now);
+    out.figures_on = figures_on_;
+    out.baseline = problem_.has_baseline();
+    out.notes = notes_;
+    return out;
   }
 
  private:
@@ -183,45 +177,34 @@ class ReportWriter {
                                   [](const EffectFit& body) { return body.named && body.effect == GravityTilt::name; });
   }
 
-  json effect_json(const EffectFit& fit, const EffectId& id, double closed) {
-    json alternatives = json::array();
+  NamedEffect named(const EffectFit& fit, const EffectId& id, double closed) {
+    NamedEffect out;
     const auto found = std::find_if(conclusion_.outcome.found.begin(), conclusion_.outcome.found.end(),
                                     [&](const Finding& f) { return f.id == id; });
     const bool known = found != conclusion_.outcome.found.end();
     for (const Alternative& a : known ? found->alternatives : std::vector<Alternative>{}) {
       const bool body = find_effect(a.candidate.effect)->acts_on == ActsOn::body;
       if (!id.body && !body && a.candidate.joint != id.joint) continue;
-      if (std::find(alternatives.begin(), alternatives.end(), a.candidate.effect) != alternatives.end()) continue;
-      alternatives.push_back(a.candidate.effect);
+      if (std::find(out.alternatives.begin(), out.alternatives.end(), a.candidate.effect) != out.alternatives.end())
+        continue;
+      out.alternatives.push_back(a.candidate.effect);
       const std::size_t joint = id.body && !body ? a.candidate.joint : id.joint;
       const std::string place = id.body && body ? "" : fmt::format(" at joint {}", joint + 1);
       advise(
           fmt::format("{} or {}{}: {}", fit.effect, a.candidate.effect, place, cure(fit.effect, a.candidate.effect)));
     }
-    return {{"effect", fit.effect},
-            {"parameters", parameters_json(fit, joint_of(id.joint), conclusion_.model.joints[id.joint].rated_torque)},
-            {"score", known ? found->score : 0.0},
-            {"held_out_closure", closed},
-            {"alternatives", alternatives}};
+    out.effect = fit.effect;
+    out.parameters = parameters_of(fit, joint_of(id.joint), conclusion_.model.joints[id.joint].rated_torque);
+    out.score = known ? found->score : 0.0;
+    out.held_out_closure = closed;
+    return out;
   }
 
-  json still(std::size_t j) {
-    json unseen = json::array();
-    for (const std::string_view effect : joint_effect_names()) unseen.push_back(effect);
+  JointDiagnosis still(std::size_t j) {
+    JointDiagnosis out{joint_of(j).name, joint_of(j).torque_unit(), j + 1, Verdict::not_excited};
+    for (const std::string_view effect : joint_effect_names()) out.not_identifiable.emplace_back(effect);
     advise(fmt::format("record a log in which joint {} moves", j + 1));
-    return {{"joint", joint_of(j).name},
-            {"index", j + 1},
-            {"unit", joint_of(j).torque_unit()},
-            {"verdict", "not_excited"},
-            {"gap_before", nullptr},
-            {"gap_after", nullptr},
-            {"noise_floor", nullptr},
-            {"closure", nullptr},
-            {"where", json::array()},
-            {"effects", json::array()},
-            {"resembles", json::array()},
-            {"not_identifiable", unseen},
-            {"lack_of_fit", {{"state_p", nullptr}, {"time_p", nullptr}}}};
+    return out;
   }
 
   /// RMS errors of a joint [N*m | N], and its errors over the logs that are shown.
@@ -260,10 +243,10 @@ class ReportWriter {
   }
 
   /// Effects that were named at a joint. @param resembles those that are not believed
-  json effects_of(std::size_t j, json& resembles) {
+  std::vector<NamedEffect> effects_of(std::size_t j, std::vector<std::string>& resembles) {
     const auto k = static_cast<Index>(j);
     const Gate& gate = conclusion_.gate;
-    json out = json::array();
+    std::vector<NamedEffect> out;
     const auto& fits = conclusion_.model.joints[j].effects;
     for (std::size_t e = 0; e < fits.size(); ++e) {
       const EffectId id{false, j, e};
@@ -280,27 +263,28 @@ class ReportWriter {
             joint_of(j).name));
         continue;
       }
-      json one = effect_json(fits[e], id, gate.gap[k] > 0 ? gate.held.alone[i][k] / gate.gap[k] : 0);
-      one["model_share"] = model_share(j, e);
+      NamedEffect one = named(fits[e], id, gate.gap[k] > 0 ? gate.held.alone[i][k] / gate.gap[k] : 0);
+      one.model_share = model_share(j, e);
       out.push_back(std::move(one));
     }
     for (const DeflectionEffect& seen : conclusion_.deflections.found) {
-      if (seen.joint == j) out.push_back(deflection_json(seen));
+      if (seen.joint == j) out.push_back(named(seen));
     }
     return out;
   }
 
-  json deflection_json(const DeflectionEffect& seen) const {
+  NamedEffect named(const DeflectionEffect& seen) const {
     const JointFit& joint = conclusion_.model.joints[seen.joint];
     const auto place = std::find_if(joint.effects.begin(), joint.effects.end(),
                                     [&](const EffectFit& fit) { return fit.named && fit.effect == seen.fit.effect; });
-    return {{"effect", seen.fit.effect},
-            {"parameters", parameters_json(seen.fit, joint_of(seen.joint), joint.rated_torque)},
-            {"score", seen.score},
-            {"held_out_closure", seen.held_out ? json(seen.closure) : json(nullptr)},
-            {"signal", "q - qlink"},
-            {"alternatives", json::array()},
-            {"model_share", model_share(seen.joint, static_cast<std::size_t>(place - joint.effects.begin()))}};
+    NamedEffect out;
+    out.effect = seen.fit.effect;
+    out.parameters = parameters_of(seen.fit, joint_of(seen.joint), joint.rated_torque);
+    out.score = seen.score;
+    if (seen.held_out) out.held_out_closure = seen.closure;
+    out.signal = "q - qlink";
+    out.model_share = model_share(seen.joint, static_cast<std::size_t>(place - joint.effects.begin()));
+    return out;
   }
 
   void note_other_test_logs(std::size_t j, const Figures& figures) {
@@ -341,26 +325,23 @@ class ReportWriter {
         step > 0 ? fmt::format(" (steps of {:.2g} {})", step, joint_of(j).position_unit()) : std::string()));
   }
 
-  void advise_on_gap(std::size_t j, const json& regions) {
+  void advise_on_gap(std::size_t j, const std::vector<GapRegion>& regions) {
     std::string which;
     if (!regions.empty())
-      which = fmt::format(" where the gap sits ({} from {:.3g} to {:.3g})", regions[0]["signal"].get<std::string>(),
-                          regions[0]["from"].get<double>(), regions[0]["to"].get<double>());
+      which = fmt::format(" where the gap sits ({} from {:.3g} to {:.3g})", regions[0].signal, regions[0].from,
+                          regions[0].to);
     advise(fmt::format("record more of joint {}{}", j + 1, which));
   }
 
-  static json region_of(const Impacts& impacts) {
-    return {{"signal", "t"},
-            {"from", impacts.t - 0.05},
-            {"to", impacts.t + 0.05},
-            {"share_of_gap", nullptr},
-            {"log", impacts.log}};
+  static GapRegion region_of(const Impacts& impacts) {
+    return {"t", impacts.t - 0.05, impacts.t + 0.05, {}, impacts.log};
   }
 
-  json moving(std::size_t j) {
+  JointDiagnosis moving(std::size_t j) {
     const auto k = static_cast<Index>(j);
     const Figures of = figures(j);
-    json resembles = json::array(), effects = effects_of(j, resembles);
+    std::vector<std::string> resembles;
+    std::vector<NamedEffect> effects = effects_of(j, resembles);
     note_other_test_logs(j, of);
     const bool reached = robot_reaches(k), nothing_found = effects.empty() && !reached;
     const std::optional<Impacts>& impacts = conclusion_.impacts[j];
@@ -369,20 +350,22 @@ class ReportWriter {
     const bool structured = conclusion_.outcome.structured(j);
     const bool unexplained = (structured && (nothing_found || conclusion_.gate.remains[j])) || !resembles.empty() ||
                              (nothing_found && impacts);
-    const std::string verdict = unexplained ? "unexplained" : !effects.empty() ? "effects_found" : "nothing_missing";
+    const Verdict verdict = unexplained        ? Verdict::unexplained
+                            : !effects.empty() ? Verdict::effects_found
+                                               : Verdict::nothing_missing;
     any_effect_ |= !effects.empty();
     // What only bends leaves no gap in the torque, and noise alone has nothing to close.
     const bool of_torque =
         !resembles.empty() || reached || unexplained ||
-        std::any_of(effects.begin(), effects.end(), [](const json& e) { return !e.contains("signal"); });
-    const json closure = of_torque ? json(conclusion_.gate.closure[k]) : json(nullptr);
+        std::any_of(effects.begin(), effects.end(), [](const NamedEffect& e) { return e.signal.empty(); });
     if (!effects.empty() || !resembles.empty() || reached) note_risen_error(j, of);
-    std::sort(effects.begin(), effects.end(), [](const json& a, const json& b) { return a["score"] > b["score"]; });
-    json regions = json::array();
+    std::sort(effects.begin(), effects.end(),
+              [](const NamedEffect& a, const NamedEffect& b) { return a.score > b.score; });
+    std::vector<GapRegion> regions;
     const bool only_impacts = impacts && nothing_found && resembles.empty() && !structured;
     if (only_impacts) {
       regions.push_back(region_of(*impacts));
-    } else if (unexplained || (verdict != "nothing_missing" && of_torque) ||
+    } else if (unexplained || (verdict != Verdict::nothing_missing && of_torque) ||
                of.before >= report_.much_larger * of.floor) {
       regions = where(conclusion_.nominal, shown_, j, of.errors, std::min(of.floor, of.before), report_);
     }
@@ -392,19 +375,18 @@ class ReportWriter {
     } else if (unexplained) {
       advise_on_gap(j, regions);
     }
-    return {{"joint", joint_of(j).name},
-            {"index", j + 1},
-            {"unit", joint_of(j).torque_unit()},
-            {"verdict", verdict},
-            {"gap_before", of.before},
-            {"gap_after", of.after},
-            {"noise_floor", std::min(of.floor, of.after)},
-            {"closure", closure},
-            {"where", regions},
-            {"effects", effects},
-            {"resembles", resembles},
-            {"not_identifiable", conclusion_.outcome.not_identifiable[j]},
-            {"lack_of_fit", {{"state_p", lack.state_p}, {"time_p", lack.time_p}}}};
+    JointDiagnosis out{joint_of(j).name, joint_of(j).torque_unit(), j + 1, verdict};
+    out.gap_before = of.before;
+    out.gap_after = of.after;
+    out.noise_floor = std::min(of.floor, of.after);
+    if (of_torque) out.closure = conclusion_.gate.closure[k];
+    out.where = std::move(regions);
+    out.effects = std::move(effects);
+    out.resembles = std::move(resembles);
+    out.not_identifiable = conclusion_.outcome.not_identifiable[j];
+    out.state_p = lack.state_p;
+    out.time_p = lack.time_p;
+    return out;
   }
 
   /// Whether a named effect on the robot is felt at a joint.
@@ -418,8 +400,8 @@ class ReportWriter {
     return false;
   }
 
-  json of_robot(json& resembles) {
-    json robot = json::array();
+  std::vector<NamedEffect> of_robot(std::vector<std::string>& resembles) {
+    std::vector<NamedEffect> robot;
     for (std::size_t e = 0; e < conclusion_.model.body.size(); ++e) {
       const EffectId id{true, 0, e};
       const std::size_t i = conclusion_.gate.place(problem_, id);
@@ -430,14 +412,13 @@ class ReportWriter {
                            conclusion_.model.body[e].effect));
         continue;
       }
-      json one = effect_json(conclusion_.model.body[e], id, conclusion_.gate.robot_closure[i]);
-      json which = json::array();
+      NamedEffect one = named(conclusion_.model.body[e], id, conclusion_.gate.robot_closure[i]);
+      one.joints.emplace();
       for (std::size_t j = 0; j < conclusion_.model.joints.size(); ++j) {
         if (conclusion_.gate.held.alone[i][static_cast<Index>(j)] > problem_.models().options.gate.least_felt)
-          which.push_back(j + 1);
+          one.joints->push_back(j + 1);
       }
-      one["joints"] = which;
-      one["model_share"] = body_share(e);
+      one.model_share = body_share(e);
       robot.push_back(std::move(one));
     }
     return robot;
@@ -463,6 +444,6 @@ std::string gate_of(const std::vector<ProcessedLog>& now) {
                          : "train logs, each judged by coefficients fitted to the others";
 }
 
-json verdicts(const Conclusion& conclusion) { return ReportWriter(conclusion).all(); }
+DiagnosisResult verdicts(const Conclusion& conclusion) { return ReportWriter(conclusion).all(); }
 
 }  // namespace fxdyn::diagnosis

@@ -1,10 +1,11 @@
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "host_tools/diagnose/deflection.hpp"
+#include "host_tools/diagnose/diagnosis_result.hpp"
 #include "host_tools/diagnose/gate.hpp"
 #include "host_tools/diagnose/impacts.hpp"
 
@@ -25,7 +26,7 @@ struct Conclusion {
 
 /// What judged the names.
 std::string gate_of(const std::vector<ProcessedLog>& now);
-/// diagnosis.json; its notes are those that the figures ask for.
-nlohmann::json verdicts(const Conclusion& conclusion);
+/// The answer; its notes are those that the figures ask for.
+DiagnosisResult verdicts(const Conclusion& conclusion);
 
 }  // namespace fxdyn::diagnosis

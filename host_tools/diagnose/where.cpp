@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
@@ -152,8 +151,9 @@ Region in_frequency(const std::vector<const ProcessedLog*>& logs, const std::vec
 
 }  // namespace
 
-nlohmann::json where(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs, std::size_t joint,
-                     const std::vector<VectorXd>& error, double noise, const ReportOptions& options) {
+std::vector<GapRegion> where(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs,
+                             std::size_t joint, const std::vector<VectorXd>& error, double noise,
+                             const ReportOptions& options) {
   const Samples samples = samples_of(model, logs, joint, error);
   const auto total = static_cast<double>(samples.square.size());
   const Whole all{samples.square.sum() - noise * noise * total, total};
@@ -169,12 +169,10 @@ nlohmann::json where(const IdentifiedModel& model, const std::vector<const Proce
   if (const Region region = in_direction(samples, noise); region.to > region.from) regions.push_back(region);
   add(in_frequency(logs, error, noise));
   std::sort(regions.begin(), regions.end(), [](const Region& a, const Region& b) { return a.contrast > b.contrast; });
-  nlohmann::json out = nlohmann::json::array();
+  std::vector<GapRegion> out;
   for (const Region& region : regions) {
     if (out.size() >= most_regions || (region.contrast < options.least_contrast && !out.empty())) break;
-    out.push_back(
-        {{"signal", region.signal}, {"from", region.from}, {"to", region.to}, {"share_of_gap", region.share}});
-    if (!region.log.empty()) out.back()["log"] = region.log;
+    out.push_back({region.signal, region.from, region.to, region.share, region.log});
   }
   return out;
 }

@@ -1,7 +1,8 @@
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
+#include <vector>
 
+#include "host_tools/diagnose/diagnosis_result.hpp"
 #include "host_tools/diagnose/options.hpp"
 #include "host_tools/effects/forward.hpp"
 #include "host_tools/regression/dataset.hpp"
@@ -9,9 +10,10 @@
 namespace fxdyn::diagnosis {
 
 /// Where a gap sits: the regions of velocity, position, acceleration, load, direction, time and frequency that hold
-/// clearly more of its power than of the samples, the most telling first: [{signal, from, to, share_of_gap}].
+/// clearly more of its power than of the samples, the most telling first.
 /// @param error filtered residual of the joint over each log, full rate @param noise its noise floor
-nlohmann::json where(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs, std::size_t joint,
-                     const std::vector<Eigen::VectorXd>& error, double noise, const ReportOptions& options);
+std::vector<GapRegion> where(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs,
+                             std::size_t joint, const std::vector<Eigen::VectorXd>& error, double noise,
+                             const ReportOptions& options);
 
 }  // namespace fxdyn::diagnosis

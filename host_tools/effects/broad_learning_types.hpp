@@ -25,6 +25,7 @@ void with_bls_types(const BroadLearningFit& fit, Visit&& visit) {
     activation.template operator()<RampNodes>();
   };
   inputs.template operator()<PhysicalInputs>();
+  inputs.template operator()<BristlesInputs>();
   inputs.template operator()<ExtendedInputs>();
   inputs.template operator()<StateInputs>();
   if (!found)

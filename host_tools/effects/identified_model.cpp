@@ -7,6 +7,7 @@
 #include "host_tools/effects/broad_learning_types.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/link_parameters.hpp"
+#include "host_tools/effects/lugre_check.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
 #include "model/version.hpp"
@@ -152,6 +153,7 @@ json quantity_json(double value, double std, std::string_view unit) {
 template <class Fit, class Visit>
 void for_each_scale(Fit& fit, Visit&& visit) {
   const bool state = fit.inputs == StateInputs::name, extended = fit.inputs == ExtendedInputs::name;
+  const bool bristles = fit.inputs == BristlesInputs::name;
   visit("reference_velocity", fit.reference_velocity);
   visit("span", fit.span);
   if (!state) visit("distances", fit.distances);
@@ -159,8 +161,12 @@ void for_each_scale(Fit& fit, Visit&& visit) {
     visit("torque", fit.torque);
     visit("wavenumber", fit.wavenumber);
   }
+  if (bristles) {
+    visit("stribeck", fit.stribeck);
+    visit("share", fit.share);
+  }
+  if (state || bristles) visit("velocity", fit.velocity);
   if (state) {
-    visit("velocity", fit.velocity);
     visit("middle", fit.middle);
     visit("half_range", fit.half_range);
   }
@@ -253,6 +259,13 @@ JointFit to_joint(const json& j) {
   if (j.contains("flexible")) fit.flexible = to_flexible(j.at("flexible"));
   if (j.contains("bls")) fit.bls = to_bls(j.at("bls"));
   return fit;
+}
+
+void check_friction(const IdentifiedModel& model) {
+  for (std::size_t j = 0; j < model.joints.size(); ++j) {
+    if (const auto why = lugre_is_no_friction(model.joints[j], model.joints[j].dq_limit))
+      throw InputError(fmt::format("joint {} ({}): {}", j + 1, model.robot.joints[j].name, *why));
+  }
 }
 
 }  // namespace
@@ -370,6 +383,7 @@ IdentifiedModel read_model(const std::filesystem::path& file) {
     if (model.inertia.size() != model.robot.size() || model.joints.size() != model.robot.size()) {
       throw InputError("robot, inertia and joints differ in length");
     }
+    check_friction(model);
     for (const json& p : j.at("base_parameters")) {
       model.base.push_back(
           {p.at("column"), p.at("name"), p.at("value"), p.at("std"), p.value("essential", true), p.at("expression")});

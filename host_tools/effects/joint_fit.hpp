@@ -20,7 +20,7 @@ struct EffectFit {
 
 /// The BLS of one joint (model/broad_learning.hpp).
 struct BroadLearningFit : BroadLearningScales {
-  std::string inputs = "physical";  ///< names of types there: physical, extended, state
+  std::string inputs = "physical";  ///< names of types there: physical, bristles, extended, state
   std::string activation = "tanh";  ///< tanh, relu
   Eigen::MatrixXd weights;          ///< nodes x (inputs + 1): input weights, bias [-]
   Eigen::VectorXd coefficients;     ///< of inputs, then nodes [N*m | N]

@@ -114,6 +114,8 @@ std::string scales_text(std::string_view inputs) {
   constexpr std::string_view physical = "1 / reference velocity, 1 / span, tick / distances";
   if (inputs == ExtendedInputs::name)
     return fmt::format("{}, 1 / torque, turns per unit of position, 1 / acceleration", physical);
+  if (inputs == BristlesInputs::name)
+    return fmt::format("{}, 1 / Stribeck velocity, 1 - share, 1 / velocity", physical);
   if (inputs == StateInputs::name)
     return "middle position, 1 / half range, 1 / velocity, 1 / acceleration, 1 / reference velocity, 1 / span";
   return std::string(physical);

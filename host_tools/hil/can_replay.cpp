@@ -258,35 +258,46 @@ CanDrives::Tick CanDrives::tick(const Eigen::VectorXd& q, const Eigen::VectorXd&
   return out;
 }
 
-json CanDrives::report() {
+DriveReport CanDrives::report() {
   const auto ms = [&](double share) { return 1e-6 * static_cast<double>(round_trips_.quantile(share).count()); };
-  json nodes = json::array();
+  DriveReport out{ticks_, equal_ticks_, disabled_ticks_, 0, ms(0.5), ms(0.99), ms(1), 0, {}};
   for (const Node& node : nodes_) {
-    json driven = json::array();
+    DriveReport::Node one{node.id, node.board, node.version, node.crc, {}, 0, {}};
     for (std::size_t j = 0; j < joints_.size(); ++j) {
-      if ((node.outputs >> j & 1U) != 0) driven.push_back(j + 1);
+      if ((node.outputs >> j & 1U) != 0) one.joints.push_back(j);
     }
-    json counters = json::object();
     for (const dictionary::Described& described : dictionary::described) {
       if (described.entry.index != dictionary::counter_record) continue;
-      counters[described.name] = master_.read(node.id, described.entry.index, described.entry.sub_index);
+      one.counters[described.name] = master_.read(node.id, described.entry.index, described.entry.sub_index);
     }
+    one.most_cost_of_a_tick = master_.read(node.id, dictionary::cost_record, 4);
+    out.nodes.push_back(std::move(one));
+  }
+  out.frames_lost =
+      lost_ + (lockstep_ ? lockstep_->statistics().missing + lockstep_->statistics().late : 0) + master_.bus().lost();
+  out.ticks_per_second = busy_s_ > 0 ? static_cast<double>(ticks_) / busy_s_ : 0;
+  return out;
+}
+
+json to_json(const DriveReport& report) {
+  json nodes = json::array();
+  for (const DriveReport::Node& node : report.nodes) {
+    json driven = json::array();
+    for (const std::size_t joint : node.joints) driven.push_back(joint + 1);
     nodes.push_back({{"id", node.id},
                      {"board", node.board},
                      {"version", node.version},
-                     {"tables_crc", node.crc},
+                     {"tables_crc", node.tables_crc},
                      {"joints", driven},
-                     {"most_cost_of_a_tick", master_.read(node.id, dictionary::cost_record, 4)},
-                     {"counters", counters}});
+                     {"most_cost_of_a_tick", node.most_cost_of_a_tick},
+                     {"counters", node.counters}});
   }
-  const std::uint64_t lost =
-      lost_ + (lockstep_ ? lockstep_->statistics().missing + lockstep_->statistics().late : 0) + master_.bus().lost();
-  return {{"ticks", ticks_},
-          {"equal_ticks", equal_ticks_},
-          {"disabled_ticks", disabled_ticks_},
-          {"frames_lost", lost},
-          {"round_trip_ms", {{"p50", ms(0.5)}, {"p99", ms(0.99)}, {"max", ms(1)}}},
-          {"ticks_per_second", busy_s_ > 0 ? static_cast<double>(ticks_) / busy_s_ : 0},
+  return {{"ticks", report.ticks},
+          {"equal_ticks", report.equal_ticks},
+          {"disabled_ticks", report.disabled_ticks},
+          {"frames_lost", report.frames_lost},
+          {"round_trip_ms", {{"p50", report.p50_ms}, {"p99", report.p99_ms}, {"max", report.max_ms}}},
+          {"ticks_per_second", report.ticks_per_second},
           {"nodes", nodes}};
 }
 

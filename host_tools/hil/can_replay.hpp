@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -13,6 +14,28 @@
 #include "host_tools/export/export.hpp"
 
 namespace fxdyn {
+
+/// What the drives of a bus did, as can_replay.json has it.
+struct DriveReport {
+  struct Node {
+    std::uint8_t id = 0;
+    std::string board, version;
+    std::uint32_t tables_crc = 0;
+    std::vector<std::size_t> joints;  ///< from 0
+    std::uint32_t most_cost_of_a_tick = 0;
+    std::map<std::string, std::uint32_t> counters;
+  };
+  std::uint64_t ticks = 0, equal_ticks = 0;
+  std::uint64_t disabled_ticks = 0;  ///< a node's enable input was low
+  std::uint64_t frames_lost = 0;
+  double p50_ms = 0, p99_ms = 0, max_ms = 0;  ///< round trip
+  double ticks_per_second = 0;
+  std::vector<Node> nodes;
+
+  /// Every torque frame is the host's, and none was lost.
+  bool bit_exact() const { return equal_ticks == ticks && frames_lost == 0; }
+};
+nlohmann::json to_json(const DriveReport& report);
 
 /// Drive nodes on a CAN bus that together put out the torques of a model, in lockstep with the host: all setpoints of a
 /// tick, SYNC, then it waits for all torques. The host computes what every torque frame has to say, byte for byte,
@@ -47,9 +70,8 @@ class CanDrives {
   /// One tick of the setpoints q, dq, ddq of all joints.
   Tick tick(const Eigen::VectorXd& q, const Eigen::VectorXd& dq, const Eigen::VectorXd& ddq);
 
-  /// {ticks, equal_ticks, disabled_ticks (a node's enable input was low), frames_lost, round_trip_ms: {p50, p99, max},
-  /// ticks_per_second, nodes: [{id, board, version, tables_crc, joints, cost, counters}]}
-  nlohmann::json report();
+  /// Of all ticks so far; asks the nodes for their counters.
+  DriveReport report();
 
  private:
   struct Node {

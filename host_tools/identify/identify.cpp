@@ -39,6 +39,7 @@ class Identification {
     const std::vector<JointFit> design = nominal_design();
     progress_.stage("building the regressor", 1);
     fitter_ = std::make_unique<Fitter>(project_.robot, data_.logs, design);
+    set_prior(*fitter_, project_);
     check_saturation();
     for (const Suspicion& suspicion : check_plausible(project_.robot, data_.logs, design, options_.plausible)) {
       if (suspicion.severity == Severity::error) throw DataError(suspicion.text);
@@ -205,6 +206,16 @@ void weigh(Fitter& fitter, const IdentifySettings& settings) {
     fitter.reweight();
   }
   if (settings.method == "rls" && settings.forgetting < 1) fitter.forget(settings.forgetting);
+}
+
+void set_prior(Fitter& fitter, const Project& project) {
+  if (!project.identify.prior_error) return;
+  try {
+    fitter.set_prior(prior_of_urdf(project.robot, fitter.chain(), fitter.base(), *project.identify.prior_error));
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: identify.prior_error: {}; add it, or leave prior_error out",
+                                 project.file.string(), error.what()));
+  }
 }
 
 std::string torque_lead_note(double lead_s) {

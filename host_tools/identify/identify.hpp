@@ -14,6 +14,10 @@ namespace fxdyn {
 /// Weights of joints and rows by the project's method.
 void weigh(Fitter& fitter, const IdentifySettings& settings);
 
+/// [identify] prior_error: what the URDF says of the links takes part in the fit; else nothing happens.
+/// @throws InputError: the URDF does not say it of every link
+void set_prior(Fitter& fitter, const Project& project);
+
 /// Structure and friction: widths and shapes searched on the gate data, coefficients by (weighted) least squares.
 /// Returns the fitter with the chosen designs. What it leaves out for want of data goes into data.notes.
 std::unique_ptr<Fitter> identify(const Project& project, GateData& data, Progress& progress,

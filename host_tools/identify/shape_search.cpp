@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/regression/search_beside.hpp"
 #include "host_tools/support/error.hpp"
 
 namespace fxdyn {
@@ -26,19 +27,15 @@ Candidate search(const Fitter& fitter, std::size_t joint, const JointFit& start,
     JointFit design = start;
     set(design, value);
     const Judgement judgement = fitter.held_out_with(joint, design, {0.0})[0];
-    if (judgement.rmse < best.judgement.rmse) {
-      best = {design, judgement};
-      best_value = value;
-    }
+    if (!(judgement.rmse < best.judgement.rmse)) return false;
+    best = {design, judgement};
+    return true;
   };
-  constexpr int points = 12;
-  for (const double value : geometric(from, to, points)) attempt(value);
-  double step = std::pow(to / from, 0.5 / (points - 1));
-  for (int round = 0; round < 2; ++round, step = std::sqrt(step)) {
-    const double centre = best_value;
-    attempt(std::max(from, centre / step));
-    attempt(std::min(to, centre * step));
+  constexpr int points = 12, rounds = 2;
+  for (const double value : geometric(from, to, points)) {
+    if (attempt(value)) best_value = value;
   }
+  search_beside(best_value, std::pow(to / from, 0.5 / (points - 1)), rounds, from, to, attempt);
   return best;
 }
 
@@ -105,10 +102,29 @@ std::vector<double> starts(const JointFit& before, const EffectInfo& info, const
   return geometric(from * std::pow(to / from, 0.1), from * std::pow(to / from, 0.9), 4);
 }
 
-/// Several shapes: the best of a coarse grid, then one after the other, each by steps that become smaller.
+/// One shape after the other, each by steps that become smaller.
+template <class Attempt>
+void walk(Candidate& best, const std::vector<ShapeRange>& ranges, Attempt&& attempt) {
+  constexpr int sweeps = 3, rounds = 3;
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
+    for (std::size_t i = 0; i < ranges.size(); ++i) {
+      std::vector<double> shape = best.design.effects.back().shape;
+      double best_value = shape[i];
+      search_beside(best_value, sweep == 0 ? 1.5 : 1.2, rounds, ranges[i].from, ranges[i].to, [&](double value) {
+        shape[i] = value;
+        const Candidate one = attempt(shape);
+        if (!(one.judgement.rmse < best.judgement.rmse)) return false;
+        best = one;
+        return true;
+      });
+    }
+  }
+}
+
+/// Several shapes: from the best points of a coarse grid, since there are more valleys than one.
 Candidate search_shapes(const Fitter& fitter, std::size_t joint, JointFit design, const EffectInfo& info,
                         const Scales& scales) {
-  constexpr int sweeps = 3, rounds = 3;
+  constexpr std::size_t most_walks = 5;
   std::vector<std::vector<double>> grid;
   std::vector<ShapeRange> ranges;
   for (const ParameterInfo& shape : info.shape) {
@@ -116,26 +132,18 @@ Candidate search_shapes(const Fitter& fitter, std::size_t joint, JointFit design
     ranges.push_back({std::max(shape.lower, range.from), std::min(shape.upper, range.to)});
     grid.push_back(starts(fitter.design(joint), info, shape, ranges.back()));
   }
-  Candidate best{design, {}};
   const auto attempt = [&](const std::vector<double>& shape) {
     design.effects.back().shape = shape;
-    const Judgement judgement = fitter.held_out_with(joint, design, {0.0})[0];
-    if (judgement.rmse < best.judgement.rmse) best = {design, judgement};
+    return Candidate{design, fitter.held_out_with(joint, design, {0.0})[0]};
   };
-  for (const std::vector<double>& shape : combinations(grid)) attempt(shape);
-  for (int sweep = 0; sweep < sweeps; ++sweep) {
-    for (std::size_t i = 0; i < ranges.size(); ++i) {
-      double ratio = sweep == 0 ? 1.5 : 1.2;
-      for (int round = 0; round < rounds; ++round, ratio = std::sqrt(ratio)) {
-        const std::vector<double> centre = best.design.effects.back().shape;
-        for (const double value :
-             {std::max(ranges[i].from, centre[i] / ratio), std::min(ranges[i].to, centre[i] * ratio)}) {
-          std::vector<double> shape = centre;
-          shape[i] = value;
-          attempt(shape);
-        }
-      }
-    }
+  std::vector<Candidate> all;
+  for (const std::vector<double>& shape : combinations(grid)) all.push_back(attempt(shape));
+  std::stable_sort(all.begin(), all.end(),
+                   [](const Candidate& x, const Candidate& y) { return x.judgement.rmse < y.judgement.rmse; });
+  Candidate best{design, {}};
+  for (std::size_t i = 0; i < std::min(most_walks, all.size()); ++i) {
+    walk(all[i], ranges, attempt);
+    if (all[i].judgement.rmse < best.judgement.rmse) best = all[i];
   }
   return best;
 }

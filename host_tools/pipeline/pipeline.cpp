@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/diagnose/diagnose.hpp"
+#include "host_tools/diagnose/diagnosis_result.hpp"
 #include "host_tools/diagnose/evidence.hpp"
 #include "host_tools/diagnose/plots.hpp"
 #include "host_tools/effects/identified_model.hpp"
@@ -89,9 +90,8 @@ void Pipeline::check_motion() {
 std::optional<std::pair<int, std::string>> Pipeline::not_excited() const {
   const fs::path file = directory_ / "diagnosis.json";
   if (!fs::exists(file)) return {};
-  const json report = json::parse(read_file(file));
-  for (const json& joint : report.at("joints")) {
-    if (joint.at("verdict") == "not_excited") return {{joint.at("index"), joint.at("joint")}};
+  for (const JointDiagnosis& joint : diagnosis_of(json::parse(read_file(file))).joints) {
+    if (joint.verdict == Verdict::not_excited) return {{static_cast<int>(joint.index), joint.joint}};
   }
   return {};
 }
@@ -175,15 +175,15 @@ void Pipeline::diagnose() {
   progress_.step();
   std::vector<ProcessedLog> held_out = logs(Role::test);
   if (held_out.empty()) held_out = logs(Role::validate);
-  json report = diagnosis.report;
-  report["evidence"] = evidence_json(nominal, model, held_out, diagnosis.still);
+  DiagnosisResult report = diagnosis.report;
+  report.evidence = evidence_json(nominal, model, held_out, diagnosis.still);
   progress_.step();
-  const json metrics = {{"schema", "fxdyn.metrics/1"},          {"gate", diagnosis.report.at("gate")},
+  const json metrics = {{"schema", "fxdyn.metrics/1"},          {"gate", report.gate},
                         {"base_parameters", model.base.size()}, {"notes", data().notes},
                         {"logs", to_json(stages.back().logs)},  {"stages", to_json(stages)}};
   write_file(directory_ / "nominal.json", to_json(nominal).dump(1) + "\n");
   write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
-  write_file(directory_ / "diagnosis.json", report.dump(1) + "\n");
+  write_file(directory_ / "diagnosis.json", to_json(report).dump(1) + "\n");
   write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
   std::string no_plots;
   try {

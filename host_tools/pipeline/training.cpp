@@ -47,6 +47,7 @@ Fitter Trainer::make_fitter() {
   kept_.mark_hidden(data_.logs);
   progress_.stage("building the regressor", 1);
   Fitter fitter(project_.robot, data_.logs, kept_.design());
+  set_prior(fitter, project_);
   fitter.set_torque_lead(diagnosed_.filter.torque_lead_s);
   weigh(fitter, project_.identify);
   progress_.step();

@@ -42,7 +42,7 @@ Names known_effects() {
 const Names signal_names{"t", "q", "dq", "ddq", "tau", "qlink", "temp"};
 const Names role_names{"baseline", "train", "validate", "test"};
 const Names method_names{"ls", "wls", "irls", "rls"};
-const Names input_names{"physical", "extended", "state"}, feature_names{"random", "sparse"};
+const Names input_names{"physical", "bristles", "extended", "state"}, feature_names{"random", "sparse"};
 const Names activation_names{"tanh", "sigmoid", "relu"};
 /// Words of a text.
 Names words(const char* text) {
@@ -200,6 +200,11 @@ class ProjectReader {
     if (const auto forgetting = table.find("forgetting")) {
       project_.identify.forgetting = forgetting->positive();
       if (project_.identify.forgetting > 1) forgetting->place().fail("expected more than 0, at most 1");
+    }
+    if (const auto error = table.find("prior_error")) {
+      project_.identify.prior_error = error->positive();
+      if (project_.identify.method == "ls")
+        error->place().fail("needs the residuals' variance: method wls, irls or rls");
     }
     if (const auto effects = table.find("effects")) {
       Names names;

@@ -27,9 +27,10 @@ struct LogEntry {
 struct IdentifySettings {
   std::string method = "wls";  ///< ls | wls | irls | rls
   std::optional<std::vector<std::string>> effects;
-  bool physical = true;    ///< pseudo-inertias positive definite, friction and rotor inertia not negative
-  bool essential = false;  ///< base parameters that do not matter are left out
-  double forgetting = 1;   ///< rls: what a second-old row counts
+  bool physical = true;               ///< pseudo-inertias positive definite, friction and rotor inertia not negative
+  bool essential = false;             ///< base parameters that do not matter are left out
+  double forgetting = 1;              ///< rls: what a second-old row counts
+  std::optional<double> prior_error;  ///< relative, of the URDF's masses: they take part in the fit
 };
 
 struct DiagnoseSettings {
@@ -47,7 +48,7 @@ struct PsoSettings {
 struct TrainSettings {
   bool enabled = true;
   std::uint64_t seed = 1;
-  std::string inputs = "physical";  ///< physical | extended | state
+  std::string inputs = "physical";  ///< physical | bristles | extended | state
   std::string features = "random";  ///< random | sparse
   std::optional<int> windows, nodes, enhancement;
   std::string activation = "tanh";   ///< tanh | sigmoid | relu

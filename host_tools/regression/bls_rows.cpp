@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "host_tools/signals/decimating_filter.hpp"
 #include "host_tools/support/vectors.hpp"
@@ -15,8 +16,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 
 constexpr int lanes = DecimatingFilter::lanes;
-constexpr int inputs = PhysicalInputs::size;
-static_assert(inputs < lanes);
 
 /// e^y = 2^k (even + odd) / (even - odd), |r| <= ln(2) / 2 what is left of y: Pade's approximant of fifth order over
 /// fifth, to 9e-16; k goes straight into the exponent's bits. |y| < 700.
@@ -50,27 +49,30 @@ template <class V>
 
 /// tanh(b_k + sum_i w_ki u_i) of eight nodes for each sample, their sums in the model's order.
 /// @param weights first the nodes' bias, then the weights of each input: (1 + inputs) x lanes
-template <class V>
+template <class V, int inputs>
 [[gnu::always_inline]] inline void nodes_of(const double* u, Index samples, const double* weights, double* out) {
   for (Index k = 0; k < samples; ++k, u += inputs, out += lanes) {
 #pragma GCC unroll 4
     for (int lane = 0; lane < lanes; lane += V::size) {
       typename V::Double sum = V::at(weights + lanes + lane) * u[0];
-#pragma GCC unroll 4
+#pragma GCC unroll 8
       for (int i = 1; i < inputs; ++i) sum = sum + V::at(weights + lanes * (1 + i) + lane) * u[i];
       V::at(out + lane) = tanh_of_vector<V>(sum + V::at(weights + lane));
     }
   }
 }
 
+template <int inputs>
 void nodes_two(const double* u, Index samples, const double* weights, double* out) {
-  nodes_of<Vector<2>>(u, samples, weights, out);
+  nodes_of<Vector<2>, inputs>(u, samples, weights, out);
 }
+template <int inputs>
 FXDYN_FOUR_AT_ONCE void nodes_four(const double* u, Index samples, const double* weights, double* out) {
-  nodes_of<Vector<4>>(u, samples, weights, out);
+  nodes_of<Vector<4>, inputs>(u, samples, weights, out);
 }
+template <int inputs>
 FXDYN_EIGHT_AT_ONCE void nodes_eight(const double* u, Index samples, const double* weights, double* out) {
-  nodes_of<Vector<8>>(u, samples, weights, out);
+  nodes_of<Vector<8>, inputs>(u, samples, weights, out);
 }
 
 /// 1 - e^-x of eight numbers x >= 0, to 2e-16.
@@ -91,44 +93,87 @@ void shares_two(const double* x, double* out) { shares_of<Vector<2>>(x, out); }
 FXDYN_FOUR_AT_ONCE void shares_four(const double* x, double* out) { shares_of<Vector<4>>(x, out); }
 FXDYN_EIGHT_AT_ONCE void shares_eight(const double* x, double* out) { shares_of<Vector<8>>(x, out); }
 
-/// What the nodes see, inputs x samples: PhysicalInputs::values() with the states' exponentials of eight samples at a
-/// time.
-MatrixXd inputs_of(const BroadLearningFit& bls, const Eigen::VectorXd& dq, double step_s) {
+/// Calls step(k, 1 - e^-x(k)) for the samples in turn, the exponentials of eight at a time.
+template <class X, class Step>
+void with_shares(Index samples, X&& x_of, Step&& step) {
+  const auto shares = widest(&shares_eight, &shares_four, &shares_two);
+  for (Index from = 0; from < samples; from += lanes) {
+    const Index count = std::min<Index>(lanes, samples - from);
+    std::array<double, lanes> x{}, share;
+    for (Index k = 0; k < count; ++k) x[static_cast<std::size_t>(k)] = x_of(from + k);
+    shares(x.data(), share.data());
+    for (Index k = 0; k < count; ++k) step(from + k, share[static_cast<std::size_t>(k)]);
+  }
+}
+
+/// What the nodes see, inputs x samples: Inputs::values() with the states' exponentials of eight samples at a time.
+template <class Inputs>
+MatrixXd inputs_of(const BroadLearningFit& bls, const Eigen::VectorXd& dq, double step_s);
+
+template <>
+MatrixXd inputs_of<PhysicalInputs>(const BroadLearningFit& bls, const Eigen::VectorXd& dq, double step_s) {
   const auto stored = PhysicalInputs::stored(bls, step_s);
   const Words<Real> words{stored.data()};
-  const auto shares = widest(&shares_eight, &shares_four, &shares_two);
-  MatrixXd out(inputs, dq.size());
+  MatrixXd out(PhysicalInputs::size, dq.size());
   for (Index k = 0; k < dq.size(); ++k) out(0, k) = curved_velocity<Real>(dq[k], words, 0);
-  for (Index i = 1; i < inputs; ++i) {
-    const double inverse_path = stored[static_cast<std::size_t>(1 + i)];
+  for (Index i = 0; i < static_cast<Index>(PhysicalInputs::distances); ++i) {
+    const double inverse_path = stored[static_cast<std::size_t>(2 + i)];
     double z = 0;
-    for (Index from = 0; from < dq.size(); from += lanes) {
-      const Index count = std::min<Index>(lanes, dq.size() - from);
-      std::array<double, lanes> x{}, share;
-      for (Index k = 0; k < count; ++k) x[static_cast<std::size_t>(k)] = std::fabs(dq[from + k]) * inverse_path;
-      shares(x.data(), share.data());
-      for (Index k = 0; k < count; ++k) {
-        z = relax<Real>(z, sign_of(dq[from + k]), share[static_cast<std::size_t>(k)]);
-        out(i, from + k) = Real::feature(z);
-      }
-    }
+    with_shares(
+        dq.size(), [&](Index k) { return std::fabs(dq[k]) * inverse_path; },
+        [&](Index k, double share) {
+          z = relax<Real>(z, sign_of(dq[k]), share);
+          out(1 + i, k) = Real::feature(z);
+        });
   }
   return out;
 }
 
-}  // namespace
-
-bool has_fast_rows(const BroadLearningFit& bls) {
-  return bls.inputs == PhysicalInputs::name && bls.activation == TanhNodes::name;
+template <>
+MatrixXd inputs_of<BristlesInputs>(const BroadLearningFit& bls, const Eigen::VectorXd& dq, double step_s) {
+  const auto stored = BristlesInputs::stored(bls, step_s);
+  const Words<Real> words{stored.data()};
+  MatrixXd out(BristlesInputs::size, dq.size());
+  std::vector<SlidingLevel<Real>> levels(static_cast<std::size_t>(dq.size()));
+  const auto level = [&](Index k) -> SlidingLevel<Real>& { return levels[static_cast<std::size_t>(k)]; };
+  const double inverse_velocity = stored[5], most_fall = stored[6];
+  with_shares(
+      dq.size(),
+      [&](Index k) {
+        const double ratio = Real::clamp<Argument<Real>>(dq[k] * inverse_velocity);
+        return ratio * ratio;
+      },
+      [&](Index k, double share) {
+        const double n = 1 - most_fall * share;
+        level(k) = {1 - share, n, reciprocal_of(n)};
+        out(0, k) = curved_velocity<Real>(dq[k], words, 0);
+        out(5, k) = as_feature<Real>(1 - share - share);
+      });
+  const auto way = [&](Index k) { return dq[k] + (k > 0 ? dq[k - 1] : 0); };
+  for (Index i = 0; i < static_cast<Index>(BristlesInputs::distances); ++i) {
+    const double inverse_path = stored[static_cast<std::size_t>(2 + i)];
+    Bristle<Real> bristle;
+    with_shares(
+        dq.size(), [&](Index k) { return std::fabs(way(k)) / 2 * (inverse_path * level(k).inverse); },
+        [&](Index k, double share) {
+          bristle.y = relax<Real>(bristle.y, signed_as(level(k).n, way(k)), share);
+          out(1 + i, k) = as_feature<Real>(bristle.y);
+          if (i == 1) out(4, k) = Real::feature(bristle.rate(dq[k], level(k)) * stored[7]);
+        });
+  }
+  return out;
 }
 
-MatrixXd bls_rows(const BroadLearningFit& bls, const ProcessedLog& log, Index joint) {
-  const MatrixXd u = inputs_of(bls, log.joint_velocity(joint), log.step_s);
+template <class Inputs>
+MatrixXd rows_of(const BroadLearningFit& bls, const ProcessedLog& log, Index joint) {
+  constexpr int inputs = Inputs::size;
+  static_assert(inputs < lanes);
+  const MatrixXd u = inputs_of<Inputs>(bls, log.joint_velocity(joint), log.step_s);
   const Index rows = log.rows(), columns = inputs + bls.nodes();
   const DecimatingFilter filter(log.filter.torque_cutoff_hz, log.step_s, log.samples(), log.first, log.decimation,
                                 rows);
   MatrixXd out(rows, columns), tile(lanes, filter.tile_samples()), kept(lanes, rows);
-  const auto nodes = widest(&nodes_eight, &nodes_four, &nodes_two);
+  const auto nodes = widest(&nodes_eight<inputs>, &nodes_four<inputs>, &nodes_two<inputs>);
   for (Index from = 0; from < columns; from += lanes) {
     const Index count = std::min<Index>(lanes, columns - from);
     MatrixXd weights = MatrixXd::Zero(lanes, 1 + inputs);
@@ -145,6 +190,18 @@ MatrixXd bls_rows(const BroadLearningFit& bls, const ProcessedLog& log, Index jo
     for (Index lane = 0; lane < count; ++lane) out.col(from + lane) = kept.row(lane).transpose();
   }
   return out;
+}
+
+}  // namespace
+
+bool has_fast_rows(const BroadLearningFit& bls) {
+  return (bls.inputs == PhysicalInputs::name || bls.inputs == BristlesInputs::name) &&
+         bls.activation == TanhNodes::name;
+}
+
+MatrixXd bls_rows(const BroadLearningFit& bls, const ProcessedLog& log, Index joint) {
+  return bls.inputs == BristlesInputs::name ? rows_of<BristlesInputs>(bls, log, joint)
+                                            : rows_of<PhysicalInputs>(bls, log, joint);
 }
 
 }  // namespace fxdyn

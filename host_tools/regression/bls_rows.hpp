@@ -5,7 +5,7 @@
 
 namespace fxdyn {
 
-/// Whether bls_rows() knows its inputs and activation: physical ones and tanh.
+/// Whether bls_rows() knows its inputs and activation: physical ones or bristles, and tanh.
 bool has_fast_rows(const BroadLearningFit& bls);
 
 /// Columns of a joint's BLS over a log as fits use them, filtered and decimated: broad_learning_basis() of every

@@ -12,6 +12,7 @@
 #include "host_tools/regression/bls_rows.hpp"
 #include "host_tools/regression/own_columns.hpp"
 #include "host_tools/regression/solver.hpp"
+#include "host_tools/regression/tie.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {
@@ -277,6 +278,17 @@ NormalEquations Fitter::assemble(const std::vector<std::size_t>& blocks, const s
     // Paper Eq. 30: mean square error + ridge |W|^2
     out.information.diagonal().segment(at, own) +=
         w * rows * ridge_of(*design[j], design[j]->bls ? design[j]->bls->ridge : 0, own);
+    if (const auto tie = tie_of(*design[j])) {
+      const double weight = rows_of_tie * w * rows;
+      out.information(at + tie->part, at + tie->part) += weight;
+      out.information(at + tie->whole, at + tie->whole) += weight * tie->share * tie->share;
+      out.information(at + std::min(tie->part, tie->whole), at + std::max(tie->part, tie->whole)) -=
+          weight * tie->share;
+    }
+  }
+  if (!prior_.empty()) {
+    out.information.topLeftCorner(nb, nb) += prior_.information;
+    out.projection.head(nb) += prior_.information * prior_.mean;
   }
   out.information.triangularView<Eigen::StrictlyLower>() = out.information.transpose();
   return out;
@@ -328,11 +340,15 @@ std::vector<std::size_t> Fitter::train_blocks() const {
 
 NormalEquations Fitter::normal_equations() const { return assemble(train_blocks(), current(), designs()); }
 
+double Fitter::train_rows(std::size_t joint) const {
+  double rows = 0;
+  for (const std::size_t b : train_blocks()) rows += base_moments_[joint][b].count;
+  return rows;
+}
+
 double Fitter::train_rows() const {
   double rows = 0;
-  for (const auto& joint : base_moments_) {
-    for (const std::size_t b : train_blocks()) rows += joint[b].count;
-  }
+  for (std::size_t j = 0; j < joints(); ++j) rows += train_rows(j);
   return rows;
 }
 

@@ -7,6 +7,7 @@
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/forward.hpp"
 #include "host_tools/effects/joint_fit.hpp"
+#include "host_tools/regression/base_prior.hpp"
 #include "host_tools/regression/dataset.hpp"
 #include "host_tools/regression/fit_data.hpp"
 #include "host_tools/regression/judgement.hpp"
@@ -82,6 +83,10 @@ class Fitter {
   /// Weights are one over the residual's variance of each joint (1 for ordinary least squares).
   void set_weights(const Eigen::VectorXd& weights) { weights_ = weights; }
   const Eigen::VectorXd& weights() const { return weights_; }
+  /// What was known of the base parameters before these logs: part of every fit from now on. Its information is in the
+  /// units of weights that are one over the residual's variance.
+  void set_prior(BasePrior prior) { prior_ = std::move(prior); }
+  const BasePrior& prior() const { return prior_; }
   /// Two rounds of reweighting from the residuals of the train logs.
   void reweight();
   /// Iteratively reweighted least squares (Huber's weights, 95 % efficient on normal noise; scale from the median of
@@ -108,7 +113,7 @@ class Fitter {
   /// Rows of the train logs count `forgetting` per second of their age, as recursive() forgets them.
   void forget(double forgetting);
   /// Widths and distances of all joints to the least squares of the train rows, from where they are (Gauss and Newton
-  /// over shapes and coefficients together, steps that do not help are halved).
+  /// over shapes and coefficients together; a joint whose step does not help tries a shorter one).
   void polish();
 
   /// The fit on all train rows, with standard deviations: a sandwich of the residual's autocorrelation, so that
@@ -128,8 +133,8 @@ class Fitter {
   };
   Recursion recursive(double forgetting, Eigen::Index points,
                       const SquareRootInformation& start = SquareRootInformation()) const;
-  /// What the train rows tell with the current weights, a BLS's ridge included: what a recursion over later logs starts
-  /// from.
+  /// What the train rows and the prior tell with the current weights, a BLS's ridge included: what a recursion over
+  /// later logs starts from.
   SquareRootInformation information() const;
   /// x as beta and theta.
   Solution split(const Eigen::VectorXd& x) const { return split(offsets(), x); }
@@ -137,10 +142,11 @@ class Fitter {
   std::vector<std::string> unknowns() const;
   /// Of the train rows with the current weights.
   NormalEquations normal_equations() const;
-  /// Sum over the train rows of the weighted squared residual.
+  /// Sum over the train rows of the weighted squared residual, and the prior's share.
   double weighted_square(const Solution& solution) const;
   /// Rows of all joints in the train logs, by their weights.
   double train_rows() const;
+  double train_rows(std::size_t joint) const;
   IdentifiedModel to_model(const Solution& solution) const;
   /// Rows that are left out since the drive was at its limit, of each joint.
   std::vector<Eigen::Index> saturated_rows() const;
@@ -157,6 +163,8 @@ class Fitter {
   Eigen::VectorXd residual(std::size_t joint, const Solution& solution) const;
   /// Where x has its parts: NormalEquations::offset.
   std::vector<Eigen::Index> offsets() const;
+  /// What is known before any row: the prior, and ties of parameters (tie.hpp).
+  SquareRootInformation prior_information() const;
   /// Adds rows [from, from + count) with these weights (of all rows), and their share of the ridge.
   void take_in(Eigen::Index from, Eigen::Index count, const std::vector<Eigen::VectorXd>& row_weights,
                SquareRootInformation& information) const;
@@ -171,6 +179,10 @@ class Fitter {
   /// The normal equations of coefficients and shapes together at a solution; projection is X^T W residual.
   NormalEquations with_shapes(const Solution& solution, std::vector<Eigen::MatrixXd>& shape_rows) const;
   void add_standard_deviations(Solution& solution) const;
+  /// weighted_square() by joint, without the prior.
+  std::vector<double> weighted_squares(const Solution& solution) const;
+  /// Where polish() would take the logarithms of the shapes. `offset`: where each joint's begin.
+  Eigen::VectorXd shape_step(const Solution& solution, double square, std::vector<Eigen::Index>& offset) const;
   /// Judgements of some joints, added up fold by fold.
   struct Tally {
     std::vector<Judgement> judgements;
@@ -200,6 +212,7 @@ class Fitter {
   std::vector<Eigen::MatrixXd> own_rows_;               ///< per joint: rows x own columns
   std::vector<OwnByBlock> own_moments_;                 ///< [joint][block]
   Eigen::VectorXd weights_;
+  BasePrior prior_;  ///< empty: none
 };
 
 }  // namespace fxdyn

@@ -43,20 +43,6 @@ Inertial ellipsoid(const Robot& robot, std::size_t link) {
   return body;
 }
 
-/// The body with second moments about its centre that are safely positive: URDFs have points, rods and rounded tensors.
-Inertial made_possible(const Inertial& body) {
-  const Matrix3d second = 0.5 * body.tensor.trace() * Matrix3d::Identity() - body.tensor;
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(second);
-  constexpr double smallest = 2e-3;  // radius of gyration [m]
-  const double floor = std::max(1e-3 * second.trace(), body.mass * smallest * smallest);
-  if (solver.eigenvalues().minCoeff() >= floor) return body;
-  const Matrix3d raised =
-      solver.eigenvectors() * solver.eigenvalues().cwiseMax(floor).asDiagonal() * solver.eigenvectors().transpose();
-  Inertial out = body;
-  out.tensor = raised.trace() * Matrix3d::Identity() - raised;
-  return out;
-}
-
 /// Information about beta alone: theta's share taken out.
 struct Reduced {
   MatrixXd information;
@@ -86,7 +72,7 @@ Prior make_prior(const PhysicalProblem& problem, const Reduced& data) {
   for (std::size_t i = 0; i < problem.robot.size(); ++i) {
     const auto& given = problem.robot.joints[i].inertial;
     if (!given) generic.push_back(i);
-    const Inertial body = given ? made_possible(*given) : ellipsoid(problem.robot, i);
+    const Inertial body = given ? possible_body(*given) : ellipsoid(problem.robot, i);
     prior.bodies.push_back(pseudo_inertia(to_link_inertia(body, problem.chain.urdf_in_dh[i])));
   }
   if (generic.empty()) {
@@ -123,7 +109,9 @@ void add_shares(const PhysicalProblem& problem, const Reduced& data, const std::
     before.block(at, at, ten, ten) = barrier_hessian(prior[i].inverse()).inverse();
   }
   // information = root^T root, S = root G: covariance after = before - (S before)^T (1 + S before S^T)^-1 (S before)
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(data.information / problem.variance);
+  MatrixXd told = data.information / problem.variance;
+  if (problem.known.size() > 0) told -= problem.known;
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(told);
   const MatrixXd seen = solver.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() * solver.eigenvectors().transpose() *
                         problem.base.grouping;
   const MatrixXd seen_before = seen * before;
@@ -199,8 +187,8 @@ PhysicalFit fit_physical(const Fitter& fitter, const Robot& robot, MatrixXd info
     }
     if (design.bls) at += design.bls->coefficient_count();
   }
-  return fit_physical(
-      {robot, chain, fitter.base(), std::move(information), std::move(projection), lower, upper, variance});
+  return fit_physical({robot, chain, fitter.base(), std::move(information), std::move(projection), lower, upper,
+                       variance, fitter.prior().information / variance});
 }
 
 Solution physical_solution(Solution solution, const PhysicalFit& fit) {

@@ -70,4 +70,17 @@ LinkInertia<Real> from_pseudo_inertia(const Matrix4d& p) {
   return to_inertia(values);
 }
 
+Inertial possible_body(const Inertial& body) {
+  const Eigen::Matrix3d second = 0.5 * body.tensor.trace() * Eigen::Matrix3d::Identity() - body.tensor;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(second);
+  constexpr double smallest = 2e-3;  // radius of gyration [m]
+  const double floor = std::max(1e-3 * second.trace(), body.mass * smallest * smallest);
+  if (solver.eigenvalues().minCoeff() >= floor) return body;
+  const Eigen::Matrix3d raised =
+      solver.eigenvectors() * solver.eigenvalues().cwiseMax(floor).asDiagonal() * solver.eigenvectors().transpose();
+  Inertial out = body;
+  out.tensor = raised.trace() * Eigen::Matrix3d::Identity() - raised;
+  return out;
+}
+
 }  // namespace fxdyn

@@ -11,6 +11,9 @@ namespace fxdyn {
 Eigen::Matrix4d pseudo_inertia(const LinkInertia<Real>& link);
 LinkInertia<Real> from_pseudo_inertia(const Eigen::Matrix4d& p);
 
+/// The body with second moments about its centre that are safely positive: URDFs have points, rods and rounded tensors.
+Inertial possible_body(const Inertial& body);
+
 /// The same of a link's ten standard parameters, in the order of to_array().
 Eigen::Matrix4d pseudo_inertia(const Eigen::Ref<const Eigen::VectorXd>& parameters);
 Eigen::VectorXd pseudo_inertia_parameters(const Eigen::Matrix4d& p);

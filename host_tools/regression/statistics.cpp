@@ -1,13 +1,15 @@
-// Standard deviations, robust weights, shapes as unknowns, recursive least squares: what Fitter does with rows rather
-// than with moments.
+// Standard deviations, robust weights, recursive least squares: what Fitter does with rows rather than with moments.
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/regression/fitter.hpp"
 #include "host_tools/regression/solver.hpp"
+#include "host_tools/regression/tie.hpp"
+#include "host_tools/regression/unknown_shapes.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {
@@ -18,36 +20,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// Widths and distances that no joint has: what the catalogue's bounds leave.
-constexpr double smallest_shape = 1e-8, largest_shape = 1e3;
-
-/// Whether the shape can be an unknown of the fit: a width, a distance or a share, not an index or a count.
-bool is_continuous(const ParameterInfo& shape) {
-  if (shape.values.search != ShapeSearch::refine) return false;
-  return shape.quantity == Quantity::inverse_velocity || shape.quantity == Quantity::inverse_path ||
-         shape.quantity == Quantity::unit;
-}
-
-/// A shape that is an unknown, in a design.
-struct UnknownShape {
-  double* value;
-  double least, most;
-  void set(double to) const { *value = std::clamp(to, least, most); }
-};
-
-/// A joint's shapes that are unknowns: the sign's width first.
-std::vector<UnknownShape> unknown_shapes(JointFit& design) {
-  std::vector<UnknownShape> out{{&design.sign_width, smallest_shape, largest_shape}};
-  for (EffectFit& fit : design.effects) {
-    const auto infos = find_effect(fit.effect)->shape;
-    for (std::size_t i = 0; i < infos.size(); ++i) {
-      if (!is_continuous(infos[i])) continue;
-      out.push_back({&fit.shape[i], std::max(smallest_shape, infos[i].lower), std::min(largest_shape, infos[i].upper)});
-    }
-  }
-  return out;
-}
-
 double median(VectorXd values) {
   const Index middle = values.size() / 2;
   std::nth_element(values.begin(), values.begin() + middle, values.end());
@@ -56,105 +28,23 @@ double median(VectorXd values) {
 
 }  // namespace
 
-MatrixXd Fitter::shape_rows(std::size_t joint, const VectorXd& theta) const {
-  constexpr double step = 1e-3;
-  std::vector<JointFit> designs = design_;
-  JointFit& design = designs[joint];
-  if (design.bls) return MatrixXd(torque_rows_[joint].size(), 0);
-  const auto shapes = unknown_shapes(design);
-  MatrixXd out(torque_rows_[joint].size(), static_cast<Index>(shapes.size()));
-  for (std::size_t s = 0; s < shapes.size(); ++s) {
-    double& shape = *shapes[s].value;
-    const double value = shape;
-    shape = value * (1 + step);
-    const VectorXd more = own_rows(joint, designs) * theta;
-    shape = value * (1 - step);
-    out.col(static_cast<Index>(s)) = (more - own_rows(joint, designs) * theta) / (2 * step);
-    shape = value;
-  }
-  return out;
-}
-
-NormalEquations Fitter::with_shapes(const Solution& solution, std::vector<MatrixXd>& shapes) const {
-  shapes.resize(joints());
-  parallel_for(joints(), [&](std::size_t j) { shapes[j] = shape_rows(j, solution.theta[j]); });
-  NormalEquations linear = normal_equations(), out;
-  const Index p = linear.offset.back();
-  out.offset = {p};
-  for (const MatrixXd& rows : shapes) out.offset.push_back(out.offset.back() + rows.cols());
-  out.information = MatrixXd::Zero(out.offset.back(), out.offset.back());
-  out.information.topLeftCorner(p, p) = linear.information;
-  out.projection = VectorXd::Zero(out.offset.back());
-  for (std::size_t j = 0; j < joints(); ++j) {
-    const double w = weights_[static_cast<Index>(j)];
-    const VectorXd e = residual(j, solution);
-    const Index at = out.offset[j], count = shapes[j].cols(), first = data_->first_base[j];
-    const Index own = linear.offset[j], own_count = linear.offset[j + 1] - own;
-    for (const std::size_t b : train_blocks()) {
-      const LogBlock& block = data_->blocks[b];
-      const auto cut = [&](const auto& m) { return m.middleRows(block.from, block.to - block.from); };
-      const MatrixXd ws = (w * cut(row_weights_[j])).asDiagonal() * cut(shapes[j]);
-      const auto x = cut(data_->base_rows[j]);
-      out.information.block(first, at, x.cols(), count) += x.transpose() * ws;
-      out.information.block(own, at, own_count, count) += cut(own_rows_[j]).transpose() * ws;
-      out.information.block(at, at, count, count) += cut(shapes[j]).transpose() * ws;
-      out.projection.segment(first, x.cols()) += w * x.transpose() * cut(row_weights_[j]).cwiseProduct(cut(e));
-      out.projection.segment(own, own_count) +=
-          w * cut(own_rows_[j]).transpose() * cut(row_weights_[j]).cwiseProduct(cut(e));
-      out.projection.segment(at, count) += ws.transpose() * cut(e);
-    }
-  }
-  out.information.triangularView<Eigen::StrictlyLower>() = out.information.transpose();
-  return out;
-}
-
-double Fitter::weighted_square(const Solution& solution) const {
-  double sum = 0;
-  for (std::size_t j = 0; j < joints(); ++j) {
+std::vector<double> Fitter::weighted_squares(const Solution& solution) const {
+  std::vector<double> out(joints());
+  parallel_for(joints(), [&](std::size_t j) {
     const VectorXd e = residual(j, solution);
     for (const std::size_t b : train_blocks()) {
       const LogBlock& block = data_->blocks[b];
       const Index count = block.to - block.from;
-      sum += weights_[static_cast<Index>(j)] *
-             row_weights_[j].segment(block.from, count).dot(e.segment(block.from, count).cwiseAbs2());
+      out[j] += weights_[static_cast<Index>(j)] *
+                row_weights_[j].segment(block.from, count).dot(e.segment(block.from, count).cwiseAbs2());
     }
-  }
-  return sum;
+  });
+  return out;
 }
 
-void Fitter::polish() {
-  constexpr int most_rounds = 8;
-  constexpr double longest = 0.4;  // in the logarithm of a shape
-  Solution solution = solve(normal_equations());
-  double square = weighted_square(solution);
-  for (int round = 0; round < most_rounds; ++round) {
-    std::vector<MatrixXd> rows;
-    const NormalEquations all = with_shapes(solution, rows);
-    if (all.offset.back() == all.offset.front()) return;
-    VectorXd step = SymmetricSolver(all.information).solve(all.projection).tail(all.offset.back() - all.offset.front());
-    for (double& s : step) s = std::isfinite(s) ? std::clamp(s, -longest, longest) : 0;
-    const std::vector<JointFit> before = design_;
-    const double old = square;
-    bool better = false;
-    for (int halving = 0; halving < 4 && !better; ++halving, step /= 4) {
-      std::vector<JointFit> designs = before;
-      for (std::size_t j = 0; j < joints(); ++j) {
-        if (designs[j].bls) continue;
-        const auto shapes = unknown_shapes(designs[j]);
-        for (std::size_t s = 0; s < shapes.size(); ++s)
-          shapes[s].set(*shapes[s].value * std::exp(step[all.offset[j] - all.offset[0] + static_cast<Index>(s)]));
-      }
-      set_designs(std::move(designs));
-      solution = solve(normal_equations());
-      square = weighted_square(solution);
-      better = square < old;
-    }
-    if (!better) {
-      set_designs(before);
-      return;
-    }
-    if (square > 0.999 * old) return;
-  }
+double Fitter::weighted_square(const Solution& solution) const {
+  const std::vector<double> squares = weighted_squares(solution);
+  return std::accumulate(squares.begin(), squares.end(), prior_.empty() ? 0.0 : prior_.square(solution.beta));
 }
 
 namespace {
@@ -403,8 +293,33 @@ void Fitter::take_in(Index from, Index count, const std::vector<VectorXd>& row_w
   }
 }
 
-SquareRootInformation Fitter::information() const {
+SquareRootInformation Fitter::prior_information() const {
   SquareRootInformation out(offsets().back());
+  const std::vector<Index> offset = offsets();
+  for (std::size_t j = 0; j < joints(); ++j) {
+    const auto tie = tie_of(design_[j]);
+    if (!tie) continue;
+    const Index part = offset[j] + tie->part, whole = offset[j] + tie->whole;
+    Eigen::RowVector3d row(1, -tie->share, 0);
+    if (whole < part) std::swap(row[0], row[1]);
+    out.take_in(std::sqrt(rows_of_tie * weights_[static_cast<Index>(j)] * train_rows(j)) * row,
+                {std::min(part, whole), std::max(part, whole)}, 0);
+  }
+  if (prior_.empty()) return out;
+  // information = root^T root; rows of unit weight
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(prior_.information);
+  const Index nb = prior_.mean.size();
+  MatrixXd rows(nb, nb + 1);
+  rows.leftCols(nb) = solver.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() * solver.eigenvectors().transpose();
+  rows.col(nb) = rows.leftCols(nb) * prior_.mean;
+  std::vector<Index> columns(static_cast<std::size_t>(nb));
+  std::iota(columns.begin(), columns.end(), 0);
+  out.take_in(rows, columns, 0);
+  return out;
+}
+
+SquareRootInformation Fitter::information() const {
+  SquareRootInformation out = prior_information();
   for (const std::size_t b : train_blocks()) {
     const LogBlock& block = data_->blocks[b];
     take_in(block.from, block.to - block.from, row_weights_, out);
@@ -418,7 +333,7 @@ Fitter::Recursion Fitter::recursive(double forgetting, Index points, const Squar
   Index total = 0;
   for (const ProcessedLog& log : logs()) total += log.role == Role::train ? log.rows() : 0;
   Recursion out;
-  out.information = start.unknowns() > 0 ? start : SquareRootInformation(offset.back());
+  out.information = start.unknowns() > 0 ? start : prior_information();
   points = std::min(points, total);
   out.t.resize(points);
   out.trace.resize(points, offset.back());

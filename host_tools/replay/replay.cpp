@@ -5,15 +5,13 @@
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/hil/qemu_target.hpp"
+#include "host_tools/report/replay_result.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
-
-#include <nlohmann/json.hpp>
 
 namespace fxdyn {
 namespace {
 
-using nlohmann::json;
 namespace fs = std::filesystem;
 
 struct Replayed {
@@ -66,27 +64,23 @@ Replayed play(QemuTarget& target, const IdentifiedModel& model, FixedModel& fixe
   return out;
 }
 
-json to_json(const Replayed& replayed, const TickStates& states, const IdentifiedModel& model,
-             const std::vector<std::size_t>& outputs) {
-  json joints = json::array();
+ReplayedLog log_of(const Replayed& replayed, const TickStates& states, const IdentifiedModel& model,
+                   const std::vector<std::size_t>& outputs) {
+  const double ticks = static_cast<double>(std::max<Eigen::Index>(1, replayed.ticks));
+  ReplayedLog out{states.name,
+                  replayed.ticks,
+                  replayed.different_ticks,
+                  replayed.saturations,
+                  replayed.fewest,
+                  replayed.most,
+                  static_cast<double>(replayed.instructions) / ticks,
+                  {}};
   for (const std::size_t j : outputs) {
     const double error = replayed.largest_error[static_cast<Eigen::Index>(j)];
-    joints.push_back({{"joint", model.robot.joints[j].name},
-                      {"index", j + 1},
-                      {"largest_error", error},
-                      {"unit", model.robot.joints[j].torque_unit()},
-                      {"largest_error_of_rated", error / model.joints[j].rated_torque}});
+    out.joints.push_back({model.robot.joints[j].name, model.robot.joints[j].torque_unit(), j + 1, error,
+                          error / model.joints[j].rated_torque});
   }
-  return {{"log", states.name},
-          {"ticks", replayed.ticks},
-          {"different_ticks", replayed.different_ticks},
-          {"saturations", replayed.saturations},
-          {"instructions_per_tick",
-           {{"fewest", replayed.fewest},
-            {"most", replayed.most},
-            {"mean", static_cast<double>(replayed.instructions) /
-                         static_cast<double>(std::max<Eigen::Index>(1, replayed.ticks))}}},
-          {"joints", joints}};
+  return out;
 }
 
 /// Where the tables and the replay of these joints are: of all of them, or of a drive with one.
@@ -133,28 +127,22 @@ Replay replay(Pipeline& pipeline, const fs::path& image, Eigen::Index max_ticks)
   }
   Progress progress;
   progress.stage("replaying on the firmware", streams.size());
-  json logs = json::array(), output_joints = json::array();
-  for (const std::size_t joint : fixed.outputs()) output_joints.push_back(joint + 1);
-  bool same = true;
+  ReplayResult out;
+  out.image = image.filename().string();
+  out.tables_crc = fixed.crc();
+  out.tables_in = updated ? "update slot" : "image";
+  for (const std::size_t joint : fixed.outputs()) out.output_joints.push_back(joint + 1);
   for (const TickStates& states : streams) {
     const Replayed replayed = play(*target, model, fixed, states, std::min(max_ticks, states.t.size()));
-    same = same && replayed.different_ticks == 0;
-    logs.push_back(to_json(replayed, states, model, fixed.outputs()));
+    out.logs.push_back(log_of(replayed, states, model, fixed.outputs()));
     progress.step();
   }
   progress.done();
-  json document = {{"schema", "fxdyn.replay/1"},
-                   {"image", image.filename().string()},
-                   {"tables_crc", fixed.crc()},
-                   {"output_joints", output_joints},
-                   {"tables_in", updated ? "update slot" : "image"},
-                   {"bit_exact", same},
-                   {"logs", logs}};
   const fs::path size_file = image.parent_path() / "size.json";
-  if (fs::exists(size_file)) document["size"] = json::parse(read_file(size_file));
+  if (fs::exists(size_file)) out.size = nlohmann::json::parse(read_file(size_file));
   fs::create_directories(directory);
-  write_file(directory / "replay.json", document.dump(1) + "\n");
-  return {same, directory / "replay.json"};
+  write_file(directory / "replay.json", to_json(out).dump(1) + "\n");
+  return {out.bit_exact(), directory / "replay.json"};
 }
 
 }  // namespace fxdyn

@@ -42,8 +42,8 @@ VectorXd measured_at(const ProcessedLog& log, const VectorXd& t, Index joint) {
   return out;
 }
 
-json play(CanDrives& drives, const ProcessedLog& log, const IdentifiedModel& model, Index most_ticks,
-          Progress& progress) {
+CanReplay::PlayedLog play(CanDrives& drives, const ProcessedLog& log, const IdentifiedModel& model, Index most_ticks,
+                          Progress& progress) {
   const TickStates states = at_ticks(log, model.tick_s);
   const Index ticks = std::min(most_ticks, states.t.size()), n = states.q.cols();
   drives.restart();
@@ -56,7 +56,7 @@ json play(CanDrives& drives, const ProcessedLog& log, const IdentifiedModel& mod
     if (k % 500 == 499) progress.step();
   }
   drives.stop();
-  json joints = json::array();
+  CanReplay::PlayedLog out{states.name, ticks, equal, {}};
   // The torque comes up by its ramp at the start: not the model's yet.
   const Index first = std::min<Index>(ticks - 1, lead_in);
   for (Index j = 0; j < n; ++j) {
@@ -66,18 +66,18 @@ json play(CanDrives& drives, const ProcessedLog& log, const IdentifiedModel& mod
     };
     const double error = rms(torque.col(j) - measured);
     const std::size_t i = static_cast<std::size_t>(j);
-    joints.push_back({{"joint", model.robot.joints[i].name},
-                      {"index", j + 1},
-                      {"unit", model.robot.joints[i].torque_unit()},
-                      {"error_to_measured", std::isfinite(error) ? json(error) : json(nullptr)},
-                      {"of_rated", std::isfinite(error) ? json(error / model.joints[i].rated_torque) : json(nullptr)},
-                      {"measured_rms", rms(measured)}});
+    CanReplay::Joint joint{model.robot.joints[i].name, model.robot.joints[i].torque_unit(), {}, {}, rms(measured)};
+    if (std::isfinite(error)) {
+      joint.error_to_measured = error;
+      joint.of_rated = error / model.joints[i].rated_torque;
+    }
+    out.joints.push_back(std::move(joint));
   }
-  return {{"log", states.name}, {"ticks", ticks}, {"equal_ticks", equal}, {"joints", joints}};
+  return out;
 }
 
 /// The vibration experiment with the torque that comes over the bus while the plant moves.
-json in_the_loop(CanDrives& drives, const Pipeline& pipeline, std::size_t most_moves) {
+VibrationResult in_the_loop(CanDrives& drives, const Pipeline& pipeline, std::size_t most_moves) {
   const std::size_t n = pipeline.project().robot.size();
   const Reference* reference = nullptr;
   Feedforward drive;
@@ -111,10 +111,10 @@ CanReplay replay_on_can(Pipeline& pipeline, const CanReplaySettings& settings) {
     const IdentifiedModel model = pipeline.exported();
     CanDrives drives(bus, model, {settings.nodes, settings.fd, master});
     guard.stop_by_signals(drives.nodes());
-    json document = {{"schema", "fxdyn.can_replay/1"}, {"interface", settings.interface}, {"fd", settings.fd}};
+    CanReplay out{settings.interface, settings.fd, {}, {}, {}};
     Progress progress;
     if (settings.closed_loop) {
-      document["closed_loop"] = in_the_loop(drives, pipeline, settings.most_moves);
+      out.closed_loop = in_the_loop(drives, pipeline, settings.most_moves);
     } else {
       std::vector<ProcessedLog> logs;
       for (const Role role : {Role::test, Role::validate, Role::train}) {
@@ -125,17 +125,13 @@ CanReplay replay_on_can(Pipeline& pipeline, const CanReplaySettings& settings) {
       for (const ProcessedLog& log : logs)
         steps += static_cast<std::size_t>(std::min(settings.most_ticks, at_ticks(log, model.tick_s).t.size()) / 500);
       progress.stage("replaying over " + settings.interface, std::max<std::size_t>(1, steps));
-      json played = json::array();
-      for (const ProcessedLog& log : logs) played.push_back(play(drives, log, model, settings.most_ticks, progress));
+      for (const ProcessedLog& log : logs) out.logs.push_back(play(drives, log, model, settings.most_ticks, progress));
       progress.done();
-      document["logs"] = played;
     }
     drives.stop();
-    document.update(drives.report());
-    const bool same = document.at("equal_ticks") == document.at("ticks") && document.at("frames_lost") == 0;
-    document["bit_exact"] = same;
-    write_file(pipeline.directory() / "can_replay.json", document.dump(1) + "\n");
-    return {same, document};
+    out.drives = drives.report();
+    write_file(pipeline.directory() / "can_replay.json", to_json(out).dump(1) + "\n");
+    return out;
   } catch (const can::BusError& error) {
     throw InputError(error.what());
   } catch (const can::NodeError& error) {
@@ -143,32 +139,60 @@ CanReplay replay_on_can(Pipeline& pipeline, const CanReplaySettings& settings) {
   }
 }
 
-std::string can_replay_table(const json& result) {
+json to_json(const CanReplay& result) {
+  json out = to_json(result.drives);
+  out["schema"] = "fxdyn.can_replay/1";
+  out["interface"] = result.interface;
+  out["fd"] = result.fd;
+  out["bit_exact"] = result.drives.bit_exact();
+  if (result.closed_loop) {
+    out["closed_loop"] = to_json(*result.closed_loop);
+    return out;
+  }
+  const auto or_null = [](const std::optional<double>& value) { return value ? json(*value) : json(nullptr); };
+  json& logs = out["logs"] = json::array();
+  for (const CanReplay::PlayedLog& log : result.logs) {
+    json joints = json::array();
+    for (std::size_t j = 0; j < log.joints.size(); ++j) {
+      const CanReplay::Joint& joint = log.joints[j];
+      joints.push_back({{"joint", joint.name},
+                        {"index", j + 1},
+                        {"unit", joint.unit},
+                        {"error_to_measured", or_null(joint.error_to_measured)},
+                        {"of_rated", or_null(joint.of_rated)},
+                        {"measured_rms", joint.measured_rms}});
+    }
+    logs.push_back({{"log", log.name}, {"ticks", log.ticks}, {"equal_ticks", log.equal_ticks}, {"joints", joints}});
+  }
+  return out;
+}
+
+std::string can_replay_table(const CanReplay& result) {
   std::string out;
-  if (result.contains("closed_loop")) out += vibration_table(result.at("closed_loop"));
-  if (result.contains("logs")) {
+  if (result.closed_loop) {
+    out += vibration_table(*result.closed_loop);
+  } else {
     out += fmt::format("{:<24} {:>8} {:>8}  torque over the bus against the measured one, RMS of rated, %\n", "log",
                        "ticks", "equal");
-    for (const json& log : result.at("logs")) {
-      out += fmt::format("{:<24} {:>8} {:>8} ", log.at("log").get<std::string>(), log.at("ticks").get<Index>(),
-                         log.at("equal_ticks").get<Index>());
-      for (const json& joint : log.at("joints"))
-        out += joint.at("of_rated").is_null() ? "      -"
-                                              : fmt::format(" {:>6.2f}", 100 * joint.at("of_rated").get<double>());
-      out += "\n";
-    }
   }
-  const json& trip = result.at("round_trip_ms");
+  for (const CanReplay::PlayedLog& log : result.logs) {
+    out += fmt::format("{:<24} {:>8} {:>8} ", log.name, log.ticks, log.equal_ticks);
+    for (const CanReplay::Joint& joint : log.joints)
+      out += joint.of_rated ? fmt::format(" {:>6.2f}", 100 * *joint.of_rated) : "      -";
+    out += "\n";
+  }
+  const DriveReport& drives = result.drives;
   out += fmt::format(
       "{} of {} ticks equal bit for bit, {} frames lost, round trip p50 {:.2f} p99 {:.2f} max {:.2f} ms, {:.0f} "
       "ticks/s\n",
-      result.at("equal_ticks").get<std::uint64_t>(), result.at("ticks").get<std::uint64_t>(),
-      result.at("frames_lost").get<std::uint64_t>(), trip.at("p50").get<double>(), trip.at("p99").get<double>(),
-      trip.at("max").get<double>(), result.at("ticks_per_second").get<double>());
-  for (const json& node : result.at("nodes"))
-    out += fmt::format("node {} ({}, fxdyn {}): joints {}, most cost of a tick {}\n", node.at("id").get<int>(),
-                       node.at("board").get<std::string>(), node.at("version").get<std::string>(),
-                       node.at("joints").dump(), node.at("most_cost_of_a_tick").get<std::uint32_t>());
+      drives.equal_ticks, drives.ticks, drives.frames_lost, drives.p50_ms, drives.p99_ms, drives.max_ms,
+      drives.ticks_per_second);
+  for (const DriveReport::Node& node : drives.nodes) {
+    std::vector<std::size_t> joints;
+    for (const std::size_t joint : node.joints) joints.push_back(joint + 1);
+    out += fmt::format("node {} ({}, fxdyn {}): joints {}, most cost of a tick {}\n", node.id, node.board, node.version,
+                       json(joints).dump(), node.most_cost_of_a_tick);
+  }
   return out;
 }
 

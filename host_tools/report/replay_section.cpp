@@ -1,30 +1,29 @@
 #include <fmt/format.h>
 
 #include "host_tools/page/page.hpp"
+#include "host_tools/report/replay_result.hpp"
 #include "host_tools/report/section.hpp"
 
 namespace fxdyn {
 
 using namespace page;
-using nlohmann::json;
 
-std::string replay_section(const ReportInput&, const json& result) {
+std::string replay_section(const ReportInput&, const nlohmann::json& file) {
   std::string out = section("Replay on the firmware");
-  if (result.is_null())
+  if (file.is_null())
     return out + paragraph(
                      "Not replayed with these tables: build the image with toolchains/build_image.sh, then run fxdyn "
                      "replay.");
-  const ReplaySummary sum = summarise_replay(result);
-  out += paragraph(fmt::format("{} ticks on {} in QEMU (image {}): {}. {} to {} instructions a tick.", sum.ticks,
-                               sum.processor, text(result.at("image")),
-                               sum.different_ticks == 0
-                                   ? "every torque is the host's bit for bit"
-                                   : fmt::format("{} ticks differ from the host", sum.different_ticks),
-                               sum.fewest, sum.most));
-  if (result.contains("size")) {
+  const ReplayResult result = replay_of(file);
+  const ReplaySummary sum = summarise_replay(file);
+  out += paragraph(fmt::format(
+      "{} ticks on {} in QEMU (image {}): {}. {} to {} instructions a tick.", sum.ticks, sum.processor, result.image,
+      sum.different_ticks == 0 ? "every torque is the host's bit for bit"
+                               : fmt::format("{} ticks differ from the host", sum.different_ticks),
+      sum.fewest, sum.most));
+  if (!result.size.is_null()) {
     out += paragraph(fmt::format("Image: {} bytes flash, {} bytes RAM (stack included).",
-                                 result.at("size").at("flash_bytes").get<int>(),
-                                 result.at("size").at("ram_bytes").get<int>()));
+                                 result.size.at("flash_bytes").get<int>(), result.size.at("ram_bytes").get<int>()));
   }
   Table table({{"stream"},
                {"ticks", "n"},
@@ -32,16 +31,14 @@ std::string replay_section(const ReportInput&, const json& result) {
                {"saturations", "n"},
                {"instructions a tick", "n"},
                {"largest |firmware - double| of rated", "n"}});
-  for (const json& log : result.at("logs")) {
+  for (const ReplayedLog& log : result.logs) {
     double largest = 0;
-    for (const json& joint : log.at("joints"))
-      largest = std::max(largest, joint.at("largest_error_of_rated").get<double>());
-    const auto different = log.at("different_ticks").get<std::int64_t>();
-    table.add({{text(log.at("log"))},
-               {fmt::format("{}", log.at("ticks").get<std::int64_t>()), "n"},
-               {fmt::format("{}", different), different == 0 ? "n good" : "n bad"},
-               {fmt::format("{}", log.at("saturations").get<std::int64_t>()), "n"},
-               {fmt::format("{:.0f}", log.at("instructions_per_tick").at("mean").get<double>()), "n"},
+    for (const ReplayedLog::Joint& joint : log.joints) largest = std::max(largest, joint.largest_error_of_rated);
+    table.add({{log.name},
+               {fmt::format("{}", log.ticks), "n"},
+               {fmt::format("{}", log.different_ticks), log.different_ticks == 0 ? "n good" : "n bad"},
+               {fmt::format("{}", log.saturations), "n"},
+               {fmt::format("{:.0f}", log.mean), "n"},
                {fmt::format("{:.2g}", largest), "n"}});
   }
   return out + table.html();

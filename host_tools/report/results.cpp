@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "host_tools/project/provenance.hpp"
+#include "host_tools/report/replay_result.hpp"
 #include "host_tools/report/section.hpp"
 #include "host_tools/support/files.hpp"
 
@@ -110,14 +111,15 @@ std::string stage_title(const StageErrors& stage) {
 ReplaySummary summarise_replay(const json& replayed) {
   ReplaySummary sum;
   sum.fewest = std::numeric_limits<std::uint32_t>::max();
-  for (const json& log : replayed.at("logs")) {
-    sum.ticks += log.at("ticks").get<std::int64_t>();
-    sum.different_ticks += log.at("different_ticks").get<std::int64_t>();
-    sum.saturations += log.at("saturations").get<std::int64_t>();
-    sum.fewest = std::min(sum.fewest, log.at("instructions_per_tick").at("fewest").get<std::uint32_t>());
-    sum.most = std::max(sum.most, log.at("instructions_per_tick").at("most").get<std::uint32_t>());
+  const ReplayResult result = replay_of(replayed);
+  for (const ReplayedLog& log : result.logs) {
+    sum.ticks += log.ticks;
+    sum.different_ticks += log.different_ticks;
+    sum.saturations += static_cast<std::int64_t>(log.saturations);
+    sum.fewest = std::min(sum.fewest, log.fewest);
+    sum.most = std::max(sum.most, log.most);
   }
-  sum.processor = processor_of(replayed.at("image"));
+  sum.processor = processor_of(result.image);
   return sum;
 }
 

@@ -7,6 +7,7 @@
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/lugre_check.hpp"
 #include "host_tools/simulate/mujoco_plant.hpp"
 #include "host_tools/support/files.hpp"
 #include "host_tools/support/toml.hpp"
@@ -132,6 +133,9 @@ void check_plant(const Value& effects, const Scenario& scenario) {
     for (const std::size_t j : joints_of(*joint, scenario)) {
       const JointFit& fit = scenario.plant.joints[j];
       const EffectFit& effect = *fit.find(table.need("name", "").string());
+      if (effect.effect == "lugre") {
+        if (const auto why = lugre_is_no_friction(fit, scenario.bounds[j].velocity)) value.place().fail(*why);
+      }
       const double longest = longest_memory(*find_effect(effect.effect), plant_step(scenario));
       if (!mujoco && longest > 0 && effect.shape[0] > longest) {
         value.place().fail(
@@ -242,6 +246,21 @@ void read_link_encoders(Table& sensors, Scenario& scenario) {
   for (const std::size_t joint : joints_of(*which, scenario)) scenario.link_encoder[joint] = true;
 }
 
+TorqueVibration read_vibration(Table table, double sample_s) {
+  TorqueVibration vibration;
+  vibration.amplitude = table.need("amplitude", "a share of rated torque").positive();
+  const Value frequency = table.need("frequency_hz", "below half of the sampling rate");
+  vibration.frequency_hz = frequency.positive();
+  // Above it the log would show another, slower vibration than the file says.
+  const double highest = 0.5 / sample_s;
+  if (vibration.frequency_hz >= highest) {
+    frequency.place().fail(
+        fmt::format("expected a number below {:g}: half of the sampling rate of {:g} Hz", highest, 1 / sample_s));
+  }
+  table.finish();
+  return vibration;
+}
+
 /// The smallest step with which every effect of the plant remembers as long as it has to [s].
 double remembering_step(const IdentifiedModel& plant) {
   double step = 0;
@@ -330,6 +349,8 @@ Scenario read_scenario(const fs::path& file) {
     toml_input::set(scenario.jitter, table->find("jitter"), share);
     toml_input::set(scenario.start_s, table->find("start_s"), toml_input::as_number);
     toml_input::set(scenario.exact_motion, table->find("exact_motion"), toml_input::as_boolean);
+    if (auto vibration = table->table("torque_vibration"))
+      scenario.vibration = read_vibration(*vibration, scenario.sample_s);
     read_link_encoders(*table, scenario);
     table->finish();
   }

@@ -28,6 +28,12 @@ struct ScenarioControl {
   double tick_s = 0.002;
 };
 
+/// A sine on the measured torque of every joint, as a structure that vibrates shows in it.
+struct TorqueVibration {
+  double amplitude = 0;     ///< share of rated torque
+  double frequency_hz = 0;  ///< below half of the sampling rate
+};
+
 /// A scenario file (docs/guide/scenario.md).
 struct Scenario {
   enum class Plant { internal, mujoco };
@@ -47,7 +53,8 @@ struct Scenario {
   double torque_noise = 0;         ///< white, share of rated torque
   double ar_noise = 0;             ///< first-order autoregressive, RMS as share of rated torque
   double ar_pole = 0.95;           ///< its correlation from sample to sample
-  bool exact_motion = false;       ///< logs carry exact q, dq, ddq
+  TorqueVibration vibration;
+  bool exact_motion = false;  ///< logs carry exact q, dq, ddq
   std::uint64_t seed = 1;
   std::vector<ScenarioLog> logs;
 };

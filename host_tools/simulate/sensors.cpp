@@ -22,6 +22,13 @@ double cubic(double from, double slope_from, double to, double slope_to, double 
          share * share * ((1 + 2 * rest) * to - rest * step * slope_to);
 }
 
+/// Every joint of every log begins in another phase.
+void add_vibration(const TorqueVibration& vibration, double rated, double phase, const Eigen::VectorXd& t,
+                   Eigen::Ref<Eigen::VectorXd> tau) {
+  const double w = 2 * std::numbers::pi * vibration.frequency_hz;
+  tau.array() += vibration.amplitude * rated * (w * (t.array() - t[0]) + phase).sin();
+}
+
 }  // namespace
 
 Eigen::VectorXd sampling_times(const Scenario& scenario, const ScenarioLog& log) {
@@ -72,7 +79,7 @@ Log sampled(const Scenario& scenario, const PlantRun& run, const Eigen::VectorXd
 }
 
 void measure(const Scenario& scenario, const ScenarioLog& spec, Log& log) {
-  Random white = chance(scenario, spec, 0), coloured = chance(scenario, spec, 2);
+  Random white = chance(scenario, spec, 0), coloured = chance(scenario, spec, 2), phases = chance(scenario, spec, 3);
   for (Index j = 0; j < log.q.cols(); ++j) {
     const auto& joint = scenario.plant.robot.joints[static_cast<std::size_t>(j)];
     const auto encode = [&](auto&& column, int bits) {
@@ -89,6 +96,8 @@ void measure(const Scenario& scenario, const ScenarioLog& spec, Log& log) {
     const double rated = scenario.plant.joints[static_cast<std::size_t>(j)].rated_torque;
     const double sigma = scenario.torque_noise * rated;
     for (Index k = 0; k < log.samples(); ++k) log.tau(k, j) += sigma * white.normal();
+    if (scenario.vibration.amplitude > 0)
+      add_vibration(scenario.vibration, rated, phases.uniform(0, 2 * std::numbers::pi), log.t, log.tau.col(j));
     if (scenario.ar_noise == 0) continue;
     // e <- pole e + sqrt(1 - pole^2) rms n keeps the RMS that it starts with
     const double rms = scenario.ar_noise * rated, pole = scenario.ar_pole;

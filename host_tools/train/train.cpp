@@ -29,6 +29,12 @@ std::vector<double> grid_distances(const TrainSettings& settings) {
 }
 constexpr std::array grid_scales{1.0, 3.0};
 
+/// Stribeck velocities to choose from, as shares of the joint's top speed; only bristles have one.
+std::vector<double> grid_velocities(const TrainSettings& settings) {
+  if (settings.inputs == BristlesInputs::name) return {0.01, 0.1};
+  return {};
+}
+
 std::vector<Eigen::Index> grid_sizes(const TrainSettings& settings) {
   if (settings.enhancement) return {*settings.enhancement};
   if (settings.nodes) return {*settings.nodes * settings.windows.value_or(1)};
@@ -70,8 +76,14 @@ Choice by_grid(const Fitter& fitter, std::size_t j, const TrainSettings& setting
     attempt({.activation = settings.activation, .nodes = middling, .distance = share}, {middling});
   if (!best) return out;
   const double distance = tried[*best].shape.distance;
+  for (const double velocity : grid_velocities(settings))
+    attempt({.activation = settings.activation, .nodes = middling, .distance = distance, .stribeck = velocity},
+            {middling});
+  const double velocity = tried[*best].shape.stribeck;
   for (const double scale : grid_scales)
-    attempt({.activation = settings.activation, .nodes = most, .scale = scale, .distance = distance}, sizes);
+    attempt(
+        {.activation = settings.activation, .nodes = most, .scale = scale, .distance = distance, .stribeck = velocity},
+        sizes);
   // Of those that are nearly as good, the one with the smallest coefficients: it leans least on its training data.
   const int evaluations = out.evaluations;
   for (const Choice& choice : tried) {
@@ -127,6 +139,10 @@ nlohmann::json choice_json(const TrainOutcome& outcome) {
                         {"reference_velocity", outcome.bls->reference_velocity},
                         {"J", outcome.value}};
   if (outcome.bls->inputs != StateInputs::name) out["distances"] = outcome.bls->distances;
+  if (outcome.bls->inputs == BristlesInputs::name) {
+    out["stribeck_velocity"] = outcome.bls->stribeck;
+    out["share"] = outcome.bls->share;
+  }
   if (outcome.by == "pso") out["generations"] = outcome.generations;
   return out;
 }
@@ -134,7 +150,8 @@ nlohmann::json choice_json(const TrainOutcome& outcome) {
 std::vector<TrainOutcome> train(Fitter& fitter, const TrainSettings& settings, Progress& progress,
                                 const std::optional<ResumeFile>& resume) {
   const std::size_t n = fitter.joints();
-  const std::size_t grid_steps = grid_distances(settings).size() + grid_scales.size() * grid_sizes(settings).size();
+  const std::size_t grid_steps = grid_distances(settings).size() + grid_velocities(settings).size() +
+                                 grid_scales.size() * grid_sizes(settings).size();
   const std::size_t steps = settings.pso ? static_cast<std::size_t>(settings.pso->iterations) + 1 : grid_steps;
   progress.stage(settings.pso ? "training the BLS, by particle swarm" : "training the BLS", n * steps);
   const std::vector<Judgement> without = fitter.held_out();

@@ -1,6 +1,7 @@
 #include "host_tools/train/tuning.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -77,6 +78,8 @@ JointFit BlsDesigner::operator()(const BlsShape& shape) const {
   bls.middle = limited ? (design.q_lower + design.q_upper) / 2 : (low_ + high_) / 2;
   bls.half_range = (limited ? design.q_upper - design.q_lower : range) / 2;
   bls.velocity = std::max(top_speed_, design.dq_limit);
+  bls.stribeck = shape.stribeck * top_speed_;
+  bls.share = shape.share;
   bls.acceleration = std::max({top_acceleration_, design.ddq_limit, least_acceleration});
   bls.torque = design.tau_limit > 0 ? design.tau_limit : design.rated_torque;
   bls.wavenumber = settings_.wavenumber.value_or(revolute_ ? 1 : 2 * std::numbers::pi / range);
@@ -110,20 +113,29 @@ JointFit first_nodes(JointFit design, Index nodes) {
   return design;
 }
 
-BlsSpace::BlsSpace(const PsoSettings& settings, std::string activation) : activations_(settings.activations) {
-  if (activations_.empty()) activations_ = {std::move(activation)};
-  const auto log10 = [](double x) { return std::log10(x); };
-  lower_.resize(7);
-  upper_.resize(7);
-  lower_ << settings.nodes[0], settings.windows[0], log10(settings.ridge[0]), log10(0.3), log10(3e-5), log10(1.5),
-      log10(5e-3);
-  upper_ << settings.nodes[1], settings.windows[1], log10(settings.ridge[1]), log10(6), log10(1e-2), log10(6),
-      log10(0.1);
-  if (activations_.size() == 1) return;
-  lower_.conservativeResize(8);
-  upper_.conservativeResize(8);
-  lower_[7] = 0;
-  upper_[7] = static_cast<double>(activations_.size());
+BlsSpace::BlsSpace(const TrainSettings& settings) : bristles_(settings.inputs == BristlesInputs::name) {
+  const PsoSettings pso = settings.pso.value_or(PsoSettings{});
+  activations_ = pso.activations.empty() ? std::vector{settings.activation} : pso.activations;
+  using Bounds = std::array<double, 2>;
+  const auto log10 = [](Bounds x) { return Bounds{std::log10(x[0]), std::log10(x[1])}; };
+  std::vector<Bounds> all{{static_cast<double>(pso.nodes[0]), static_cast<double>(pso.nodes[1])},
+                          {static_cast<double>(pso.windows[0]), static_cast<double>(pso.windows[1])},
+                          log10(pso.ridge),
+                          log10({0.3, 6}),
+                          log10({3e-5, 1e-2}),
+                          log10({1.5, 6}),
+                          log10({5e-3, 0.1})};
+  if (bristles_) {
+    all.push_back(log10({3e-3, 0.3}));
+    all.push_back({0.4, 0.95});
+  }
+  if (activations_.size() > 1) all.push_back({0, static_cast<double>(activations_.size())});
+  lower_.resize(static_cast<Index>(all.size()));
+  upper_.resize(lower_.size());
+  for (Index i = 0; i < lower_.size(); ++i) {
+    lower_[i] = all[static_cast<std::size_t>(i)][0];
+    upper_[i] = all[static_cast<std::size_t>(i)][1];
+  }
 }
 
 BlsShape BlsSpace::operator()(const Eigen::VectorXd& x) const {
@@ -136,7 +148,11 @@ BlsShape BlsSpace::operator()(const Eigen::VectorXd& x) const {
   shape.distance = from_log(4);
   shape.spread = from_log(5);
   shape.reference_velocity = from_log(6);
-  const double choice = x.size() > 7 ? x[7] : 0;
+  if (bristles_) {
+    shape.stribeck = from_log(7);
+    shape.share = x[8];
+  }
+  const double choice = activations_.size() > 1 ? x[x.size() - 1] : 0;
   shape.activation = activations_[std::min(static_cast<std::size_t>(choice), activations_.size() - 1)];
   return shape;
 }
@@ -154,10 +170,7 @@ double fitness_of(const Judgement& judgement, const JointFit& design) {
 }
 
 BlsFitness::BlsFitness(const Fitter& fitter, std::size_t joint, const TrainSettings& settings)
-    : fitter_(&fitter),
-      joint_(joint),
-      space_(settings.pso.value_or(PsoSettings{}), settings.activation),
-      design_of_(fitter, joint, settings) {}
+    : fitter_(&fitter), joint_(joint), space_(settings), design_of_(fitter, joint, settings) {}
 
 BlsFitness::Outcome BlsFitness::operator()(const Eigen::VectorXd& x) const {
   Outcome out;

@@ -20,6 +20,8 @@ struct BlsShape {
   double distance = 1e-3;            ///< middle presliding distance, of the joint's range
   double spread = 3;                 ///< between two presliding distances
   double reference_velocity = 0.02;  ///< of the joint's top speed
+  double stribeck = 0.03;            ///< Stribeck velocity of the inputs "bristles", of the joint's top speed
+  double share = 0.7;                ///< Coulomb's of static friction there
 };
 
 /// Makes designs of one joint: the fitter's own with a BLS in it.
@@ -48,17 +50,18 @@ class BlsDesigner {
 /// The design with the first nodes of its BLS only.
 JointFit first_nodes(JointFit design, Eigen::Index nodes);
 
-/// The search space of a swarm. Lengths, scales and the ridge on logarithms; the activation is one more dimension where
-/// there is a choice.
+/// The search space of a swarm. Lengths, scales and the ridge on logarithms. Inputs with bristles have two dimensions
+/// more, the activation is the last one where there is a choice.
 class BlsSpace {
  public:
-  BlsSpace(const PsoSettings& settings, std::string activation);
+  explicit BlsSpace(const TrainSettings& settings);
   const Eigen::VectorXd& lower() const { return lower_; }
   const Eigen::VectorXd& upper() const { return upper_; }
   BlsShape operator()(const Eigen::VectorXd& x) const;
 
  private:
   std::vector<std::string> activations_;
+  bool bristles_;
   Eigen::VectorXd lower_, upper_;
 };
 

@@ -53,7 +53,47 @@ class Writer {
   std::vector<VectorXd> q_, dq_, ddq_;
 };
 
+/// A joint's state between two ticks, s in 0 .. 1 of the way, by the polynomial of fifth degree that has the states of
+/// both: a segment is one itself, so that it stays as it is.
+struct Between {
+  double q, dq, ddq;
+};
+Between between(const Reference& r, Index k, Index j, double s) {
+  const double h = r.step_s, p0 = r.q(k, j), v0 = h * r.dq(k, j), a0 = h * h * r.ddq(k, j);
+  const double far = r.q(k + 1, j) - (p0 + v0 + 0.5 * a0), fast = h * r.dq(k + 1, j) - (v0 + a0),
+               bent = h * h * r.ddq(k + 1, j) - a0;
+  const double c3 = 10 * far - 4 * fast + 0.5 * bent, c4 = -15 * far + 7 * fast - bent,
+               c5 = 6 * far - 3 * fast + 0.5 * bent;
+  return {p0 + s * (v0 + s * (0.5 * a0 + s * (c3 + s * (c4 + s * c5)))),
+          (v0 + s * (a0 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / h,
+          (a0 + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))) / (h * h)};
+}
+
 }  // namespace
+
+Move slower(const Move& move, Index ticks) {
+  const Reference& r = move.reference;
+  const Index moving = move.stop - move.start, n = r.q.cols();
+  const double pace = static_cast<double>(moving) / static_cast<double>(moving + ticks);
+  Move out = move;
+  out.stop += ticks;
+  for (Eigen::MatrixXd* signal : {&out.reference.q, &out.reference.dq, &out.reference.ddq})
+    signal->resize(r.q.rows() + ticks, n);
+  for (Index k = 0; k < out.reference.q.rows(); ++k) {
+    const bool moves = k >= move.start && k < out.stop;
+    const double at = moves            ? static_cast<double>(move.start) + pace * static_cast<double>(k - move.start)
+                      : k < move.start ? static_cast<double>(k)
+                                       : static_cast<double>(k - ticks);
+    const auto before = std::min(static_cast<Index>(at), r.q.rows() - 2);
+    for (Index j = 0; j < n; ++j) {
+      const Between state = between(r, before, j, at - static_cast<double>(before));
+      out.reference.q(k, j) = state.q;
+      out.reference.dq(k, j) = (moves ? pace : 1) * state.dq;
+      out.reference.ddq(k, j) = (moves ? pace * pace : 1) * state.ddq;
+    }
+  }
+  return out;
+}
 
 std::vector<Move> make_moves(const IdentifiedModel& robot, double tick_s, std::uint64_t seed, int repeats) {
   Random random(seed);
@@ -92,7 +132,7 @@ std::vector<Move> make_moves(const IdentifiedModel& robot, double tick_s, std::u
       body(writer, start);
       const Index to = writer.samples();
       writer.rest(rest_s);
-      moves.push_back({kind, writer.reference(), from, to});
+      moves.push_back({kind, writer.reference(), from, to, to});
     };
     move("point_to_point", [&](Writer& writer, const VectorXd& start) {
       const VectorXd end = pose();

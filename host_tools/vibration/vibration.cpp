@@ -12,6 +12,7 @@
 #include "host_tools/identify/structure.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
 #include "host_tools/project/provenance.hpp"
+#include "host_tools/report/vibration_result.hpp"
 #include "host_tools/simulate/mujoco_plant.hpp"
 #include "host_tools/simulate/scenario.hpp"
 #include "host_tools/support/error.hpp"
@@ -20,6 +21,8 @@
 #include "host_tools/support/random.hpp"
 #include "host_tools/vibration/motor_reference.hpp"
 #include "host_tools/vibration/moves.hpp"
+#include "host_tools/vibration/outcome.hpp"
+#include "host_tools/vibration/shaper.hpp"
 #include "model/effects/elasticity.hpp"
 
 namespace fxdyn {
@@ -36,24 +39,29 @@ constexpr std::array<double, 8> bandwidths{4, 8, 16, 24, 32, 48, 64, 96};  // Hz
 constexpr std::array<double, 5> dampings{0.3, 0.5, 0.7, 1, 1.4};
 constexpr double encoder_step = 2 * std::numbers::pi / (1 << 22);
 constexpr double still = 0.25;  ///< of the residual of the PD alone
-/// Feedforward "model" at the model's motor_reference().
+/// Feedforward "model" at the model's motor_reference(), and the same of a path that is shaped.
 constexpr const char* elastic = "model_elastic";
+constexpr const char* elastic_shaped = "model_elastic_shaped";
 constexpr std::uint64_t tuning_moves = 1, judged_moves = 2;
 
-/// What one move comes to.
-struct Outcome {
-  double motor = 0, link = 0;  ///< mean squares of the error while it moves [rad^2 | m^2]
-  double with_rest = 0;        ///< the link's, to the end
-  double residual = 0;         ///< [rad | m]
-  double settling_s = 0, roughness = 0;
-  MatrixXd q;  ///< of the motors
-};
+/// The links' path: as the move has it, shaped, or in the time that the shaped one takes.
+enum class Path { asked, shaped, slower };
 
 /// One row of the result.
 struct Method {
-  std::string name, numbers, off;          ///< feedforward, computed in, parameters off
-  const IdentifiedModel* model = nullptr;  ///< none: PD alone
-  bool motor_side = false;                 ///< the motors' reference is the model's, not the links'
+  std::string name, numbers = "-", off = "none";  ///< feedforward, computed in, parameters off
+  const IdentifiedModel* model = nullptr;         ///< none: PD alone
+  bool motor_side = false;                        ///< the motors' reference is the model's, not the links'
+  Path path = Path::asked;
+  const IdentifiedModel* shaper = nullptr;  ///< whose modes it is shaped by
+};
+
+/// A move as a method has it.
+struct Plan {
+  Move move;
+  Reference asked;  ///< of the motors
+  double delay_s = 0;
+  double cut_short = 0;  ///< of the path [rad | m]
 };
 
 class Experiment {
@@ -61,96 +69,138 @@ class Experiment {
   Experiment(const fs::path& project, const fs::path& directory)
       : pipeline_(project, directory), model_(with_tables()), plant_(scenario_plant()) {}
 
-  /// @param known vibration.json, whose controller it takes
-  json with_drive(const json& known, const Feedforward& drive) {
-    const json& control = known.at("control");
-    ClosedLoopSettings settings = loop(control.at("bandwidth_hz"), control.at("damping"));
-    band_ = control.at("settling_band");
+  /// @param known of the host alone, whose controller it takes
+  VibrationResult with_drive(const VibrationResult& known, const Feedforward& drive) {
+    const VibrationControl& control = known.control;
+    settings_ = loop(control.bandwidth_hz, control.damping);
+    instants_ = {control.settling_band, control.late_s};
+    ClosedLoopSettings settings = settings_;
     settings.drive = drive.torque;
-    std::vector<Method> driven{{"model", "drive", "none", &model_}};
-    if (bends(model_)) driven.push_back({elastic, "drive", "none", &model_, true});
+    std::vector<Method> driven{{.name = "model", .numbers = "drive", .model = &model_}};
+    if (bends(model_)) {
+      driven.push_back({.name = elastic, .numbers = "drive", .model = &model_, .motor_side = true});
+      driven.push_back(shaped_row("drive", "none", model_));
+    }
     std::vector<Move> moves = make_moves(model_, model_.tick_s, judged_moves);
     const bool all = drive.most_moves == 0 || drive.most_moves >= moves.size();
     if (!all) moves.erase(moves.begin() + static_cast<std::ptrdiff_t>(drive.most_moves), moves.end());
     progress_.stage("vibration: the drive in the loop", moves.size() * driven.size());
-    json methods = json::array();
-    for (const json& method : known.at("methods")) {
-      const std::string name = method.at("feedforward");
-      const bool beside = name == "none" || name == "model" || name == elastic;
-      if (beside && method.at("parameters_off") == "none") methods.push_back(method);
+    std::vector<VibrationMethod> methods;
+    for (const VibrationMethod& method : known.methods) {
+      const std::string& name = method.feedforward;
+      const bool beside = name == "none" || std::any_of(driven.begin(), driven.end(),
+                                                        [&](const Method& other) { return other.name == name; });
+      if (beside && method.is_exact()) methods.push_back(method);
     }
     for (const Method& method : driven) {
+      std::vector<Plan> plans;
       std::vector<Outcome> outcomes;
       for (const Move& move : moves) {
-        const Reference asked = asked_of(method, move);
-        drive.begin(asked);
-        outcomes.push_back(play(move, asked, {}, settings));
+        plans.push_back(plan(method, move));
+        drive.begin(plans.back().asked);
+        outcomes.push_back(play(plans.back(), {}, settings));
         progress_.step();
       }
-      methods.push_back(summary(method, moves, outcomes));
-      if (all) add_ratios(methods.back(), known.at("methods"));  // means over the same moves
+      methods.push_back(row(method, moves, plans, outcomes));
+      if (all) add_ratios(methods.back(), known.methods);  // means over the same moves
     }
     progress_.done();
-    return {{"schema", "fxdyn.vibration/1"}, {"control", control}, {"methods", methods}};
+    return {{}, {}, control, methods, {}};
   }
 
-  json run() {
+  VibrationResult run() {
     tune();
     const std::vector<Move> moves = make_moves(model_, model_.tick_s, judged_moves);
-    json methods = json::array();
     const bool bent = bends(model_);
-    progress_.stage("vibration: feedforward in the loop", moves.size() * (bent ? 19 : 13));
-    const auto add = [&](const std::string& name, const std::string& numbers, const std::string& error,
-                         const IdentifiedModel* model) {
-      methods.push_back(judge({name, numbers, error, model, name == elastic}, moves));
-    };
     GateData data = read_gate_data(pipeline_.project(), pipeline_.directory());
     Progress quiet;
     const IdentifiedModel friction = identify_structure(pipeline_.project(), data, coulomb_and_viscous, "wls", quiet);
     const IdentifiedModel rigid = rigid_part(friction);
-    set_band(moves);
-    add("none", "-", "none", nullptr);
-    add("rigid", "fixed", "none", &rigid);
-    add("friction", "fixed", "none", &friction);
-    add("model", "fixed", "none", &model_);
-    add("model", "real", "none", &model_);
-    json numbers = compare_numbers(moves, false);
-    if (bent) {
-      add(elastic, "fixed", "none", &model_);
-      add(elastic, "real", "none", &model_);
-      numbers[elastic] = compare_numbers(moves, true);
-    }
+    std::vector<Wrong> wrong;
     for (const double factor : {0.8, 1.2}) {
-      const std::string error = factor < 1 ? "-20 %" : "+20 %";
-      for (const auto& [name, model] :
-           {std::pair("rigid", &rigid), std::pair("friction", &friction), std::pair("model", &std::as_const(model_))}) {
-        const IdentifiedModel wrong = scaled(*model, [&] { return factor; });
-        add(name, "fixed", error, &wrong);
-        if (model == &model_ && bent) add(elastic, "fixed", error, &wrong);
-      }
+      const auto all = [&] { return factor; };
+      wrong.push_back({factor < 1 ? "-20 %" : "+20 %", scaled(model_, all), scaled(rigid, all), scaled(friction, all)});
     }
     Random random(5);
-    const IdentifiedModel mixed = scaled(model_, [&] { return random.uniform() < 0.5 ? 0.8 : 1.2; });
-    add("model", "fixed", "+-20 %", &mixed);
-    if (bent) add(elastic, "fixed", "+-20 %", &mixed);
+    wrong.push_back({"+-20 %", scaled(model_, [&] { return random.uniform() < 0.5 ? 0.8 : 1.2; }), {}, {}});
+    const std::vector<Method> rows = methods(rigid, friction, wrong, bent);
+    set_instants(rows, moves);
+    progress_.stage("vibration: feedforward in the loop", moves.size() * (rows.size() + (bent ? 3 : 1)));
+    std::vector<VibrationMethod> result;
+    for (const Method& method : rows) result.push_back(judge(method, moves));
+    std::vector<Method> compared{{.name = "model", .model = &model_}};
+    if (bent) {
+      compared.push_back(elastic_row("real", "none", model_));
+      compared.push_back(shaped_row("real", "none", model_));
+    }
+    std::map<std::string, NumbersCompared> numbers;
+    for (const Method& method : compared) numbers[method.name] = compare_numbers(moves, method);
     progress_.done();
-    for (json& method : methods) add_ratios(method, json(methods));
-    return {{"schema", "fxdyn.vibration/1"},
-            {"project_hash", model_.project_hash},
-            {"made_from", made_from(pipeline_.project(), pipeline_.directory(), true)},
-            {"control", control_json()},
-            {"methods", methods},
-            {"fixed_against_double", numbers}};
+    for (VibrationMethod& method : result) add_ratios(method, result);
+    return {model_.project_hash, made_from(pipeline_.project(), pipeline_.directory(), true), control(), result,
+            numbers};
   }
 
  private:
-  json control_json() const {
-    return {{"bandwidth_hz", settings_.bandwidth_hz},
-            {"damping", settings_.damping},
-            {"tick_s", model_.tick_s},
-            {"encoder_step", encoder_step},
-            {"settling_band", band_},
-            {"grid", {{"bandwidth_hz", bandwidths}, {"damping", dampings}}}};
+  /// The models with their parameters off.
+  struct Wrong {
+    std::string off;
+    IdentifiedModel model, rigid, friction;
+  };
+
+  static Method elastic_row(const std::string& numbers, const std::string& off, const IdentifiedModel& model) {
+    return {.name = elastic, .numbers = numbers, .off = off, .model = &model, .motor_side = true};
+  }
+  static Method shaped_row(const std::string& numbers, const std::string& off, const IdentifiedModel& model) {
+    Method method = elastic_row(numbers, off, model);
+    method.name = elastic_shaped;
+    method.path = Path::shaped;
+    method.shaper = &model;
+    return method;
+  }
+
+  std::vector<Method> methods(const IdentifiedModel& rigid, const IdentifiedModel& friction,
+                              const std::vector<Wrong>& wrong, bool bent) const {
+    std::vector<Method> rows{{.name = "none"},
+                             {.name = "rigid", .numbers = "fixed", .model = &rigid},
+                             {.name = "friction", .numbers = "fixed", .model = &friction},
+                             {.name = "model", .numbers = "fixed", .model = &model_},
+                             {.name = "model", .numbers = "real", .model = &model_}};
+    if (bent) {
+      rows.push_back(elastic_row("fixed", "none", model_));
+      rows.push_back(elastic_row("real", "none", model_));
+      rows.push_back(shaped_row("fixed", "none", model_));
+      rows.push_back(shaped_row("real", "none", model_));
+      // what shaping alone and the longer time alone are worth
+      rows.push_back({.name = "none_shaped", .path = Path::shaped, .shaper = &model_});
+      rows.push_back({.name = "none_slower", .path = Path::slower, .shaper = &model_});
+      rows.push_back(elastic_row("fixed", "none", model_));
+      rows.back().name = "model_elastic_slower";
+      rows.back().path = Path::slower;
+      rows.back().shaper = &model_;
+    }
+    for (const Wrong& w : wrong) {
+      if (!w.rigid.joints.empty()) {
+        rows.push_back({.name = "rigid", .numbers = "fixed", .off = w.off, .model = &w.rigid});
+        rows.push_back({.name = "friction", .numbers = "fixed", .off = w.off, .model = &w.friction});
+      }
+      rows.push_back({.name = "model", .numbers = "fixed", .off = w.off, .model = &w.model});
+      if (!bent) continue;
+      rows.push_back(elastic_row("fixed", w.off, w.model));
+      rows.push_back(shaped_row("fixed", w.off, w.model));
+    }
+    return rows;
+  }
+
+  VibrationControl control() const {
+    return {settings_.bandwidth_hz,
+            settings_.damping,
+            model_.tick_s,
+            encoder_step,
+            instants_.band,
+            instants_.late_s,
+            {bandwidths.begin(), bandwidths.end()},
+            {dampings.begin(), dampings.end()}};
   }
 
   static ClosedLoopSettings loop(double bandwidth_hz, double damping) {
@@ -162,8 +212,15 @@ class Experiment {
     return s;
   }
 
-  void set_band(const std::vector<Move>& moves) {
-    for (const Move& move : moves) band_ = std::max(band_, still * play(move, move.reference, {}, settings_).residual);
+  /// Of all rows: the band by the PD alone, the late instant by the slowest shaper.
+  void set_instants(const std::vector<Method>& rows, const std::vector<Move>& moves) {
+    std::vector<double> residual(moves.size()), delay(moves.size());
+    parallel_for(moves.size(), [&](std::size_t i) {
+      residual[i] = play(plan({}, moves[i]), {}, settings_).residual;
+      for (const Method& method : rows) delay[i] = std::max(delay[i], plan(method, moves[i]).delay_s);
+    });
+    instants_ = {still * *std::max_element(residual.begin(), residual.end()),
+                 *std::max_element(delay.begin(), delay.end())};
   }
 
   IdentifiedModel with_tables() {
@@ -188,38 +245,33 @@ class Experiment {
                                  pipeline_.project().file.string()));
   }
 
-  static Reference asked_of(const Method& method, const Move& move) {
-    return method.motor_side ? motor_reference(*method.model, move.reference) : move.reference;
+  /// For the modes of `model` under this controller.
+  Shaper shaper(const IdentifiedModel& model, const Reference& path) const {
+    const MotorLoop motors = motor_loop(model, path.q.row(0), settings_.bandwidth_hz, settings_.damping);
+    const ShaperSettings wanted;
+    return design_shaper(bands_along(model, path, motors, wanted.margin), path.step_s, wanted.tolerance);
   }
 
-  /// @param reference what the motors get; the links have to be where the move has them
-  Outcome play(const Move& move, Reference reference, MatrixXd feedforward, const ClosedLoopSettings& settings) const {
+  Plan plan(const Method& method, const Move& move) const {
+    Plan plan{move, {}};
+    if (method.path != Path::asked) {
+      const Shaper by = shaper(*method.shaper, move.reference);
+      plan.move = method.path == Path::shaped ? shaped(move, by) : slower(move, by.delay());
+      plan.delay_s = by.delay_s();
+      plan.cut_short = cut_short(move.reference, plan.move.reference);
+    }
+    plan.asked = method.motor_side ? motor_reference(*method.model, plan.move.reference) : plan.move.reference;
+    return plan;
+  }
+
+  PlantRun run_plant(const Reference& asked, MatrixXd feedforward, const ClosedLoopSettings& settings) const {
+    Reference reference = asked;
     reference.feedforward = std::move(feedforward);
-    const PlantRun run = closed_loop_on_mujoco(plant_, reference, settings);
-    const MatrixXd link = run.q - run.deflections;
-    const Index n = run.q.cols(), moving = move.stop - move.start, after = run.q.rows() - move.stop;
-    Outcome out;
-    const auto mean_square = [](const MatrixXd& m) { return m.squaredNorm() / static_cast<double>(m.size()); };
-    out.motor = mean_square((run.q - reference.q).middleRows(move.start, moving));
-    const MatrixXd error = link - move.reference.q;
-    out.link = mean_square(error.middleRows(move.start, moving));
-    out.with_rest = mean_square(error.bottomRows(error.rows() - move.start));
-    // its place at the end: the mean over the last tenth of a second
-    const auto last = static_cast<Index>(std::lround(0.1 / run.step_s));
-    const Eigen::RowVectorXd end = link.bottomRows(last).colwise().mean();
-    const MatrixXd off = (link.bottomRows(after).rowwise() - end).cwiseAbs();
-    out.residual = off.colwise().maxCoeff().mean();
-    for (Index k = 0; k < after; ++k) {
-      if (off.row(k).maxCoeff() > band_) out.settling_s = run.step_s * static_cast<double>(k + 1);
-    }
-    for (Index j = 0; j < n; ++j) {
-      const VectorXd torque = run.tau.col(j).segment(move.start, moving);
-      const VectorXd change = torque.tail(moving - 1) - torque.head(moving - 1);
-      out.roughness += std::sqrt(change.squaredNorm() / static_cast<double>(moving - 1)) /
-                       plant_.joints[static_cast<std::size_t>(j)].rated_torque / static_cast<double>(n);
-    }
-    out.q = run.q;
-    return out;
+    return closed_loop_on_mujoco(plant_, reference, settings);
+  }
+  Outcome play(const Plan& plan, MatrixXd feedforward, const ClosedLoopSettings& settings) const {
+    return outcome_of(run_plant(plan.asked, std::move(feedforward), settings), plan.move, plan.asked, plant_,
+                      instants_);
   }
 
   void tune() {
@@ -231,7 +283,7 @@ class Experiment {
     };
     parallel_for(cost.size(), [&](std::size_t i) {
       try {
-        for (const Move& move : moves) cost[i] += play(move, move.reference, {}, settings(i)).with_rest;
+        for (const Move& move : moves) cost[i] += play(plan({}, move), {}, settings(i)).with_rest;
       } catch (const RunsAway&) {
         cost[i] = 1e300;
       }
@@ -266,132 +318,72 @@ class Experiment {
     return predict_fixed(model, model.formats ? *model.formats : choose_formats(model), states);
   }
 
-  json judge(const Method& method, const std::vector<Move>& moves) {
+  VibrationMethod judge(const Method& method, const std::vector<Move>& moves) {
+    std::vector<Plan> plans(moves.size());
     std::vector<Outcome> outcomes(moves.size());
     parallel_for(moves.size(), [&](std::size_t i) {
-      const Reference asked = asked_of(method, moves[i]);
-      outcomes[i] =
-          play(moves[i], asked,
-               method.model == nullptr ? MatrixXd() : feedforward(*method.model, method.numbers, asked), settings_);
+      plans[i] = plan(method, moves[i]);
+      outcomes[i] = play(
+          plans[i], method.model == nullptr ? MatrixXd() : feedforward(*method.model, method.numbers, plans[i].asked),
+          settings_);
       progress_.step();
     });
-    return summary(method, moves, outcomes);
+    return row(method, moves, plans, outcomes);
   }
 
-  static json summary(const Method& method, const std::vector<Move>& moves, const std::vector<Outcome>& outcomes) {
-    json kinds = json::object();
-    const auto mean = [&](const std::string& kind) {
-      Outcome sum;
-      double count = 0;
-      for (std::size_t i = 0; i < moves.size(); ++i) {
-        if (kind != "all" && moves[i].kind != kind) continue;
-        ++count;
-        sum.motor += outcomes[i].motor;
-        sum.link += outcomes[i].link;
-        sum.residual += outcomes[i].residual;
-        sum.settling_s += outcomes[i].settling_s;
-        sum.roughness += outcomes[i].roughness;
-      }
-      return json{{"tracking_motor", 1e3 * std::sqrt(sum.motor / count)},
-                  {"tracking_link", 1e3 * std::sqrt(sum.link / count)},
-                  {"residual", 1e3 * sum.residual / count},
-                  {"settling_s", sum.settling_s / count},
-                  {"roughness", sum.roughness / count}};
-    };
-    kinds["all"] = mean("all");
-    for (const Move& move : moves) {
-      if (!kinds.contains(move.kind)) kinds[move.kind] = mean(move.kind);
+  static VibrationMethod row(const Method& method, const std::vector<Move>& moves, const std::vector<Plan>& plans,
+                             const std::vector<Outcome>& outcomes) {
+    VibrationMethod out{method.name, method.numbers, method.off, method.motor_side, {}, {}, {}};
+    set_means(out, moves, outcomes);
+    if (method.path == Path::asked) return out;
+    out.path = {method.path == Path::shaped ? "shaped" : "slower", {}, 0};
+    for (const Plan& plan : plans) {
+      out.path->delay_s.push_back(plan.delay_s);
+      out.path->cut_short = std::max(out.path->cut_short, 1e3 * plan.cut_short);
     }
-    return {{"feedforward", method.name},
-            {"numbers", method.numbers},
-            {"parameters_off", method.off},
-            {"reference", method.motor_side ? "motor" : "link"},
-            {"moves", kinds}};
-  }
-
-  /// Over all moves, against the PD alone and the rigid body.
-  static void add_ratios(json& method, const json& methods) {
-    for (const json& other : methods) {
-      const std::string name = other.at("feedforward");
-      if ((name != "none" && name != "rigid") || other.at("parameters_off") != "none") continue;
-      for (const char* key : {"tracking_motor", "tracking_link", "residual", "settling_s", "roughness"}) {
-        const double base = other.at("moves").at("all").at(key);
-        if (base > 0) method["ratios"][name][key] = method.at("moves").at("all").at(key).get<double>() / base;
-      }
-    }
+    return out;
   }
 
   /// Of the motors' remaining error (RMS, double in the loop): how much it is another in fixed point, and how far both
   /// paths are apart. Exact encoders: the steps of real ones part any two runs that differ at all.
-  json compare_numbers(const std::vector<Move>& moves, bool motor_side) {
+  NumbersCompared compare_numbers(const std::vector<Move>& moves, const Method& method) {
     ClosedLoopSettings exact = settings_;
     exact.encoder_step = 0;
     VectorXd error(moves.size()), fixed(moves.size()), apart(moves.size());
     parallel_for(moves.size(), [&](std::size_t i) {
-      const Reference asked = asked_of({"", "", "", &model_, motor_side}, moves[i]);
-      const MatrixXd real = play(moves[i], asked, feedforward(model_, "real", asked), exact).q;
-      const MatrixXd rounded = play(moves[i], asked, feedforward(model_, "fixed", asked), exact).q;
+      const Reference asked = plan(method, moves[i]).asked;
+      const MatrixXd real = run_plant(asked, feedforward(model_, "real", asked), exact).q;
+      const MatrixXd rounded = run_plant(asked, feedforward(model_, "fixed", asked), exact).q;
       const auto k = static_cast<Index>(i);
       error[k] = (real - asked.q).squaredNorm();
       fixed[k] = (rounded - asked.q).squaredNorm();
       apart[k] = (rounded - real).squaredNorm();
       progress_.step();
     });
-    return {{"error_change", std::fabs(std::sqrt(fixed.sum() / error.sum()) - 1)},
-            {"path_difference", std::sqrt(apart.sum() / error.sum())}};
+    return {std::fabs(std::sqrt(fixed.sum() / error.sum()) - 1), std::sqrt(apart.sum() / error.sum())};
   }
 
   Pipeline pipeline_;
   IdentifiedModel model_, plant_;
   ClosedLoopSettings settings_;
-  double band_ = 0;  ///< within which a link counts as still [rad | m]
+  Instants instants_;
   Progress progress_;
 };
 
 }  // namespace
 
-json vibration(const fs::path& project, const fs::path& directory) {
-  const json result = Experiment(project, directory).run();
-  write_file(directory / "vibration.json", result.dump(1) + "\n");
+VibrationResult vibration(const fs::path& project, const fs::path& directory) {
+  VibrationResult result = Experiment(project, directory).run();
+  write_file(directory / "vibration.json", to_json(result).dump(1) + "\n");
   return result;
 }
 
-json vibration_with(const fs::path& project, const fs::path& directory, const Feedforward& drive) {
+VibrationResult vibration_with(const fs::path& project, const fs::path& directory, const Feedforward& drive) {
   const fs::path file = directory / "vibration.json";
-  json known = fs::exists(file) ? json::parse(read_file(file)) : json();
-  if (known.is_null() || !is_unchanged(known.value("made_from", json()), directory))
-    known = vibration(project, directory);
-  return Experiment(project, directory).with_drive(known, drive);
-}
-
-std::string vibration_table(const json& result) {
-  const json& control = result.at("control");
-  std::string out = fmt::format("PD of {:.3g} Hz, damping {:.2g} (best alone), tick {:.3g} ms; means over all moves\n",
-                                control.at("bandwidth_hz").get<double>(), control.at("damping").get<double>(),
-                                1e3 * control.at("tick_s").get<double>());
-  out += fmt::format("{:<13} {:<6} {:<7} {:>10} {:>10} {:>9} {:>10} {:>9} | {}\n", "feedforward", "as", "off",
-                     "motor mrad", "link mrad", "residual", "settling s", "roughness",
-                     "of PD alone: motor, link, residual; of rigid: motor, link");
-  for (const json& method : result.at("methods")) {
-    const json& all = method.at("moves").at("all");
-    const auto value = [&](const char* key) { return all.at(key).get<double>(); };
-    const auto ratio = [&](const char* base, const char* key) {
-      const json::json_pointer at(fmt::format("/ratios/{}/{}", base, key));
-      return method.contains(at) ? fmt::format(" {:>6.3f}", method.at(at).get<double>()) : "      -";
-    };
-    out += fmt::format("{:<13} {:<6} {:<7} {:>10.4g} {:>10.4g} {:>9.3g} {:>10.3f} {:>9.2g} |{}{}{} {}{}\n",
-                       method.at("feedforward").get<std::string>(), method.at("numbers").get<std::string>(),
-                       method.at("parameters_off").get<std::string>(), value("tracking_motor"), value("tracking_link"),
-                       value("residual"), value("settling_s"), value("roughness"), ratio("none", "tracking_motor"),
-                       ratio("none", "tracking_link"), ratio("none", "residual"), ratio("rigid", "tracking_motor"),
-                       ratio("rigid", "tracking_link"));
-  }
-  if (!result.contains("fixed_against_double")) return out;
-  const json& numbers = result.at("fixed_against_double");
-  out += fmt::format(
-      "fixed point against double in the loop, of the remaining error: {:.2g} more or less, paths {:.2g} apart\n",
-      numbers.at("error_change").get<double>(), numbers.at("path_difference").get<double>());
-  return out;
+  const json known = fs::exists(file) ? json::parse(read_file(file)) : json();
+  const bool current = !known.is_null() && is_unchanged(known.value("made_from", json()), directory);
+  const VibrationResult host = current ? vibration_of(known) : vibration(project, directory);
+  return Experiment(project, directory).with_drive(host, drive);
 }
 
 }  // namespace fxdyn

@@ -1,7 +1,6 @@
 #pragma once
 
-#include "model/effect.hpp"
-#include "model/shapes.hpp"
+#include "model/effects/bristle.hpp"
 
 namespace fxdyn {
 
@@ -11,11 +10,7 @@ namespace fxdyn {
 ///   tau = static (y - share s) + damping (dq - |dq| y / n(dq)).
 /// Fs = static, Fc = share static: static friction and Coulomb's; distance = Fs / sigma0; damping = sigma1; s is the
 /// sign that the effect `coulomb` has: with its amplitude share * static, both add up to static y. Joint side.
-///
-/// Each tick is stepped exactly for a constant velocity, the mean of those at its ends, and n of its end:
-///   y <- y e + n s (1 - e),   e = exp(-|mean| tick / (distance n)).
-/// It is stable for every tick, since y stays between its last value and n s. The mean makes the path of a tick right
-/// to second order; with the velocity at its end alone the error is 20 to 80 times as large.
+/// The step of a tick: Bristle.
 struct Lugre {
   static constexpr std::string_view name = "lugre";
   static constexpr std::string_view equation =
@@ -38,7 +33,7 @@ struct Lugre {
       ParameterInfo{"damping", "N*m*s/rad", "N*s/m", 0, unbounded, Quantity::velocity, "Han, Wu, Hui 2025, Eq. 20"}};
   template <class N>
   struct State {
-    Unit<N> y{};
+    Bristle<N> bristle{};
     Velocity<N> dq{};  ///< of the tick before
   };
   static constexpr double stored_shape(std::size_t i, double value, double tick_s) {
@@ -47,26 +42,15 @@ struct Lugre {
 
   template <class N, class Emit>
   static constexpr void basis(const JointInput<N>& u, Words<N> words, State<N>& state, Saturations&, Emit&& emit) {
-    const auto inverse_path = words.template number<Quantity::inverse_path>(0);
-    const auto inverse_velocity = words.template number<Quantity::inverse_velocity>(1);
     const auto most_fall = words.template number<Quantity::unit>(2);
-    const auto one = N::one();
-    const auto bell = bell_of<N>(N::template clamp<Argument<N>>(u.dq * inverse_velocity));
-    const auto fall = N::template proven_narrow<Unit<N>>(most_fall * N::template proven_narrow<Unit<N>>(one - bell));
-    const auto n = N::template proven_narrow<Unit<N>>(one - fall);
-    const auto inverse = reciprocal_of(n);
-
-    const auto way = u.dq + state.dq;
-    const auto mean = N::template proven_narrow<Velocity<N>>(half_of(way));
-    const auto rate = N::template proven_narrow<InversePath<N>>(inverse_path * inverse);
-    const auto decay = exp_negative(N::template clamp<Argument<N>>(magnitude(mean) * rate));
-    state.y = relax<N>(state.y, signed_as(n, way), N::template proven_narrow<Unit<N>>(one - decay));
+    const auto level = SlidingLevel<N>::at(u.dq, words.template number<Quantity::inverse_velocity>(1), most_fall);
+    state.bristle.step(u.dq + state.dq, words.template number<Quantity::inverse_path>(0), level);
     state.dq = u.dq;
 
-    const auto coulomb = N::template proven_narrow<Unit<N>>(one - most_fall) * u.sign;
-    const auto sliding = magnitude(u.dq) * N::template proven_narrow<Ratio<N>>(state.y * inverse);
-    emit(as<Quantity::unit>, 0, N::template clamp<Unit<N>>(align(state.y, coulomb) - coulomb));
-    emit(as<Quantity::velocity>, 1, N::template proven_narrow<Velocity<N>>(align(u.dq, sliding) - sliding));
+    const auto y = state.bristle.y;
+    const auto coulomb = N::template proven_narrow<Unit<N>>(N::one() - most_fall) * u.sign;
+    emit(as<Quantity::unit>, 0, N::template clamp<Unit<N>>(align(y, coulomb) - coulomb));
+    emit(as<Quantity::velocity>, 1, state.bristle.rate(u.dq, level));
   }
 };
 

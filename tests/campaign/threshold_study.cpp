@@ -50,7 +50,7 @@ class Prepared {
     GateData data = data_;
     Progress progress;
     try {
-      return answer_of(truth_, diagnose(project_, data, baseline_, {}, progress, options).report);
+      return answer_of(truth_, to_json(diagnose(project_, data, baseline_, {}, progress, options).report));
     } catch (const DataError&) {
       return {"refused", {}, {}, false};
     }

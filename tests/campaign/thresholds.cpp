@@ -30,7 +30,6 @@ constexpr auto deflection = &Options::deflection;
 std::vector<Threshold> before_the_search() {
   using namespace diagnosis;
   return {
-      {"noise.velocity_error", "-", place<noise, &NoiseOptions::velocity_error>},
       {"noise.doubtful", "noise variances", place<noise, &NoiseOptions::doubtful>},
       {"noise.background_prior", "noise variances", place<noise, &NoiseOptions::background_prior>,
        Reads::with_baseline},
@@ -70,6 +69,7 @@ std::vector<Threshold> of_the_judges() {
   return {
       {"gate.least_gain", "noise variances", place<gate, &GateOptions::least_gain>},
       {"gate.least_share", "share", place<gate, &GateOptions::least_share>},
+      {"gate.sure_gain", "noise variances", place<gate, &GateOptions::sure_gain>},
       {"gate.least_share_in_structure", "share", place<gate, &GateOptions::least_share_in_structure>},
       {"gate.worse", "-", place<gate, &GateOptions::worse>},
       {"gate.least_closure", "share", place<gate, &GateOptions::least_closure>},

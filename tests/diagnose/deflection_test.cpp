@@ -57,6 +57,25 @@ TEST_F(DeflectionOfAGear, InProportionToTheLoadIsAnElasticity) {
   EXPECT_TRUE(background_.empty());
 }
 
+TEST_F(DeflectionOfAGear, ACompliancesDeviationHasTheLoadsInIt) {
+  const std::vector<ProcessedLog> logs{log(Role::train, 1, bent), log(Role::validate, 2, bent)};
+  const auto relative = [&](const MatrixXd& covariance) {
+    background_.clear();
+    const Deflections found = find_deflections(model_, covariance, logs, {}, background_, {});
+    if (found.found.size() != 1) return -1.0;
+    const EffectFit& fit = found.found[0].fit;
+    return fit.linear_std[0] / fit.linear[0];
+  };
+  const double alone = relative(MatrixXd());
+  EXPECT_GT(alone, 0);
+  EXPECT_LT(alone, 1e-3);
+  // Base parameters that are all off by one and the same 3 %, so is the load, and the compliance with it.
+  VectorXd base(static_cast<Index>(model_.base.size()));
+  for (Index k = 0; k < base.size(); ++k) base[k] = model_.base[static_cast<std::size_t>(k)].value;
+  const VectorXd off = 0.03 * base;
+  EXPECT_NEAR(relative(off * off.transpose()), 0.03, 0.003);
+}
+
 TEST_F(DeflectionOfAGear, OnceATurnIsAnEccentricity) {
   const auto wheel = [](double q, double) { return 3e-4 * std::cos(q) - 2e-4 * std::sin(q); };
   const Deflections found = find({log(Role::train, 1, wheel), log(Role::validate, 2, wheel)});

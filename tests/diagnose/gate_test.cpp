@@ -58,8 +58,8 @@ TEST_F(NamesAtTheGate, OnlyWhatBringsSomethingStays) {
   const Deflections no_deflections;
   const std::vector<std::optional<Impacts>> no_impacts(6);
   const std::vector<ProcessedLog> no_test;
-  const json report = verdicts(
-      {nominal_, outcome_.models.current, outcome_, gate, no_deflections, no_impacts, still_, processed_, no_test});
+  const json report = to_json(verdicts(
+      {nominal_, outcome_.models.current, outcome_, gate, no_deflections, no_impacts, still_, processed_, no_test}));
   EXPECT_EQ(report.at("verdict"), "effects_found") << report.dump(1);
   EXPECT_EQ(report.at("gate"), "validate logs");
   const json& joint = report.at("joints").at(1);
@@ -80,6 +80,38 @@ TEST_F(NamesAtTheGate, NothingIsBelievedThatClosesTooLittle) {
   const Gate gate = pass(outcome_, nominal_, logs_, still_);
   ASSERT_EQ(gate.groups.size(), 1U);
   EXPECT_FALSE(gate.accepted[1]);
+}
+
+/// A large ripple and, beside it at the same joint, one with half a percent of its power.
+class ASmallNameBesideALargeOne : public testing::Test {
+ protected:
+  ASmallNameBesideALargeOne() : nominal_(test::fitted_puma()) {
+    IdentifiedModel robot = nominal_;
+    outcome_.models = test::around(nominal_);
+    auto& effects = outcome_.models.current.joints[1].effects;
+    for (const auto& [wavenumber, amplitude] : {std::pair{14.0, 1.0}, std::pair{23.0, 0.07}}) {
+      robot.joints[1].effects.push_back(test::effect("ripple", {wavenumber}, {amplitude, 0}));
+      effects.push_back(test::named_effect("ripple", {wavenumber}, {amplitude, 0}));
+      outcome_.found.push_back({{false, 1, effects.size() - 1}, 100, {}});
+    }
+    for (const auto& [role, seed] : {std::pair{Role::train, 1}, std::pair{Role::validate, 2}})
+      logs_.push_back(test::small_session_log(robot, role, static_cast<std::uint64_t>(seed)));
+    outcome_.whitening = test::no_whitening();
+    outcome_.not_identifiable.resize(7);
+    outcome_.look_again(logs_);
+  }
+  std::size_t names_left() { return pass(outcome_, nominal_, logs_, std::vector<bool>(6, false)).groups.size(); }
+
+  IdentifiedModel nominal_;
+  std::vector<SessionLog> logs_;
+  Outcome outcome_;
+};
+
+TEST_F(ASmallNameBesideALargeOne, StaysWhereItIsSure) { EXPECT_EQ(names_left(), 2U); }
+
+TEST_F(ASmallNameBesideALargeOne, GoesWhereItIsNot) {
+  outcome_.models.options.gate.sure_gain = 1e9;
+  EXPECT_EQ(names_left(), 1U);
 }
 
 TEST(WhatJudges, IsNamed) {

@@ -27,6 +27,13 @@ json arm_diagnosis() {
   return diagnosis;
 }
 
+/// The same, as far as plots are drawn from it.
+DiagnosisResult to_draw(Verdict elbow) {
+  DiagnosisResult out;
+  out.joints = {{"shoulder", "N*m", 1, Verdict::effects_found}, {"elbow", "N*m", 2, elbow}};
+  return out;
+}
+
 std::size_t count(const std::string& text, const std::string& part) {
   std::size_t found = 0;
   for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++found;
@@ -62,7 +69,8 @@ TEST(DiagnosisReport, IsInTheReportWithPlotsAndTheReportSurvivesWithoutIt) {
 
   const json diagnosis = arm_diagnosis();
   const IdentifiedModel truth = run.arm.truth(run.logs[0]);
-  const auto plots = write_diagnosis_plots(test::without(truth, "stribeck"), truth, run.logs, diagnosis, run.out);
+  const auto plots =
+      write_diagnosis_plots(test::without(truth, "stribeck"), truth, run.logs, to_draw(Verdict::unexplained), run.out);
   ASSERT_EQ(plots.size(), 2U);
   for (const fs::path& plot : plots) {
     ASSERT_TRUE(fs::exists(plot));
@@ -99,11 +107,9 @@ TEST(DiagnosisReport, ADiagnosisOfOtherLogsIsNotShown) {
 TEST(DiagnosisReport, PlotsOfAnEarlierDiagnosisAreRemoved) {
   const Identified run("earlier");
   const IdentifiedModel truth = run.arm.truth(run.logs[0]);
-  json diagnosis = arm_diagnosis();
-  write_diagnosis_plots(run.model, truth, run.logs, diagnosis, run.out);
+  write_diagnosis_plots(run.model, truth, run.logs, to_draw(Verdict::unexplained), run.out);
   EXPECT_TRUE(fs::exists(diagnosis_plot(run.out, 1)));
-  diagnosis["joints"][1]["verdict"] = "nothing_missing";
-  write_diagnosis_plots(run.model, truth, run.logs, diagnosis, run.out);
+  write_diagnosis_plots(run.model, truth, run.logs, to_draw(Verdict::nothing_missing), run.out);
   EXPECT_TRUE(fs::exists(diagnosis_plot(run.out, 0)));
   EXPECT_FALSE(fs::exists(diagnosis_plot(run.out, 1)));
 }

@@ -4,8 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <nlohmann/json.hpp>
-
 #include "host_tools/effects/identified_model.hpp"
 #include "tests/diagnose/small_log.hpp"
 
@@ -14,7 +12,6 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-using nlohmann::json;
 
 constexpr std::size_t joint = 1;
 
@@ -25,48 +22,48 @@ class Where : public testing::Test {
 
   /// Regions of an error of 1 N*m wherever `inside` holds, of a tenth of that elsewhere.
   template <class Inside>
-  json regions(Inside inside) {
+  std::vector<GapRegion> regions(Inside inside) {
     const MotionRows motion = log_.joint_motion(static_cast<Index>(joint));
     VectorXd error(log_.samples());
     for (Index k = 0; k < error.size(); ++k) error[k] = inside(motion.q(k, 0), motion.dq(k, 0), log_.t[k]) ? 1 : 0.1;
     return where(model_, {&log_}, joint, {error}, 0.1, {});
   }
-  static const json& region(const json& all, const std::string& signal) {
-    const auto found = std::find_if(all.begin(), all.end(), [&](const json& r) { return r.at("signal") == signal; });
-    if (found == all.end()) throw std::runtime_error("no region of " + signal + ": " + all.dump());
+  static GapRegion region(const std::vector<GapRegion>& all, const std::string& signal) {
+    const auto found = std::find_if(all.begin(), all.end(), [&](const GapRegion& r) { return r.signal == signal; });
+    if (found == all.end()) throw std::runtime_error("no region of " + signal);
     return *found;
   }
 };
 
 TEST_F(Where, FindsTheRangeOfThePosition) {
-  const json all = regions([](double q, double, double) { return q > 0.2 && q < 0.4; });
-  EXPECT_EQ(all.at(0).at("signal"), "q") << all.dump();
+  const auto all = regions([](double q, double, double) { return q > 0.2 && q < 0.4; });
+  ASSERT_EQ(all.at(0).signal, "q");
   const double bin = 1.6 / 24;  // of the joint's range
-  EXPECT_NEAR(all.at(0).at("from"), 0.2, bin);
-  EXPECT_NEAR(all.at(0).at("to"), 0.4, bin);
-  EXPECT_GT(all.at(0).at("share_of_gap"), 0.95);
+  EXPECT_NEAR(all[0].from, 0.2, bin);
+  EXPECT_NEAR(all[0].to, 0.4, bin);
+  EXPECT_GT(*all[0].share_of_gap, 0.95);
 }
 
 TEST_F(Where, FindsTheSpeed) {
-  const json all = regions([](double, double dq, double) { return dq > 0.9; });
-  const json& found = region(all, "dq");
-  EXPECT_NEAR(found.at("from"), 0.9, 0.15);
-  EXPECT_GT(found.at("share_of_gap"), 0.95);
+  const auto all = regions([](double, double dq, double) { return dq > 0.9; });
+  const GapRegion found = region(all, "dq");
+  EXPECT_NEAR(found.from, 0.9, 0.15);
+  EXPECT_GT(*found.share_of_gap, 0.95);
 }
 
 TEST_F(Where, FindsTheTime) {
-  const json all = regions([](double, double, double t) { return t > 5 && t < 7; });
-  const json& found = region(all, "t");
-  EXPECT_NEAR(found.at("from"), 5, 1);
-  EXPECT_NEAR(found.at("to"), 7, 1);
-  EXPECT_GT(found.at("share_of_gap"), 0.95);
+  const auto all = regions([](double, double, double t) { return t > 5 && t < 7; });
+  const GapRegion found = region(all, "t");
+  EXPECT_NEAR(found.from, 5, 1);
+  EXPECT_NEAR(found.to, 7, 1);
+  EXPECT_GT(*found.share_of_gap, 0.95);
 }
 
 TEST_F(Where, FindsTheDirection) {
-  const json found = region(regions([](double, double dq, double) { return dq < 0; }), "direction");
-  EXPECT_EQ(found.at("from"), -1);
-  EXPECT_EQ(found.at("to"), 0);
-  EXPECT_GT(found.at("share_of_gap"), 0.95);
+  const GapRegion found = region(regions([](double, double dq, double) { return dq < 0; }), "direction");
+  EXPECT_EQ(found.from, -1);
+  EXPECT_EQ(found.to, 0);
+  EXPECT_GT(*found.share_of_gap, 0.95);
 }
 
 // One region is always given, here all of a range; others only where they tell something.

@@ -314,11 +314,11 @@ TEST_F(CanDrivesTest, CountsTicksWithEnableLow) {
   CanDrives drives(bus_, model_, {});
   drives.restart();
   tick(drives);
-  EXPECT_EQ(drives.report().at("disabled_ticks"), 0);
+  EXPECT_EQ(drives.report().disabled_ticks, 0U);
   bus_.nodes[2].torque_status = torque_status::fresh;
   tick(drives);
   tick(drives);
-  EXPECT_EQ(drives.report().at("disabled_ticks"), 2);
+  EXPECT_EQ(drives.report().disabled_ticks, 2U);
 }
 
 }  // namespace

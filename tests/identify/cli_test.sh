@@ -109,12 +109,43 @@ forward "nothing is left to simulate" good.csv --given 5000
 forward "tau2 (second) stays at 0" zero.csv
 awk -F, 'BEGIN { OFS = "," } NR > 1 { $4 = -$4; $5 = -$5 } { print }' "$work/good.csv" >"$work/opposite.csv"
 forward "is it this robot's" opposite.csv
+awk -F, 'BEGIN { OFS = "," } { print $1, $2, $3 }' "$work/good.csv" >"$work/motion.csv"
+forward "tau1" motion.csv
+awk -F, 'BEGIN { OFS = "," } NR == 700 { $5 = "nan" } { print }' "$work/good.csv" >"$work/gap.csv"
+forward "gap.csv:700" gap.csv
+sed '2,12s/^[^,]*,[^,]*/,/' "$work/good.csv" >"$work/first.csv"
+forward "first.csv:2" first.csv
+# A model of a robot with other joints, and of the same joints with other masses.
+awk -F, 'BEGIN { OFS = "," } { print $1, $2, $4 }' "$work/good.csv" >"$work/one.csv"
+forward "q2" one.csv
 [ ! -e "$work/out" ] || { echo "FAILED: forward left files behind"; failures=$((failures + 1)); }
 "$fxdyn" forward --model "$work/good/model.json" --log "$work/good.csv" --out "$work/forward" >/dev/null 2>&1 ||
   { echo "FAILED: forward of a good log"; failures=$((failures + 1)); }
 for file in forward.json closed.csv forward.svg; do
   [ -s "$work/forward/$file" ] || { echo "FAILED: forward: no $file"; failures=$((failures + 1)); }
 done
+# LuGre friction that would drive the joint, and bristles that can't bend: every verb that reads the model says so.
+lugre() {  # lugre FILE DISTANCE DAMPING
+  python3 - "$work/good/model.json" "$work/$1" "$2" "$3" <<'PYTHON'
+import json, sys
+model = json.load(open(sys.argv[1]))
+values = {"distance": float(sys.argv[3]), "velocity": 0.1, "share": 0.7, "static": 5.0, "damping": float(sys.argv[4])}
+model["joints"][1]["effects"].append({"effect": "lugre", "origin": "named", "parameters":
+                                      [{"name": name, "unit": "", "value": value} for name, value in values.items()]})
+for of_tables in ("formats", "layout", "tables_crc"):
+    model.pop(of_tables, None)
+json.dump(model, open(sys.argv[2], "w"))
+PYTHON
+}
+lugre drives.json 0.01 1000
+lugre stiff.json 0 2
+lugre brakes.json 0.01 20
+for verb in predict forward payload; do
+  expect 2 "joint 2 (second): lugre: with a damping of 1000 it would drive the joint" $verb --model "$work/drives.json" --log "$work/good.csv" --out "$work/out"
+  expect 2 "joint 2 (second): lugre: distance 0 is not within" $verb --model "$work/stiff.json" --log "$work/good.csv" --out "$work/out"
+done
+"$fxdyn" predict --model "$work/brakes.json" --log "$work/good.csv" --out "$work/brakes" >/dev/null 2>&1 ||
+  { echo "FAILED: predict with LuGre friction"; failures=$((failures + 1)); }
 expect 2 "would be overwritten" payload --model "$work/good/model.json" --log "$work/good.csv" --out "$work/good"
 expect 2 "'diagnos' is no verb" diagnos "$work/good.toml" --out "$work/fresh"
 expect 2 "'--oout' is no option here" diagnose "$work/good.toml" --oout "$work/fresh"

@@ -5,11 +5,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
 
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/pipeline/one_log.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
+#include "host_tools/robot/write_urdf.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/support/files.hpp"
 #include "tests/support/files.hpp"
@@ -158,13 +160,15 @@ TEST(Identify, FindsPreslidingWhereThereIsNoOtherFriction) {
   const fs::path out = test::folder() / "presliding";
   Pipeline(project("presliding.toml", scenario("presliding_s.toml", effects), ""), out).identify();
   const IdentifiedModel model = read_model(out / "model.json");
-  int found = 0;
-  for (const JointFit& joint : model.joints) {
-    const EffectFit* fit = joint.find("presliding");
-    if (fit == nullptr) continue;
-    found += std::fabs(fit->shape[0] - 0.01) < 0.005;
+  for (std::size_t j = 0; j < model.joints.size(); ++j) {
+    const EffectFit *fit = model.joints[j].find("presliding"), *coulomb = model.joints[j].find("coulomb");
+    ASSERT_NE(fit, nullptr) << "joint " << j + 1;
+    ASSERT_NE(coulomb, nullptr) << "joint " << j + 1;
+    // 1.1 to 1.9 % too long: the filter rounds the corner that it is seen by. Amplitudes are off by 0.7 and 0.1 %.
+    EXPECT_NEAR(fit->shape[0], 0.01, 0.03 * 0.01) << "joint " << j + 1;
+    EXPECT_NEAR(fit->linear[0], 4, 0.01 * 4) << "joint " << j + 1;
+    EXPECT_NEAR(coulomb->linear[0], 4, 0.005 * 4) << "joint " << j + 1;
   }
-  EXPECT_GE(found, 5);  // joint 2 reverses too seldom in one short log
 }
 
 TEST(Identify, FindsLugresShapesWhereItIsAskedFor) {
@@ -192,6 +196,51 @@ TEST(Identify, FindsLugresShapesWhereItIsAskedFor) {
   }
   // Four standard deviations of joint 3, the least certain one; joint 2 reverses too seldom in one short log.
   EXPECT_GE(found, 5);
+}
+
+/// The PUMA's URDF with masses and inertias that are about 30 % off.
+fs::path guessed_urdf(const std::string& name) {
+  const fs::path original = FXDYN_SOURCE_DIR "/host_tools/demo/puma560.urdf";
+  fs::path out = test::folder() / name;
+  const Robot robot = read_urdf(original);
+  const DhChain chain = to_dh(robot);
+  const std::array factors{0.76, 0.94, 1.43, 1.08, 1.06, 1.22};
+  std::vector<LinkInertia<Real>> links;
+  for (std::size_t i = 0; i < robot.size(); ++i) {
+    Inertial body = *robot.joints[i].inertial;
+    body.mass *= factors[i];
+    body.tensor *= factors[i];
+    links.push_back(to_link_inertia(body, chain.urdf_in_dh[i]));
+  }
+  write_urdf(original, out, robot, chain, links);
+  return out;
+}
+
+TEST(Identify, InertiasOfAUrdfThatAreThirtyPercentOffHelpAShortLog) {
+  const fs::path made = scenario("prior_s.toml", "[sensors]\nencoder_bits = 17\ntorque_noise = 0.02\n");
+  const fs::path urdf = guessed_urdf("guessed.urdf");
+  const auto error = [&](const std::string& name, const std::string& identify) {
+    std::string text = "[identify]\neffects = []\n" + identify + "[robot]\nurdf = \"" + urdf.string() +
+                       "\"\nrated_torque = [97.6, 186.4, 89.4, 24.2, 20.1, 21.3]\n[train]\nenabled = false\n";
+    for (const auto& [log, role] : {std::pair{"a", "train"}, {"c", "test"}}) {
+      text +=
+          "[[log]]\nscenario = \"" + made.filename().string() + "\"\nlog = \"" + log + "\"\nrole = \"" + role + "\"\n";
+      if (role == std::string("train")) text += "to_s = 3\n";
+    }
+    const fs::path out = test::folder() / name;
+    Pipeline(test::write(name + ".toml", text), out).identify();
+    std::vector<double> relative;
+    const json metrics = json::parse(read_file(out / "metrics.json"));
+    for (const json& log : metrics.at("logs")) {
+      if (log.at("role") != "test") continue;
+      for (const json& joint : log.at("joints")) relative.push_back(joint.at("relative"));
+    }
+    return relative;
+  };
+  const std::vector<double> without = error("no_prior", ""), with = error("prior", "prior_error = 0.3\n");
+  for (std::size_t j = 0; j < 6; ++j) EXPECT_LT(with.at(j), without.at(j)) << j;
+  // The wrist's torque is noise for the most part, the elbow's is not.
+  EXPECT_LT(with[2], 0.75 * without[2]);
 }
 
 TEST(Export, FixedPredictionRunsAtTheDrivesTicks) {

@@ -222,6 +222,33 @@ TEST(ByHand, TheBasisOfABroadLearningSystem) {
   for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(out[i], expected[i], 1e-9) << i;
 }
 
+// From rest, one tick at dq = 2 rad/s: the mean is 1 rad/s. Bell e^-1 at a Stribeck velocity of 2 rad/s.
+TEST(ByHand, TheBristlesThatABroadLearningSystemSees) {
+  const BroadLearningScales scales{
+      .reference_velocity = 2, .span = 2, .distances = {0.01, 0.02, 0.04}, .velocity = 4, .stribeck = 2, .share = 0.5};
+  const auto words = BristlesInputs::stored(scales, 0.002);
+  BristlesInputs::State<Real> state{};
+  Saturations saturations;
+  JointInput<Real> input{};
+  input.dq = 2;
+  const auto u = BristlesInputs::values<Real>(input, Words<Real>{words.data()}, state, saturations);
+  const double bell = 0.367879441171442, n = 0.5 + 0.5 * bell;
+  EXPECT_NEAR(u[0], 0.881373587019543 / 2, 1e-12);
+  // y = n (1 - exp(-1 rad/s * 2 ms / (distance n)))
+  EXPECT_NEAR(u[1], n * (1 - std::exp(-0.2 / n)), 1e-12);
+  const double middle = n * (1 - std::exp(-0.1 / n));
+  EXPECT_NEAR(u[2], middle, 1e-12);
+  EXPECT_NEAR(u[3], n * (1 - std::exp(-0.05 / n)), 1e-12);
+  EXPECT_NEAR(u[4], (2 - 2 * middle / n) / 4, 1e-12);
+  EXPECT_NEAR(u[5], 2 * bell - 1, 1e-12);
+  // The way back: s is that of the mean of both velocities, -1 rad/s.
+  input.dq = -4;
+  const auto back = BristlesInputs::values<Real>(input, Words<Real>{words.data()}, state, saturations);
+  const double slow = 0.5 + 0.5 * std::exp(-4.0), e = std::exp(-0.1 / slow);
+  EXPECT_NEAR(back[2], middle * e - slow * (1 - e), 1e-12);
+  EXPECT_NEAR(back[4], (-4 - 4 * back[2] / slow) / 4, 1e-12);
+}
+
 struct Formats {
   static constexpr int position = 20, velocity = 20, acceleration = 20, linear_acceleration = 20, length = 24,
                        force = 20, torque = 16, inverse_velocity = 20, inverse_path = 20, weight = 20,

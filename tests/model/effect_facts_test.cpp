@@ -127,13 +127,18 @@ TEST(EffectFacts, ScalesOfBroadLearningAreStoredAsTheirReciprocals) {
                                    .velocity = 5,
                                    .acceleration = 10,
                                    .middle = 0.25,
-                                   .half_range = 8};
+                                   .half_range = 8,
+                                   .stribeck = 0.1,
+                                   .share = 0.75};
   const auto state = StateInputs::stored(scales, 0.002);
   const std::array expected{0.25, 0.125, 0.2, 0.1, 2.0, 0.25};
   for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_DOUBLE_EQ(state[i], expected[i]) << i;
   const auto extended = ExtendedInputs::stored(scales, 0.002);
   const std::array all{2.0, 0.25, 1.0, 0.5, 0.25, 0.05, 0.5, 0.1};  // half a turn a radian
   for (std::size_t i = 0; i < all.size(); ++i) EXPECT_DOUBLE_EQ(extended[i], all[i]) << i;
+  const auto bristles = BristlesInputs::stored(scales, 0.002);
+  const std::array words{2.0, 0.25, 1.0, 0.5, 0.25, 10.0, 0.25, 0.2};
+  for (std::size_t i = 0; i < words.size(); ++i) EXPECT_DOUBLE_EQ(bristles[i], words[i]) << i;
   const auto unscaled = ExtendedInputs::stored({}, 0.001);
   EXPECT_DOUBLE_EQ(unscaled[6], 0.159154943091895336) << "one ripple a turn";
 }

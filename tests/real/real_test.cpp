@@ -30,12 +30,7 @@ class Real : public testing::TestWithParam<RealSet> {};
 
 TEST_P(Real, HeldOutErrorIsNoWorseThanTheBaseline) {
   const RealSet& set = GetParam();
-  if (!test::data_is_there(set.name)) {
-    // Data that was asked for and is not there must not pass unseen.
-    ASSERT_EQ(std::getenv("FXDYN_DATA"), nullptr) << "FXDYN_DATA is set, but has no folder " << set.name;
-    ASSERT_FALSE(fs::is_directory(test::data_folder())) << test::data_folder() << " has no folder " << set.name;
-    GTEST_SKIP() << "no measured data: set FXDYN_DATA to the folder that holds " << set.name;
-  }
+  FXDYN_NEEDS_DATA(set.name);
   const fs::path out = test::folder() / set.name;
   Pipeline(fs::path(FXDYN_SOURCE_DIR) / "tests" / "real" / (set.name + ".toml"), out).run();
   const json metrics = json::parse(read_file(out / "metrics.json"));

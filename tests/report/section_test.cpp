@@ -125,11 +125,8 @@ TEST(ComparisonSection, ShowsThePapersTableAndThePicturesThatAreThere) {
 }
 
 json move(double motor) {
-  return {{"tracking_motor", motor},
-          {"tracking_link", 0.44},
-          {"residual", 0.017},
-          {"settling_s", 0.123},
-          {"roughness", 0.0016}};
+  return {{"tracking_motor", motor}, {"tracking_link", 0.44}, {"residual", 0.017},  {"residual_late", 0.0091},
+          {"settling_s", 0.123},     {"still_s", 0.287},      {"roughness", 0.0016}};
 }
 
 TEST(VibrationSection, HasATableOfEveryKindOfMove) {
@@ -137,11 +134,41 @@ TEST(VibrationSection, HasATableOfEveryKindOfMove) {
   json moves;
   for (const char* kind : {"all", "point_to_point", "reversals", "slow"}) moves[kind] = move(0.0137);
   const json vibration = {
-      {"control", {{"bandwidth_hz", 32}, {"damping", 0.3}, {"tick_s", 0.002}}},
-      {"methods", {{{"feedforward", "rigid"}, {"numbers", "fixed"}, {"parameters_off", "-20 %"}, {"moves", moves}}}}};
-  expect_all(drawn("vibration", vibration),
-             {"<h2>Vibration</h2>", "PD of 32 Hz", "damping 0.3", "tick 2 ms", "Moves: all", "Moves: point_to_point",
-              "Moves: reversals", "Moves: slow", "rigid", "-20 %", "0.0137", "0.44", "0.017", "123", "0.0016"});
+      {"control",
+       {{"bandwidth_hz", 32},
+        {"damping", 0.3},
+        {"tick_s", 0.002},
+        {"encoder_step", 1.5e-6},
+        {"settling_band", 3e-4},
+        {"late_s", 0.132},
+        {"grid", {{"bandwidth_hz", {32}}, {"damping", {0.3}}}}}},
+      {"methods",
+       {{{"feedforward", "rigid"}, {"numbers", "fixed"}, {"parameters_off", "-20 %"}, {"moves", moves}},
+        {{"feedforward", "model_elastic_shaped"},
+         {"numbers", "fixed"},
+         {"parameters_off", "none"},
+         {"path", {{"kind", "shaped"}, {"delay_s", {0.104, 0.082}}, {"cut_short", 1.73}}},
+         {"moves", moves}}}}};
+  expect_all(drawn("vibration", vibration), {"<h2>Vibration</h2>",
+                                             "PD of 32 Hz",
+                                             "damping 0.3",
+                                             "tick 2 ms",
+                                             "Moves: all",
+                                             "Moves: point_to_point",
+                                             "Moves: reversals",
+                                             "Moves: slow",
+                                             "rigid",
+                                             "-20 %",
+                                             "0.0137",
+                                             "0.44",
+                                             "0.017",
+                                             "123",
+                                             "0.0016",
+                                             "0.0091",
+                                             "287",
+                                             "model_elastic_shaped",
+                                             "82 .. 104",
+                                             "1.73"});
 }
 
 TEST(EfficiencySection, DrawsACurveOfEveryMethodThatHasFigures) {

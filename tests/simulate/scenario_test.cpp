@@ -1,7 +1,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
+#include <sstream>
 
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
@@ -9,6 +12,7 @@
 #include "host_tools/signals/fourier.hpp"
 #include "host_tools/simulate/scenario.hpp"
 #include "host_tools/simulate/simulate.hpp"
+#include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
 #include "tests/simulate/support.hpp"
 
@@ -156,6 +160,71 @@ TEST(Scenario, AutoregressiveNoiseHasItsSizeAndMemory) {
   EXPECT_NEAR(first, 1, 0.3);
 }
 
+/// A vibration is a sine of its amplitude and frequency on the measured torque alone, in another phase on every joint
+/// and log.
+TEST(Scenario, VibrationIsOnTheMeasuredTorque) {
+  const std::string sensors = "sample_s = 0.001\ntorque_vibration = { amplitude = 0.02, frequency_hz = 62.5 }";
+  const std::string another = "[[log]]\nname = \"other\"\nduration_s = 4\nseed = 8\n";
+  const Played still = play("still", test::puma_scenario("", "sample_s = 0.001") + friction + log_text);
+  const Played played = play("vibrates", test::puma_scenario("", sensors) + friction + log_text + another);
+  EXPECT_EQ(played.truth.tau, still.truth.tau);
+  EXPECT_EQ(played.log.q, still.log.q);
+  const std::array rated{97.6, 186.4, 89.4, 24.2, 20.1, 21.3};
+  const MatrixXd vibration = played.log.tau - still.log.tau;
+  std::vector<double> phases;
+  for (Eigen::Index j = 0; j < 6; ++j) {
+    // 4 s hold a whole number of its periods, so that sine and cosine are orthogonal over the log.
+    const Eigen::ArrayXd angle = 2 * std::numbers::pi * 62.5 * still.log.t.array();
+    const double half = 0.5 * static_cast<double>(vibration.rows());
+    const double in_phase = (vibration.col(j).array() * angle.sin()).sum() / half;
+    const double quadrature = (vibration.col(j).array() * angle.cos()).sum() / half;
+    const double amplitude = 0.02 * rated[static_cast<std::size_t>(j)];
+    EXPECT_NEAR(std::hypot(in_phase, quadrature), amplitude, 1e-6 * amplitude) << j;
+    // .. and nothing else is in it.
+    EXPECT_NEAR(test::rms(vibration.col(j)), amplitude / std::sqrt(2.0), 1e-6 * amplitude) << j;
+    phases.push_back(std::atan2(quadrature, in_phase));
+  }
+  for (std::size_t j = 1; j < phases.size(); ++j) EXPECT_GT(std::fabs(phases[j] - phases[0]), 1e-3) << j;
+}
+
+/// The white noise and the other draws stay what they were.
+TEST(Scenario, VibrationLeavesTheNoiseAsItWas) {
+  const std::string noise = "torque_noise = 0.01\nar_noise = 0.01";
+  const std::string both = noise + "\ntorque_vibration = { amplitude = 0.02, frequency_hz = 60 }";
+  const Played quiet = play("noise", test::puma_scenario("", "") + log_text);
+  const Played noisy = play("noise", test::puma_scenario("", noise) + log_text);
+  const Played shaken =
+      play("noise", test::puma_scenario("", "torque_vibration = { amplitude = 0.02, frequency_hz = 60 }") + log_text);
+  const Played all = play("noise", test::puma_scenario("", both) + log_text);
+  EXPECT_LT(((all.log.tau - shaken.log.tau) - (noisy.log.tau - quiet.log.tau)).cwiseAbs().maxCoeff(), 1e-9);
+}
+
+/// With the paper's vibration is the paper's scenario and nothing else: a robot or trajectory that differs would be
+/// compared.
+TEST(Scenario, ThePapersVibrationIsItsScenarioAndAVibration) {
+  const std::filesystem::path paper = std::filesystem::path(FXDYN_SOURCE_DIR) / "host_tools" / "demo" / "paper";
+  const Scenario with = read_scenario(paper / "scenario_vibration.toml");
+  const Scenario without = read_scenario(paper / "scenario.toml");
+  EXPECT_GT(with.vibration.amplitude, 0);
+  EXPECT_EQ(without.vibration.amplitude, 0);
+  const auto lines = [](const std::filesystem::path& file) {
+    std::vector<std::string> kept;
+    std::istringstream text(read_file(file));
+    for (std::string line; std::getline(text, line);) {
+      line = line.substr(0, line.find('#'));
+      while (!line.empty() && line.back() == ' ') line.pop_back();
+      if (!line.empty() && line.rfind("torque_vibration", 0) != 0) kept.push_back(line);
+    }
+    return kept;
+  };
+  EXPECT_EQ(lines(paper / "scenario_vibration.toml"), lines(paper / "scenario.toml"));
+  std::vector<std::string> project = lines(paper / "project_vibration.toml");
+  for (std::string& line : project) {
+    if (line == "scenario = \"scenario_vibration.toml\"") line = "scenario = \"scenario.toml\"";
+  }
+  EXPECT_EQ(project, lines(paper / "project.toml"));
+}
+
 TEST(Scenario, JitteredStampsAreReadAndResampled) {
   const std::string sensors = "exact_motion = true";
   const Played regular = play("regular", test::puma_scenario("", sensors) + friction + log_text);
@@ -198,6 +267,24 @@ TEST(Scenario, AmplitudeScalesTheMotionAboutItsCentre) {
   EXPECT_LT((part.ddq - 0.05 * whole.ddq).cwiseAbs().maxCoeff(), 1e-12);
 }
 
+/// What is refused as no friction (BadScenario lugre) is taken just below, and further up with viscous friction beside
+/// it.
+TEST(Scenario, LugreIsTakenWhileItBrakes) {
+  const auto lugre = [](double damping, const std::string& more) {
+    return test::puma_scenario("", "") + more +
+           test::effect_text(
+               2, "lugre",
+               fmt::format("distance = 0.01, velocity = 0.3, share = 0.5, static = 8, damping = {}", damping)) +
+           log_text;
+  };
+  EXPECT_NO_THROW(read_scenario(test::write("brakes.toml", lugre(57, ""))));
+  EXPECT_THROW(read_scenario(test::write("drives.toml", lugre(58, ""))), InputError);
+  // + 10 n / (1 - n) = 21.6
+  const std::string viscous = test::effect_text(2, "viscous", "coefficient = 10");
+  EXPECT_NO_THROW(read_scenario(test::write("viscous.toml", lugre(79, viscous))));
+  EXPECT_THROW(read_scenario(test::write("viscous_drives.toml", lugre(80, viscous))), InputError);
+}
+
 TEST(Scenario, LongDelaysMakeThePlantsStepCoarser) {
   const std::string text = test::puma_scenario("", "exact_motion = true") + log_text;
   const Played late = play("late", text + test::effect_text(2, "delay", "time = 0.02, share = 1"));
@@ -229,6 +316,22 @@ INSTANTIATE_TEST_SUITE_P(
             "tick", scenario("motion = \"closed_loop\"\n[control]\ntick_s = 0.1", ""), {":3:", "ticks of at most"}},
         test::Bad{"key", scenario("motion = \"closed_loop\"\n[control]\ntick = 0.1", ""), {":4:", "'tick'", "tick_s"}},
         test::Bad{"jitter", scenario("", "jitter = 1.0"), {":4:", "below 1"}},
+        test::Bad{"vibration_amplitude",
+                  scenario("", "torque_vibration = { amplitude = -0.1, frequency_hz = 60 }"),
+                  {":4:", "torque_vibration.amplitude", "above 0"}},
+        test::Bad{"vibration_nan",
+                  scenario("", "torque_vibration = { amplitude = nan, frequency_hz = 60 }"),
+                  {":4:", "torque_vibration.amplitude", "expected a number"}},
+        test::Bad{"vibration_alone",
+                  scenario("", "torque_vibration = { amplitude = 0.1 }"),
+                  {":4:", "'frequency_hz' is missing"}},
+        test::Bad{"vibration_fast",
+                  scenario("", "torque_vibration = { amplitude = 0.1, frequency_hz = 250 }"),
+                  {":4:", "below 250", "500 Hz"}},
+        test::Bad{"vibration_key",
+                  scenario("", "torque_vibration = { amplitude = 0.1, frequency = 60, frequency_hz = 60 }"),
+                  {":4:", "'frequency'", "frequency_hz"}},
+        test::Bad{"vibration_number", scenario("", "torque_vibration = 0.1"), {":4:", "expected a table"}},
         test::Bad{"ar_noise", scenario("", "ar_noise = -0.1"), {":4:", "at least 0"}},
         test::Bad{"ar_pole", scenario("", "ar_pole = 1.0"), {":4:", "below 1"}},
         test::Bad{"amplitude", scenario("", "") + "amplitude = 2.0", {":15:", "at most 1"}},
@@ -248,6 +351,12 @@ INSTANTIATE_TEST_SUITE_P(
         test::Bad{"delay",
                   scenario("motion = \"closed_loop\"", "", test::effect_text(1, "delay", "time = 0.01, share = 1")),
                   {":9:", "0.0075 s at most"}},
+        // n = 0.5 + 0.5 / e = 0.684 at 0.3 rad/s: it brakes up to 8 / 0.3 * n / (1 - n) = 57.7 N*m s/rad
+        test::Bad{"lugre",
+                  scenario("", "",
+                           test::effect_text(2, "lugre",
+                                             "distance = 0.01, velocity = 0.3, share = 0.5, static = 8, damping = 60")),
+                  {":9:", "lugre: with a damping of 60", "at most 57.7"}},
         test::Bad{"peer",
                   scenario("", "", test::effect_text(1, "joint_coupling", "joint = 7, coulomb = 1, viscous = 1")),
                   {":12:", "another joint of 1 .. 6"}},

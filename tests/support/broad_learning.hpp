@@ -13,7 +13,7 @@ namespace fxdyn::test {
 /// Every set of inputs with every activation.
 inline std::vector<std::pair<std::string, std::string>> bls_kinds() {
   std::vector<std::pair<std::string, std::string>> kinds;
-  for (const char* inputs : {"physical", "extended", "state"}) {
+  for (const char* inputs : {"physical", "bristles", "extended", "state"}) {
     for (const char* activation : {"tanh", "relu"}) kinds.emplace_back(inputs, activation);
   }
   return kinds;
@@ -31,6 +31,8 @@ inline BroadLearningFit random_bls(const std::string& inputs, const std::string&
   bls.torque = joint.rated_torque;
   bls.wavenumber = 2;
   bls.velocity = joint.dq_limit;
+  bls.stribeck = 0.05 * joint.dq_limit;
+  bls.share = 0.6;
   bls.acceleration = joint.ddq_limit;
   bls.middle = (joint.q_lower + joint.q_upper) / 2;
   bls.half_range = (joint.q_upper - joint.q_lower) / 2;

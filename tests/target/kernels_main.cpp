@@ -194,6 +194,21 @@ std::uint32_t effect_of() {
   return count([&] { sum = contribution<E, Numbers>(input, Words<Numbers>{words.data()}, state, saturations).raw; });
 }
 
+/// What the nodes of a BLS see in one tick.
+template <class Inputs>
+std::uint32_t inputs_of() {
+  static std::array<std::int32_t, Inputs::shape.size()> words{};
+  static typename Inputs::template State<Numbers> state{};
+  static JointInput<Numbers> input{};
+  static Saturations saturations;
+  static std::array<Feature<Numbers>, Inputs::size> out{};
+  asm volatile("" : : "r"(&words), "r"(&state), "r"(&input) : "memory");
+  return count([&] {
+    out = Inputs::template values<Numbers>(input, Words<Numbers>{words.data()}, state, saturations);
+    asm volatile("" : : "r"(&out) : "memory");
+  });
+}
+
 /// Kernels of BLS that the golden tables have not. A function of its own: what is inlined into main depends on its
 /// size.
 [[gnu::noinline]] void report_other_kinds() {
@@ -202,6 +217,8 @@ std::uint32_t effect_of() {
   report("stribeck", effect_of<Stribeck>());
   report("presliding", effect_of<Presliding>());
   report("lugre", effect_of<Lugre>());
+  report("inputs_physical", inputs_of<PhysicalInputs>());
+  report("inputs_bristles", inputs_of<BristlesInputs>());
 }
 
 }  // namespace

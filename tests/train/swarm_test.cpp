@@ -2,10 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include "host_tools/support/error.hpp"
 
@@ -119,6 +122,132 @@ TEST(Swarm, ASeedIsAnOutcome) {
   two.seed = 2;
   EXPECT_EQ(run(box(3, one), rastrigin).best(), run(box(3, one), rastrigin).best());
   EXPECT_NE(run(box(3, one), rastrigin).best(), run(box(3, two), rastrigin).best());
+}
+
+/// One step, computed by hand: a swarm put where nothing but the part of the formula in question moves it.
+/// Every dimension draws its own r, so that thousands of them show the factor in front of it.
+struct Step {
+  static constexpr Index dimensions = 4000;
+  double own = 0, common = 0, velocity = 0;  ///< p - x, g - x, v, the same in every dimension
+  int generation = 1;                        ///< which one is told now
+  double largest_step = 1;                   ///< of a box of 20: no bound here
+
+  SwarmSettings settings() const {
+    SwarmSettings s;
+    s.particles = 1;
+    s.iterations = 41;
+    s.stall = 1000;
+    s.neighbourly = 0;  // the best of all is followed
+    s.largest_step = largest_step;
+    return s;
+  }
+
+  /// The velocity that the particle has after it.
+  VectorXd taken() const {
+    Swarm swarm(VectorXd::Constant(dimensions, -10), VectorXd::Constant(dimensions, 10), settings());
+    nlohmann::json state = swarm.to_json();
+    const auto all = [](double value) {
+      return std::vector<std::vector<double>>{std::vector<double>(dimensions, value)};
+    };
+    state["positions"] = all(0);
+    state["velocities"] = all(velocity);
+    state["own_best"] = all(own);
+    state["own_value"] = {{-1.0}};  // better than what is told
+    state["best"] = all(common);
+    state["best_value"] = state["milestone"] = -2.0;
+    state["generation"] = generation - 1;
+    swarm.from_json(state);
+    swarm.tell(VectorXd::Zero(1));
+    const VectorXd v = Eigen::Map<const VectorXd>(
+        swarm.to_json().at("velocities").at(0).get<std::vector<double>>().data(), dimensions);
+    EXPECT_LT((swarm.positions().col(0) - v).cwiseAbs().maxCoeff(), 1e-12);  // x = 0 + v (Eq. 36)
+    return v;
+  }
+};
+
+/// chi = 2 / |2 - 4.1 - sqrt(4.1^2 - 16.4)| = 2 / 2.740312: Eq. 33 put right, c1 = c2 = 2.05.
+constexpr double pull = 0.7298437881 * 2.05;
+
+/// r is uniform in [0, 1): the largest of 4000 is within 0.3 % of 1 (but for 6e-6), the mean within 4 standard
+/// deviations.
+void expect_uniform_up_to(double factor, const VectorXd& v) {
+  const auto n = static_cast<double>(v.size());
+  EXPECT_GE(v.minCoeff(), 0);
+  EXPECT_LT(v.maxCoeff(), factor);
+  EXPECT_GT(v.maxCoeff(), 0.997 * factor);
+  EXPECT_NEAR(v.mean(), 0.5 * factor, 4 * factor / std::sqrt(12 * n));
+}
+
+TEST(SwarmStep, PullsWithTheConstrictionOfEquation33) {
+  Step own;
+  own.own = 1;
+  expect_uniform_up_to(pull, own.taken());
+  Step common;
+  common.common = 1;
+  expect_uniform_up_to(pull, common.taken());
+}
+
+TEST(SwarmStep, DrawsForBothPullsAndEveryDimension) {
+  Step both;
+  both.own = 1;
+  both.common = -1;
+  const VectorXd v = both.taken() / pull;  // r1 - r2: triangular, variance 1/6
+  EXPECT_NEAR(v.mean(), 0, 4 / std::sqrt(6.0 * Step::dimensions));
+  // (r1 - r2)^2 has a variance of 1/15 - 1/36
+  EXPECT_NEAR(v.squaredNorm() / Step::dimensions, 1.0 / 6, 4 * std::sqrt((1 / 15.0 - 1 / 36.0) / Step::dimensions));
+}
+
+TEST(SwarmStep, InertiaFallsLinearlyAsInEquation37) {
+  Step step;
+  step.velocity = 2;
+  // 0.6 at the first generation, 0.3 at the last, 0.45 halfway; and no chi in front of it once more.
+  for (const auto& [generation, inertia] : {std::pair(1, 0.6), {21, 0.45}, {31, 0.375}, {41, 0.3}}) {
+    step.generation = generation;
+    const VectorXd v = step.taken();
+    EXPECT_NEAR(v.minCoeff(), 2 * inertia, 1e-12) << generation;
+    EXPECT_NEAR(v.maxCoeff(), 2 * inertia, 1e-12) << generation;
+  }
+}
+
+TEST(SwarmStep, IsNoLongerThanItsBound) {
+  Step step;
+  step.velocity = 6;
+  step.largest_step = 0.1;  // of a box of 20
+  EXPECT_EQ(step.taken(), VectorXd::Constant(Step::dimensions, 2));
+}
+
+/// Which one each of ten particles follows while only neighbours are: the best of two on either side of it in the ring.
+TEST(SwarmStep, FollowsTheBestOfItsNeighboursInTheRing) {
+  constexpr Index d = 1, n = 10;
+  SwarmSettings settings;
+  settings.particles = static_cast<int>(n);
+  settings.neighbourly = 1;
+  Swarm swarm(VectorXd::Constant(d, -10), VectorXd::Constant(d, 10), settings);
+  nlohmann::json state = swarm.to_json();
+  std::vector<double> values;
+  for (Index p = 0; p < n; ++p) {
+    const auto at = static_cast<std::size_t>(p);
+    state["positions"][at] = state["velocities"][at] = {0.0};
+    // Particle 8 has found the best, at 1; particle 4 the second best, at -1; the others nothing, at 0.
+    state["own_best"][at] = {p == 8 ? 1.0 : p == 4 ? -1.0 : 0.0};
+    values.push_back(p == 8 ? -3 : p == 4 ? -2 : -1);
+  }
+  state["own_value"] = {values};
+  state["best"] = {{1.0}};
+  state["best_value"] = state["milestone"] = -3.0;
+  state["generation"] = 0;
+  swarm.from_json(state);
+  swarm.tell(VectorXd::Zero(n));
+  const std::array followed{1, 0, -1, -1, -1, -1, 1, 1, 1, 1};  // 6 has both within reach: the better one
+  for (Index p = 0; p < n; ++p) {
+    const double x = swarm.positions()(0, p);
+    const int way = followed[static_cast<std::size_t>(p)];
+    if (p == 4 || p == 8) {
+      EXPECT_EQ(way > 0, x > 0) << p;  // pulled to its own best, too
+    } else {
+      EXPECT_EQ((x > 0) - (x < 0), way) << p;
+    }
+  }
 }
 
 }  // namespace

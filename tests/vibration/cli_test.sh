@@ -30,23 +30,19 @@ assert model["tracking_motor"] < wrong["tracking_motor"] < none["tracking_motor"
 assert result["fixed_against_double"]["error_change"] < 0.01
 PYTHON
 
-# The same model, told how the gears bend: with the motors ahead by that the links follow, too.
-python3 - <<'PYTHON' || fail "no elasticity in loop/model.json"
-import json
-assert all(m["feedforward"] != "model_elastic" for m in json.load(open("loop/vibration.json"))["methods"])
-model = json.load(open("loop/model.json"))
-for joint, compliance in zip(model["joints"], (1e-4, 3e-4)):
-    joint["effects"].append({"effect": "elasticity", "origin": "named", "parameters": [
-        {"name": "relaxation", "unit": "s", "value": 0.001},
-        {"name": "compliance", "unit": "rad/(N*m)", "value": compliance}]})
-for of_tables in ("formats", "layout", "tables_crc"):
-    del model[of_tables]
-json.dump(model, open("loop/model.json", "w"))
-PYTHON
-"$fxdyn" vibration arm.project --out loop >loop.txt 2>&1 || fail "vibration, elastic: $(tail -1 loop.txt)"
+# The same arm with encoders on its links: how its gears bend is identified from its own logs, and with the motors ahead by
+# that the links follow, too.
+"$fxdyn" vibration linked.project --out linked >loop.txt 2>&1 || fail "vibration, elastic: $(tail -1 loop.txt)"
 python3 - <<'PYTHON' || fail "$(cat loop.txt)"
 import json
-result = json.load(open("loop/vibration.json"))
+assert all(m["feedforward"] != "model_elastic" for m in json.load(open("loop/vibration.json"))["methods"])
+# the scenario's compliances, rad/(N m)
+for joint, truth in zip(json.load(open("linked/model.json"))["joints"], (1e-4, 3e-4)):
+    elastic = [e for e in joint["effects"] if e["effect"] == "elasticity"]
+    found = {p["name"]: p["value"] for p in elastic[0]["parameters"]}["compliance"]
+    print("compliance", found, "truth", truth)
+    assert abs(found / truth - 1) < 0.05, (found, truth)  # 2.5 % and 0.3 % off
+result = json.load(open("linked/vibration.json"))
 rows = {(m["feedforward"], m["numbers"], m["parameters_off"]): m["moves"]["all"] for m in result["methods"]}
 none, rigid, elastic = rows["none", "-", "none"], rows["rigid", "fixed", "none"], rows["model_elastic", "fixed", "none"]
 wrong = rows["model_elastic", "fixed", "-20 %"]
@@ -58,9 +54,30 @@ assert elastic["residual"] <= 0.5 * none["residual"]
 assert elastic["tracking_link"] < wrong["tracking_link"] < none["tracking_link"]
 assert result["fixed_against_double"]["model_elastic"]["error_change"] < 0.01
 for m in result["methods"]:
-    assert m["reference"] == ("motor" if m["feedforward"] == "model_elastic" else "link"), m
+    assert m["reference"] == ("motor" if m["feedforward"].startswith("model_elastic") else "link"), m
     ratio = m["moves"]["all"]["tracking_link"] / rigid["tracking_link"]
     assert abs(m["ratios"]["rigid"]["tracking_link"] - ratio) < 1e-9, m
+PYTHON
+
+# A path shaped by the modes: it stops later and leaves less, also where the parameters are off.
+python3 - <<'PYTHON' || fail "$(cat loop.txt)"
+import json
+result = json.load(open("linked/vibration.json"))
+methods = {(m["feedforward"], m["numbers"], m["parameters_off"]): m for m in result["methods"]}
+rows = {key: m["moves"]["all"] for key, m in methods.items()}
+none, shaped = rows["none", "-", "none"], rows["model_elastic_shaped", "fixed", "none"]
+assert shaped["residual"] <= 0.2 * none["residual"], (none, shaped)
+for off in ("-20 %", "+20 %", "+-20 %"):
+    row, straight = rows["model_elastic_shaped", "fixed", off], rows["model_elastic", "fixed", off]
+    assert row["residual"] <= 0.6 * none["residual"], (off, row)
+    assert row["residual"] < straight["residual"], (off, row, straight)
+assert result["fixed_against_double"]["model_elastic_shaped"]["error_change"] < 0.01
+# the shaper does it, not the longer time; and the delay is there in what counts from the stop as asked for
+assert rows["none_shaped", "-", "none"]["residual"] < 0.5 * rows["none_slower", "-", "none"]["residual"]
+path, slower = methods["model_elastic_shaped", "fixed", "none"]["path"], methods["none_slower", "-", "none"]["path"]
+assert path["delay_s"] == slower["delay_s"] and len(path["delay_s"]) == 6, path
+assert 0.02 < min(path["delay_s"]) and max(path["delay_s"]) <= result["control"]["late_s"] < 0.3, path
+assert none["still_s"] == none["settling_s"] and shaped["still_s"] > shaped["settling_s"]
 PYTHON
 
 "$fxdyn" efficiency arm.project --out data >data.txt 2>&1 || fail "efficiency: $(tail -1 data.txt)"
@@ -68,8 +85,14 @@ python3 - <<'PYTHON' || fail "$(cat data.txt)"
 import json
 curve = {p["seconds"]: p["percent_rated"] for p in json.load(open("data/efficiency.json"))["curve"]}
 assert sorted(curve) == [5, 10, 20], sorted(curve)  # there are 20 s
-assert curve[20]["lugre"] < curve[20]["friction_ls"]
-assert curve[20]["lugre"] < 1.2 * curve[5]["lugre"]
+print(curve)
+# What data decide gets better with more of it: 3.07 to 1.78 %, 3.14 to 1.70 %.
+assert curve[20]["friction_ls"] < 0.7 * curve[5]["friction_ls"]
+assert curve[20]["mlp"] < 0.7 * curve[5]["mlp"]
+# LuGre is past that: what is left of it, 0.132, 0.101, 0.131 %, are the gears, which this method does not know.
+for seconds in curve:
+    assert curve[seconds]["lugre"] < 0.15, seconds
+    assert curve[seconds]["lugre"] < 0.1 * curve[seconds]["friction_ls"], seconds
 PYTHON
 
 # refused NAME EXPECTED

@@ -51,6 +51,27 @@ TEST(Moves, VelocityAndAccelerationAreDerivatives) {
   }
 }
 
+TEST(Moves, SlowerIsTheSamePathInMoreTime) {
+  for (const Move& move : make_moves(limited_puma(), 0.002, 3)) {
+    EXPECT_EQ(slower(move, 0).reference.q, move.reference.q) << move.kind;
+    const Index more = 60;
+    const Move after = slower(move, more);
+    const Reference &r = move.reference, &late = after.reference;
+    ASSERT_EQ(late.q.rows(), r.q.rows() + more);
+    EXPECT_EQ(after.stop, move.stop + more);
+    EXPECT_EQ(after.asked_stop, move.stop);
+    EXPECT_EQ(late.dq.bottomRows(late.q.rows() - after.stop).cwiseAbs().maxCoeff(), 0) << move.kind;
+    EXPECT_EQ(Eigen::RowVectorXd(late.q.row(late.q.rows() - 1)), Eigen::RowVectorXd(r.q.row(r.q.rows() - 1)));
+    const Index moving = move.stop - move.start;
+    const double pace = static_cast<double>(moving) / static_cast<double>(moving + more);
+    EXPECT_NEAR(late.dq.cwiseAbs().maxCoeff(), pace * r.dq.cwiseAbs().maxCoeff(), 1e-3) << move.kind;
+    EXPECT_NEAR(late.ddq.cwiseAbs().maxCoeff(), pace * pace * r.ddq.cwiseAbs().maxCoeff(), 0.02) << move.kind;
+    const Index inside = late.q.rows() - 2;
+    const MatrixXd dq = (late.q.bottomRows(inside) - late.q.topRows(inside)) / (2 * late.step_s);
+    EXPECT_LT((dq - late.dq.middleRows(1, inside)).cwiseAbs().maxCoeff(), 4e-4) << move.kind;
+  }
+}
+
 TEST(Moves, ASeedIsAMotion) {
   const IdentifiedModel robot = limited_puma();
   EXPECT_EQ(make_moves(robot, 0.002, 3)[0].reference.q, make_moves(robot, 0.002, 3)[0].reference.q);

@@ -1,0 +1,175 @@
+#include "host_tools/diagnose/diagnosis_result.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <limits>
+#include <utility>
+
+#include "host_tools/support/error.hpp"
+
+namespace fxdyn {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::array<std::pair<Verdict, std::string_view>, 4> verdict_names{
+    {{Verdict::nothing_missing, "nothing_missing"},
+     {Verdict::effects_found, "effects_found"},
+     {Verdict::unexplained, "unexplained"},
+     {Verdict::not_excited, "not_excited"}}};
+
+json or_null(const std::optional<double>& value) { return value ? json(*value) : json(nullptr); }
+std::optional<double> optional_of(const json& value) {
+  return value.is_null() ? std::nullopt : std::optional(value.get<double>());
+}
+/// What is no number is null in a file.
+double number_of(const json& value) {
+  return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>();
+}
+std::vector<std::string> strings_of(const json& list) { return list.get<std::vector<std::string>>(); }
+
+json to_json(const GapRegion& region) {
+  json out{{"signal", region.signal},
+           {"from", region.from},
+           {"to", region.to},
+           {"share_of_gap", or_null(region.share_of_gap)}};
+  if (!region.log.empty()) out["log"] = region.log;
+  return out;
+}
+
+GapRegion region_of(const json& file) {
+  return {file.at("signal"), number_of(file.at("from")), number_of(file.at("to")), optional_of(file.at("share_of_gap")),
+          file.value("log", "")};
+}
+
+json to_json(const NamedEffect& effect) {
+  json parameters = json::array();
+  for (const NamedParameter& p : effect.parameters)
+    parameters.push_back({{"name", p.name}, {"value", p.value}, {"unit", p.unit}, {"std", or_null(p.std)}});
+  json out{{"effect", effect.effect},
+           {"parameters", parameters},
+           {"score", effect.score},
+           {"held_out_closure", or_null(effect.held_out_closure)},
+           {"alternatives", effect.alternatives},
+           {"model_share", effect.model_share}};
+  if (!effect.signal.empty()) out["signal"] = effect.signal;
+  if (effect.joints) out["joints"] = *effect.joints;
+  return out;
+}
+
+NamedEffect effect_of(const json& file) {
+  NamedEffect out;
+  out.effect = file.at("effect");
+  for (const json& p : file.at("parameters"))
+    out.parameters.push_back({p.at("name"), p.at("unit"), number_of(p.at("value")), optional_of(p.at("std"))});
+  out.score = number_of(file.at("score"));
+  out.held_out_closure = optional_of(file.at("held_out_closure"));
+  out.signal = file.value("signal", "");
+  out.alternatives = strings_of(file.at("alternatives"));
+  out.model_share = number_of(file.at("model_share"));
+  if (file.contains("joints")) out.joints = file.at("joints").get<std::vector<std::size_t>>();
+  return out;
+}
+
+json to_json(const std::vector<NamedEffect>& effects) {
+  json out = json::array();
+  for (const NamedEffect& effect : effects) out.push_back(to_json(effect));
+  return out;
+}
+
+std::vector<NamedEffect> effects_of(const json& list) {
+  std::vector<NamedEffect> out;
+  for (const json& effect : list) out.push_back(effect_of(effect));
+  return out;
+}
+
+json to_json(const JointDiagnosis& joint) {
+  json where = json::array();
+  for (const GapRegion& region : joint.where) where.push_back(to_json(region));
+  return {{"joint", joint.joint},
+          {"index", joint.index},
+          {"unit", joint.unit},
+          {"verdict", to_string(joint.verdict)},
+          {"gap_before", or_null(joint.gap_before)},
+          {"gap_after", or_null(joint.gap_after)},
+          {"noise_floor", or_null(joint.noise_floor)},
+          {"closure", or_null(joint.closure)},
+          {"where", where},
+          {"effects", to_json(joint.effects)},
+          {"resembles", joint.resembles},
+          {"not_identifiable", joint.not_identifiable},
+          {"lack_of_fit", {{"state_p", or_null(joint.state_p)}, {"time_p", or_null(joint.time_p)}}}};
+}
+
+JointDiagnosis joint_of(const json& file) {
+  JointDiagnosis out;
+  out.joint = file.at("joint");
+  out.index = file.at("index");
+  out.unit = file.at("unit");
+  out.verdict = verdict_of(file.at("verdict").get<std::string>());
+  out.gap_before = optional_of(file.at("gap_before"));
+  out.gap_after = optional_of(file.at("gap_after"));
+  out.noise_floor = optional_of(file.at("noise_floor"));
+  out.closure = optional_of(file.at("closure"));
+  for (const json& region : file.at("where")) out.where.push_back(region_of(region));
+  out.effects = effects_of(file.at("effects"));
+  out.resembles = strings_of(file.at("resembles"));
+  out.not_identifiable = strings_of(file.at("not_identifiable"));
+  const json& lack = file.at("lack_of_fit");
+  out.state_p = optional_of(lack.at("state_p"));
+  out.time_p = optional_of(lack.at("time_p"));
+  return out;
+}
+
+}  // namespace
+
+std::string_view to_string(Verdict verdict) {
+  for (const auto& [one, name] : verdict_names) {
+    if (one == verdict) return name;
+  }
+  return {};
+}
+
+Verdict verdict_of(std::string_view name) {
+  for (const auto& [one, its_name] : verdict_names) {
+    if (its_name == name) return one;
+  }
+  throw InputError(fmt::format("diagnosis.json: unknown verdict '{}': run `fxdyn diagnose` again", name));
+}
+
+json to_json(const DiagnosisResult& result) {
+  json joints = json::array();
+  for (const JointDiagnosis& joint : result.joints) joints.push_back(to_json(joint));
+  json out{{"schema", "fxdyn.diagnosis/1"},
+           {"verdict", to_string(result.verdict)},
+           {"joints", joints},
+           {"robot_effects", to_json(result.robot_effects)},
+           {"resembles", result.resembles},
+           {"not_identifiable", result.not_identifiable},
+           {"next_experiment", result.next_experiment},
+           {"gate", result.gate},
+           {"figures_on", result.figures_on},
+           {"baseline", result.baseline},
+           {"notes", result.notes}};
+  if (!result.evidence.is_null()) out["evidence"] = result.evidence;
+  return out;
+}
+
+DiagnosisResult diagnosis_of(const json& file) {
+  DiagnosisResult out;
+  out.verdict = verdict_of(file.at("verdict").get<std::string>());
+  for (const json& joint : file.at("joints")) out.joints.push_back(joint_of(joint));
+  out.robot_effects = effects_of(file.at("robot_effects"));
+  out.resembles = strings_of(file.at("resembles"));
+  out.not_identifiable = strings_of(file.at("not_identifiable"));
+  out.next_experiment = file.at("next_experiment");
+  out.gate = file.at("gate");
+  out.figures_on = file.at("figures_on");
+  out.baseline = file.at("baseline");
+  out.notes = strings_of(file.at("notes"));
+  out.evidence = file.value("evidence", json());
+  return out;
+}
+
+}  // namespace fxdyn

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace fxdyn {
+
+enum class Verdict { nothing_missing, effects_found, unexplained, not_excited };
+std::string_view to_string(Verdict verdict);
+/// @throws InputError: there is none of that name
+Verdict verdict_of(std::string_view name);
+
+/// A region of the motion in which a gap sits.
+struct GapRegion {
+  std::string signal;  ///< dq, q, ddq, load, t, direction, frequency
+  double from = 0, to = 0;
+  std::optional<double> share_of_gap;
+  std::string log;  ///< empty: of all logs
+};
+
+/// A parameter of an effect that was named.
+struct NamedParameter {
+  std::string name, unit;
+  double value = 0;
+  std::optional<double> std;  ///< none: not known
+};
+
+/// An effect that was named, at a joint or on the robot.
+struct NamedEffect {
+  std::string effect;
+  std::vector<NamedParameter> parameters;
+  double score = 0;
+  std::optional<double> held_out_closure;
+  std::string signal;  ///< "q - qlink": a deflection shows it; empty: the torque does
+  std::vector<std::string> alternatives;
+  double model_share = 0;                          ///< of the model's torque
+  std::optional<std::vector<std::size_t>> joints;  ///< on the robot: those that feel it, from 1
+};
+
+struct JointDiagnosis {
+  std::string joint, unit;
+  std::size_t index = 0;  ///< from 1
+  Verdict verdict = Verdict::nothing_missing;
+  std::optional<double> gap_before{}, gap_after{}, noise_floor{};  ///< [N*m | N]; none: it stands still
+  std::optional<double> closure{};                                 ///< none: the torque has nothing to close
+  std::vector<GapRegion> where{};
+  std::vector<NamedEffect> effects{};
+  std::vector<std::string> resembles{}, not_identifiable{};
+  std::optional<double> state_p{}, time_p{};  ///< lack of fit
+};
+
+/// Content of diagnosis.json.
+struct DiagnosisResult {
+  Verdict verdict = Verdict::nothing_missing;
+  std::vector<JointDiagnosis> joints;
+  std::vector<NamedEffect> robot_effects;
+  std::vector<std::string> resembles, not_identifiable;
+  std::string next_experiment, gate, figures_on;
+  bool baseline = false;
+  std::vector<std::string> notes;
+  nlohmann::json evidence;  ///< see evidence_json(); null: none yet
+};
+nlohmann::json to_json(const DiagnosisResult& result);
+DiagnosisResult diagnosis_of(const nlohmann::json& file);
+
+}  // namespace fxdyn

@@ -1,0 +1,47 @@
+#include "host_tools/effects/lugre_check.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host_tools/effects/effects.hpp"
+
+namespace fxdyn {
+namespace {
+
+/// The first of the effect's parameters that is out of the catalogue's range.
+std::optional<std::string> out_of_range(const EffectFit& fit, const EffectInfo& info) {
+  const auto check = [](const ParameterInfo& parameter, double value) -> std::optional<std::string> {
+    if (value >= parameter.lower && value <= parameter.upper) return std::nullopt;
+    return fmt::format("lugre: {} {:g} is not within {:g} .. {:g} {}", parameter.name, value, parameter.lower,
+                       parameter.upper, parameter.unit);
+  };
+  for (std::size_t i = 0; i < fit.shape.size(); ++i) {
+    if (auto why = check(info.shape[i], fit.shape[i])) return why;
+  }
+  // A damping that came out below zero of noisy data is no reason to refuse the model; a static friction is.
+  return check(info.linear[0], fit.linear[0]);
+}
+
+}  // namespace
+
+std::optional<std::string> lugre_is_no_friction(const JointFit& joint, double dq_limit) {
+  const EffectFit* fit = joint.find("lugre");
+  if (fit == nullptr) return std::nullopt;
+  if (auto why = out_of_range(*fit, *find_effect("lugre"))) return why;
+  const double velocity = fit->shape[1], share = fit->shape[2], static_friction = fit->linear[0],
+               damping = fit->linear[1];
+  const EffectFit* viscous = joint.find("viscous");
+  const double speed = dq_limit > 0 ? std::min(velocity, dq_limit) : velocity;
+  const double n = share + (1 - share) * std::exp(-speed * speed / (velocity * velocity));
+  // static + viscous v + damping v (1 - 1 / n) >= 0
+  const double most =
+      (static_friction / speed + (viscous == nullptr ? 0 : std::max(0.0, viscous->linear[0]))) * n / (1 - n);
+  if (damping <= most) return std::nullopt;
+  return fmt::format(
+      "lugre: with a damping of {:.4g} it would drive the joint at {:.3g}/s instead of braking it; at most {:.4g} here",
+      damping, speed, most);
+}
+
+}  // namespace fxdyn

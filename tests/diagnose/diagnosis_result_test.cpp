@@ -1,0 +1,105 @@
+// diagnosis.json, written and read by one codec.
+
+#include "host_tools/diagnose/diagnosis_result.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "host_tools/support/error.hpp"
+
+namespace fxdyn {
+namespace {
+
+using nlohmann::json;
+
+/// One joint of each kind, and a load.
+DiagnosisResult example() {
+  NamedEffect stribeck;
+  stribeck.effect = "stribeck";
+  stribeck.parameters = {{"velocity", "rad/s", 0.04, 0.01}, {"amplitude", "N*m", 2.1, {}}};
+  stribeck.score = 412;
+  stribeck.held_out_closure = 0.83;
+  stribeck.alternatives = {"presliding"};
+  stribeck.model_share = 0.4;
+  NamedEffect bends = stribeck;
+  bends.effect = "elasticity";
+  bends.held_out_closure.reset();
+  bends.signal = "q - qlink";
+  NamedEffect load = stribeck;
+  load.effect = "payload";
+  load.joints = {2, 3};
+
+  JointDiagnosis moving{"shoulder", "N*m", 1, Verdict::effects_found};
+  moving.gap_before = 1.9;
+  moving.gap_after = 0.4;
+  moving.noise_floor = 0.35;
+  moving.closure = 0.83;
+  moving.where = {{"dq", -0.05, 0.05, 0.61, ""}, {"t", 3, 3.1, {}, "b.csv"}};
+  moving.effects = {stribeck, bends};
+  moving.resembles = {"saturation"};
+  moving.not_identifiable = {"spring"};
+  moving.state_p = 1e-12;
+  moving.time_p = 0.3;
+
+  DiagnosisResult out;
+  out.verdict = Verdict::effects_found;
+  out.joints = {moving, {"elbow", "N", 2, Verdict::not_excited}};
+  out.robot_effects = {load};
+  out.resembles = {"gravity_tilt"};
+  out.not_identifiable = {"payload"};
+  out.next_experiment = "record a log in which joint 2 moves";
+  out.gate = "validate logs";
+  out.figures_on = "test logs";
+  out.baseline = true;
+  out.notes = {"a note"};
+  out.evidence = {{"note", "none"}};
+  return out;
+}
+
+TEST(DiagnosisResult, ComesBackFromItsFile) {
+  const json file = to_json(example());
+  EXPECT_EQ(to_json(diagnosis_of(json::parse(file.dump()))), file);
+  const DiagnosisResult read = diagnosis_of(file);
+  EXPECT_EQ(read.joints[1].verdict, Verdict::not_excited);
+  EXPECT_EQ(read.joints[0].effects[0].parameters[0].std, 0.01);
+  EXPECT_EQ(read.robot_effects[0].joints, (std::vector<std::size_t>{2, 3}));
+}
+
+TEST(DiagnosisResult, WhatIsNotKnownIsNullOrNotThere) {
+  const json file = to_json(example());
+  EXPECT_EQ(file.at("schema"), "fxdyn.diagnosis/1");
+  const json &moving = file.at("joints").at(0), &still = file.at("joints").at(1);
+  EXPECT_EQ(moving.at("verdict"), "effects_found");
+  EXPECT_TRUE(moving.at("effects").at(0).at("parameters").at(1).at("std").is_null());
+  EXPECT_FALSE(moving.at("effects").at(0).contains("signal"));
+  EXPECT_TRUE(moving.at("effects").at(1).at("held_out_closure").is_null());
+  EXPECT_EQ(moving.at("effects").at(1).at("signal"), "q - qlink");
+  EXPECT_FALSE(moving.at("effects").at(0).contains("joints"));
+  EXPECT_FALSE(moving.at("where").at(0).contains("log"));
+  EXPECT_TRUE(moving.at("where").at(1).at("share_of_gap").is_null());
+  for (const char* key : {"gap_before", "gap_after", "noise_floor", "closure"}) EXPECT_TRUE(still.at(key).is_null());
+  EXPECT_TRUE(still.at("lack_of_fit").at("state_p").is_null());
+  EXPECT_EQ(still.at("effects"), json::array());
+  DiagnosisResult alone = example();
+  alone.evidence = nullptr;
+  EXPECT_FALSE(to_json(alone).contains("evidence"));
+}
+
+TEST(DiagnosisResult, AFigureThatIsNoNumberIsReadAsNone) {
+  DiagnosisResult result = example();
+  result.joints[0].gap_after = result.joints[0].effects[0].score = std::numeric_limits<double>::quiet_NaN();
+  const DiagnosisResult read = diagnosis_of(json::parse(to_json(result).dump()));
+  EXPECT_FALSE(read.joints[0].gap_after);
+  EXPECT_TRUE(std::isnan(read.joints[0].effects[0].score));
+}
+
+TEST(DiagnosisResult, AnUnknownVerdictIsRefused) {
+  json file = to_json(example());
+  file["joints"][0]["verdict"] = "puzzling";
+  EXPECT_THROW(diagnosis_of(file), InputError);
+}
+
+}  // namespace
+}  // namespace fxdyn
