@@ -27,7 +27,13 @@ assert model["tracking_motor"] <= 0.2 * none["tracking_motor"]
 assert model["tracking_motor"] <= 0.5 * rigid["tracking_motor"]
 assert model["residual"] < none["residual"]
 assert model["tracking_motor"] < wrong["tracking_motor"] < none["tracking_motor"]
-assert result["fixed_against_double"]["error_change"] < 0.01
+# The shoulder's elasticity is found without a link encoder, by the torque alone. With it the model's torque follows the
+# path's fourth derivative, which jumps where a move starts: double computes a spike (roughness 0.032), fixed point stops
+# at the joint's limits (0.015) and follows better. On a path without such jumps both are the same.
+real = rows["model", "real", "none"]
+for figure in ("tracking_motor", "tracking_link", "roughness"):
+    assert model[figure] <= 1.01 * real[figure], (figure, model, real)
+assert result["fixed_against_double"]["model_elastic_shaped"]["error_change"] < 1e-4  # 1.9e-6
 PYTHON
 
 # The same arm with encoders on its links: how its gears bend is identified from its own logs, and with the motors ahead by
@@ -35,7 +41,6 @@ PYTHON
 "$fxdyn" vibration linked.project --out linked >loop.txt 2>&1 || fail "vibration, elastic: $(tail -1 loop.txt)"
 python3 - <<'PYTHON' || fail "$(cat loop.txt)"
 import json
-assert all(m["feedforward"] != "model_elastic" for m in json.load(open("loop/vibration.json"))["methods"])
 # the scenario's compliances, rad/(N m)
 for joint, truth in zip(json.load(open("linked/model.json"))["joints"], (1e-4, 3e-4)):
     elastic = [e for e in joint["effects"] if e["effect"] == "elasticity"]
