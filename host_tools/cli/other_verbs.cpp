@@ -46,6 +46,7 @@ Action add_simulate(CLI::App& verb) {
 Action add_predict(CLI::App& verb) {
   struct Options {
     std::string model, log, numbers = "real", out;
+    bool raw = false;
   };
   const auto options = std::make_shared<Options>();
   verb.add_option("--model", options->model, "model.json")->required();
@@ -53,9 +54,11 @@ Action add_predict(CLI::App& verb) {
   verb.add_option("--numbers", options->numbers, "real (double) or fixed (as the firmware computes)")
       ->check(CLI::IsMember({"real", "fixed"}))
       ->capture_default_str();
+  verb.add_flag("--raw", options->raw, "torque as computed, with the noise of q; default: below the torque's cut-off");
   verb.add_option("--out", options->out, "directory for the prediction")->required();
   return [options] {
-    predict_log(options->model, options->log, options->numbers == "fixed", options->out);
+    predict_log(options->model, options->log, {.fixed = options->numbers == "fixed", .raw = options->raw},
+                options->out);
     fmt::print("prediction in {}\n", options->out);
   };
 }

@@ -64,7 +64,8 @@ class Firmware {
 /// Setpoints outside of the limits that the tables hold: the firmware clamps them, and its torque is that of another
 /// motion.
 std::vector<std::string> clamped(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs) {
-  constexpr double worth_a_word = 1e-3;  // of the samples
+  // Of the samples. Beyond a position limit gravity is another's; single spikes of derivatives are not worth a word.
+  constexpr double worth_a_word[] = {0, 1e-3, 1e-3};
   std::vector<std::string> out;
   for (std::size_t j = 0; j < model.joints.size(); ++j) {
     const JointFit& joint = model.joints[j];
@@ -81,9 +82,9 @@ std::vector<std::string> clamped(const IdentifiedModel& model, const std::vector
     const char* const names[] = {"position", "velocity", "acceleration"};
     for (int i = 0; i < 3; ++i) {
       const double share = static_cast<double>(beyond[i]) / static_cast<double>(std::max<Index>(all, 1));
-      if (share < worth_a_word) continue;
+      if (share == 0 || share < worth_a_word[i]) continue;
       out.push_back(
-          fmt::format("{}: {:.1f} % of the held-out samples are beyond its {} limit, where the firmware clamps; "
+          fmt::format("{}: {:.2g} % of the held-out samples are beyond its {} limit, where the firmware clamps; "
                       "[limits] sets wider ones",
                       model.robot.joints[j].name, 100 * share, names[i]));
     }

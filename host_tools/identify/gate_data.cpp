@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numbers>
 
 #include "host_tools/simulate/recordings.hpp"
 #include "host_tools/support/error.hpp"
@@ -21,8 +22,8 @@ constexpr Eigen::Index long_logs = 1'500'000;
 void add_notes(const Project& project, std::size_t logs, std::vector<std::string>& notes) {
   if (project.limits.position.empty() || project.limits.velocity.empty() || project.limits.acceleration.empty()) {
     notes.push_back(
-        "limits not in the project: 1.2 times the largest in the logs (URDF limits where they are within a factor of "
-        "ten)");
+        "limits not in the project: position from the URDF (slides: within ten times the logs'), velocity and torque "
+        "from it within a factor of ten; the others 1.2 times the largest in the logs");
   }
   if (logs == 1) {
     notes.push_back(
@@ -110,6 +111,18 @@ void check_torque(const Log& log, const Robot& robot) {
   }
 }
 
+namespace {
+
+/// Whether a URDF's position limits are the joint's. Placeholders are wider than any gear's hoses (8 turns), or than ten
+/// times what the slide moved.
+bool has_range(const Joint& joint, double moved) {
+  constexpr double widest_turn = 8 * 2 * std::numbers::pi, widest_slide = 10;
+  const double range = joint.limits->upper - joint.limits->lower;
+  return range > 0 && range <= (joint.type == JointType::revolute ? widest_turn : widest_slide * moved);
+}
+
+}  // namespace
+
 std::vector<JointFit> initial_joints(const Project& project, const GateData& data) {
   constexpr double margin = 1.2;
   std::vector<JointFit> joints(project.robot.size());
@@ -135,7 +148,7 @@ std::vector<JointFit> initial_joints(const Project& project, const GateData& dat
       const double middle = (data.q_lower[k] + data.q_upper[k]) / 2, half = (data.q_upper[k] - data.q_lower[k]) / 2;
       joint.q_lower = middle - margin * half;
       joint.q_upper = middle + margin * half;
-      if (urdf && urdf->upper > urdf->lower && urdf->upper - urdf->lower <= 20 * half) {
+      if (urdf && has_range(project.robot.joints[j], 2 * half)) {
         joint.q_lower = std::min(urdf->lower, data.q_lower[k]);
         joint.q_upper = std::max(urdf->upper, data.q_upper[k]);
       }

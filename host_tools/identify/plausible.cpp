@@ -242,9 +242,18 @@ Rows::Fit best_signs(const Rows& rows, double up, Index joints) {
   }
 }
 
-/// Longest distance from a joint to the last link's frame, whatever the pose.
+/// How far the last link reaches beyond its joint: to its farthest fixed frame (flange, tool), or to the end of a body
+/// whose centre of mass is in its middle.
+double last_link(const Robot& robot) {
+  const Joint& last = robot.joints.back();
+  double reach = last.inertial ? 2 * last.inertial->centre.norm() : 0;
+  for (const Eigen::Vector3d& frame : last.fixed_frames) reach = std::max(reach, frame.norm());
+  return reach;
+}
+
+/// Longest distance from a joint to the end of the last link, whatever the pose.
 double reach_of(const Robot& robot, std::size_t joint) {
-  double reach = 0;
+  double reach = last_link(robot);
   for (std::size_t i = joint + 1; i < robot.size(); ++i) {
     reach += robot.joints[i].origin.translation().norm();
     const auto& limits = robot.joints[i].limits;
@@ -278,14 +287,14 @@ void check_units(const Robot& robot, const Rows& rows, const Rows::Fit& fit, std
   const double volume = std::pow(std::max(reach, options.shortest), 3);
   if (reach > 0 && mass - options.sure * mass_std > options.heaviest * volume) {
     out.push_back(
-        {Severity::error,
+        {Severity::warning,
          {},
          fmt::format("torques ask for a robot of at least {:.3g} kg that reaches {:.2g} m: are they in mN*m or "
                      "motor current? Set torque_gain so that they are in N*m at the joint",
                      mass, reach)});
   } else if (reach > 0 && mass > 0 && mass + options.sure * mass_std < options.lightest * volume) {
     out.push_back(
-        {Severity::error,
+        {Severity::warning,
          {},
          fmt::format("torques ask for no more than {:.2g} kg in a robot that reaches {:.2g} m: are they in "
                      "kN*m, or on the motor's side of the gearbox? Set torque_gain so that they are in N*m at "

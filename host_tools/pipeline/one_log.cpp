@@ -45,7 +45,8 @@ void identify_payload(const fs::path& model_file, const fs::path& log_file, cons
   write_file(directory / "payload.json", report.dump(1) + "\n");
 }
 
-void predict_log(const fs::path& model_file, const fs::path& log_file, bool fixed, const fs::path& directory) {
+void predict_log(const fs::path& model_file, const fs::path& log_file, const Prediction& how,
+                 const fs::path& directory) {
   const IdentifiedModel model = read_model(model_file);
   // The run's own metrics.json must survive.
   if (fs::exists(directory / "model.json")) {
@@ -58,7 +59,7 @@ void predict_log(const fs::path& model_file, const fs::path& log_file, bool fixe
   const ProcessedLog processed = process(std::move(log), model.filter);
 
   Eigen::MatrixXd torque;
-  if (fixed) {
+  if (how.fixed) {
     if (!model.formats)
       throw InputError(fmt::format("{}: has no fixed-point formats; run `fxdyn export` first", model_file.string()));
     // At the drive's ticks, as the firmware computes; then back to the log's samples.
@@ -76,13 +77,14 @@ void predict_log(const fs::path& model_file, const fs::path& log_file, bool fixe
   }
   Log result;
   result.t = resampled ? stamps : processed.t;
-  result.tau = resampled ? interpolate(torque, processed.t, stamps) : torque;
+  const Eigen::MatrixXd written = how.raw ? torque : processed.filter_columns(torque);
+  result.tau = resampled ? interpolate(written, processed.t, stamps) : written;
   write_log(out, result);
   std::vector<LogErrors> errors;
   if (processed.tau.size() > 0) errors.push_back(errors_of(processed, model.robot, torque));
   write_file(
       directory / "metrics.json",
-      json{{"schema", "fxdyn.metrics/1"}, {"numbers", fixed ? "fixed" : "real"}, {"logs", to_json(errors)}}.dump(1) +
+      json{{"schema", "fxdyn.metrics/1"}, {"numbers", how.fixed ? "fixed" : "real"}, {"logs", to_json(errors)}}.dump(1) +
           "\n");
 }
 

@@ -13,8 +13,13 @@ namespace fxdyn {
 Log read_log_for(const IdentifiedModel& model, const std::filesystem::path& file, std::optional<double> from_s,
                  std::optional<double> to_s, bool torque_required = true);
 
+struct Prediction {
+  bool fixed = false;  ///< as the firmware computes, else in double
+  bool raw = false;    ///< as computed; else below the torque's cut-off, which the fit saw: above it is noise of q
+};
+
 /// `fxdyn predict`: torque of the model over one log.
-void predict_log(const std::filesystem::path& model, const std::filesystem::path& log, bool fixed,
+void predict_log(const std::filesystem::path& model, const std::filesystem::path& log, const Prediction& how,
                  const std::filesystem::path& directory);
 
 /// `fxdyn payload`: the load of a second log, payload.json and the model with it, model.json.

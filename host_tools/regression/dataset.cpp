@@ -10,6 +10,7 @@
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/regression/noise_cutoff.hpp"
 #include "host_tools/signals/spectrum.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/parallel.hpp"
@@ -24,6 +25,7 @@ using Eigen::VectorXd;
 
 /// Samples beside a block that differences of sixth order look at, its one-sided ends included.
 constexpr Index halo = 8;
+constexpr double lowest_position_hz = 5;  ///< whatever the noise is, friction reverses as fast
 
 /// Rows [from, from + count) of q and its derivatives; what is measured is not differentiated.
 MotionRows slice(const MatrixXd& q, const MatrixXd& dq, const MatrixXd& ddq, Index from, Index count, double step_s) {
@@ -223,7 +225,13 @@ FilterFit choose_filter(const std::vector<Log>& logs, const SignalSettings& sett
     filter.crossing_hz = std::max(filter.crossing_hz, crossing[k]);
   }
   filter.excited_hz = motion.frequency_of_share(0.999);
-  const double position = std::min(0.4 * rate, std::max(10.0, 2 * filter.crossing_hz));
+  double position = std::min(0.4 * rate, std::max(10.0, 2 * filter.crossing_hz));
+  if (!settings.position_cutoff_hz) {
+    std::vector<bool> counts(moved.size());
+    for (std::size_t k = 0; k < moved.size(); ++k) counts[k] = moves(k);
+    const double band = std::max(lowest_position_hz, 2 * filter.excited_hz);
+    position = std::min(position, std::max(band, noise_cutoff(logs, band, filter.encoder_step, counts)));
+  }
   if (!settings.position_cutoff_hz) {
     for (const Log& log : logs) {
       for (Index j = 0; j < n && !noisy; ++j) {
@@ -236,7 +244,8 @@ FilterFit choose_filter(const std::vector<Log>& logs, const SignalSettings& sett
   filter.position_cutoff_hz =
       settings.position_cutoff_hz.value_or(noisy ? position : rate / 2);  // half the rate: no filter
   filter.torque_cutoff_hz =
-      settings.torque_cutoff_hz.value_or(std::min(0.4 * rate, std::max(5 * filter.excited_hz, 10.0)));
+      settings.torque_cutoff_hz.value_or(std::min({0.4 * rate, filter.position_cutoff_hz,
+                                                   std::max(5 * filter.excited_hz, 10.0)}));
   filter.torque_lead_s = settings.torque_lead_s.value_or(0);
   filter.edge_s = settings.edge_s.value_or(3 / std::min(filter.torque_cutoff_hz, filter.position_cutoff_hz));
   return filter;

@@ -50,6 +50,14 @@ std::string indented(const std::string& title, const std::string& text) {
   return out;
 }
 
+/// Held-out samples that the firmware clamps: its torque there is of another motion, whatever the figures below say.
+std::string clamped_lines(const json& diagnosis) {
+  std::string out;
+  const json fixed = diagnosis.value("evidence", json::object()).value("fixed_point", json::object());
+  for (const json& note : fixed.value("notes", json::array())) out += indented("clamped", note.get<std::string>());
+  return out;
+}
+
 std::string shortened(const std::string& name) {
   return name.size() <= longest_name ? name : fmt::format("{}..", name.substr(0, longest_name - 2));
 }
@@ -183,7 +191,6 @@ std::string evidence_lines(const json& diagnosis) {
   if (evidence.contains("note")) out += indented("note", evidence.value("note", ""));
   const json fixed = evidence.value("fixed_point", json::object());
   if (fixed.contains("why_not")) out += indented("no fixed point", fixed.value("why_not", ""));
-  for (const json& note : fixed.value("notes", json::array())) out += indented("fixed point", note.get<std::string>());
   if (!played.empty()) {
     const json failed = forward.value("failed", json::object());
     for (const auto& [which, why] : failed.items())
@@ -198,7 +205,7 @@ std::string diagnosis_table(const json& diagnosis) {
   const json joints = diagnosis.value("joints", json::array());
   std::string out = "\ndiagnosis: " + words::verdict(diagnosis) + "\n";
   if (const std::string on = words::figures_on(diagnosis); !on.empty()) out += "gaps on " + on + "\n";
-  out += joint_rows(joints) + robot_lines(diagnosis) + where_lines(joints) + resembling_lines(diagnosis) +
+  out += clamped_lines(diagnosis) + joint_rows(joints) + robot_lines(diagnosis) + where_lines(joints) + resembling_lines(diagnosis) +
          alternative_lines(diagnosis) + hidden_lines(diagnosis) + evidence_lines(diagnosis);
   if (const std::string next = words::next_experiment(diagnosis); !next.empty()) out += indented("next", next);
   for (const json& note : diagnosis.value("notes", json::array())) {

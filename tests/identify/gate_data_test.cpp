@@ -135,6 +135,13 @@ TEST(InitialJoints, TakeTheUrdfsLimitsWhereTheLogsComeWithinAFactorOfTen) {
   EXPECT_DOUBLE_EQ(joints[1].dq_limit, 2.4);
   EXPECT_DOUBLE_EQ(joints[1].tau_limit, 9.6);
   EXPECT_DOUBLE_EQ(joints[1].q_upper, 1.75);
+  // A wrist that turned little in the logs keeps the turns that it has; a slide's placeholder has none.
+  project.robot.joints[0].limits = Limits{-20, 20, 19, 60};
+  project.robot.joints[1].limits = Limits{-20, 20, 19, 60};
+  project.robot.joints[1].type = JointType::prismatic;
+  EXPECT_DOUBLE_EQ(initial_joints(project, moved())[0].q_lower, -20);
+  EXPECT_DOUBLE_EQ(initial_joints(project, moved())[1].q_lower, 0.25 - 1.2 * 1.25);
+  project.robot.joints[1].type = JointType::revolute;
   // A motion beyond the URDF's limits keeps its room.
   project.robot.joints[0].limits = Limits{-0.5, 3, 1.5, 60};
   EXPECT_DOUBLE_EQ(initial_joints(project, moved())[0].q_lower, -1);
