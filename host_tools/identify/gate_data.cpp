@@ -113,8 +113,8 @@ void check_torque(const Log& log, const Robot& robot) {
 
 namespace {
 
-/// Whether a URDF's position limits are the joint's. Placeholders are wider than any gear's hoses (8 turns), or than ten
-/// times what the slide moved.
+/// Whether a URDF's position limits are the joint's. Placeholders are wider than any gear's hoses (8 turns), or than
+/// ten times what the slide moved.
 bool has_range(const Joint& joint, double moved) {
   constexpr double widest_turn = 8 * 2 * std::numbers::pi, widest_slide = 10;
   const double range = joint.limits->upper - joint.limits->lower;

@@ -84,7 +84,8 @@ void predict_log(const fs::path& model_file, const fs::path& log_file, const Pre
   if (processed.tau.size() > 0) errors.push_back(errors_of(processed, model.robot, torque));
   write_file(
       directory / "metrics.json",
-      json{{"schema", "fxdyn.metrics/1"}, {"numbers", how.fixed ? "fixed" : "real"}, {"logs", to_json(errors)}}.dump(1) +
+      json{{"schema", "fxdyn.metrics/1"}, {"numbers", how.fixed ? "fixed" : "real"}, {"logs", to_json(errors)}}.dump(
+          1) +
           "\n");
 }
 

@@ -243,9 +243,8 @@ FilterFit choose_filter(const std::vector<Log>& logs, const SignalSettings& sett
   }
   filter.position_cutoff_hz =
       settings.position_cutoff_hz.value_or(noisy ? position : rate / 2);  // half the rate: no filter
-  filter.torque_cutoff_hz =
-      settings.torque_cutoff_hz.value_or(std::min({0.4 * rate, filter.position_cutoff_hz,
-                                                   std::max(5 * filter.excited_hz, 10.0)}));
+  filter.torque_cutoff_hz = settings.torque_cutoff_hz.value_or(
+      std::min({0.4 * rate, filter.position_cutoff_hz, std::max(5 * filter.excited_hz, 10.0)}));
   filter.torque_lead_s = settings.torque_lead_s.value_or(0);
   filter.edge_s = settings.edge_s.value_or(3 / std::min(filter.torque_cutoff_hz, filter.position_cutoff_hz));
   return filter;

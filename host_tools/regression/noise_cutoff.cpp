@@ -29,7 +29,8 @@ struct Load {
     const ZeroPhaseFilter filter(band_hz, log.step_s);
     const auto edge = std::min<Index>(log.samples() / 4, static_cast<Index>(1 / (band_hz * log.step_s)));
     const VectorXd q = filter.apply(log.q.col(joint));
-    const VectorXd dq = log.dq.size() > 0 ? VectorXd(filter.apply(log.dq.col(joint))) : VectorXd(differentiate(q, log.step_s));
+    const VectorXd dq =
+        log.dq.size() > 0 ? VectorXd(filter.apply(log.dq.col(joint))) : VectorXd(differentiate(q, log.step_s));
     MatrixXd columns(log.samples(), 6);
     columns << VectorXd::Ones(log.samples()), dq.array().sign().matrix(), dq, q, differentiate(dq, log.step_s),
         log.tau.col(joint);

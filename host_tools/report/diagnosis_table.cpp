@@ -205,8 +205,9 @@ std::string diagnosis_table(const json& diagnosis) {
   const json joints = diagnosis.value("joints", json::array());
   std::string out = "\ndiagnosis: " + words::verdict(diagnosis) + "\n";
   if (const std::string on = words::figures_on(diagnosis); !on.empty()) out += "gaps on " + on + "\n";
-  out += clamped_lines(diagnosis) + joint_rows(joints) + robot_lines(diagnosis) + where_lines(joints) + resembling_lines(diagnosis) +
-         alternative_lines(diagnosis) + hidden_lines(diagnosis) + evidence_lines(diagnosis);
+  out += clamped_lines(diagnosis) + joint_rows(joints) + robot_lines(diagnosis) + where_lines(joints) +
+         resembling_lines(diagnosis) + alternative_lines(diagnosis) + hidden_lines(diagnosis) +
+         evidence_lines(diagnosis);
   if (const std::string next = words::next_experiment(diagnosis); !next.empty()) out += indented("next", next);
   for (const json& note : diagnosis.value("notes", json::array())) {
     if (note.is_string()) out += indented("note", note.get<std::string>());

@@ -40,7 +40,7 @@ Log swing(double rate_hz, double noise_rad) {
 
 double rms(const Log& log) { return log.tau.norm() / std::sqrt(static_cast<double>(log.samples())); }
 
-// The rule itself: at the cut-off, differentiated noise times inertia and viscous friction is one per cent of the torque.
+// The rule itself: at the cut-off, differentiated noise times inertia and friction is one per cent of the torque.
 TEST(NoiseCutoff, LeavesOnePerCentOfTheTorque) {
   const Log log = swing(1000, noise), clean = swing(1000, 0);
   const double cutoff = noise_cutoff({log}, 5, {0}, {true});
