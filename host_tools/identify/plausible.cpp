@@ -40,8 +40,11 @@ class Rows {
       left_out_.push_back(logs.front().is_left_out(j));
     }
     Index available = 0;
+    double independent = 0;  // samples of noise below the torque's cut-off: 2 f T
     for (const ProcessedLog& log : logs) {
-      if (log.role == Role::train) available += log.last - log.first;
+      if (log.role != Role::train) continue;
+      available += log.last - log.first;
+      independent += 2 * log.filter.torque_cutoff_hz * static_cast<double>(log.last - log.first) * log.step_s;
     }
     const Index stride = std::max<Index>(1, available / samples_used);
     std::vector<const ProcessedLog*> of;
@@ -54,6 +57,7 @@ class Rows {
       }
     }
     const auto rows = static_cast<Index>(of.size());
+    rows_per_sample_ = std::max(1.0, static_cast<double>(rows) / independent);
     tau_.resize(rows, n_);
     for (Index j = 0; j < n_; ++j) {
       moving_.emplace_back(rows, nb);
@@ -147,7 +151,7 @@ class Rows {
         fit.score += std::log(residual[j] / whole);
       }
     }
-    fit.covariance = SymmetricSolver(information).inverse();
+    fit.covariance = rows_per_sample_ * SymmetricSolver(information).inverse();
     return fit;
   }
 
@@ -216,6 +220,7 @@ class Rows {
   const PlausibleOptions& options_;
   Index n_;
   BaseSet base_;
+  double rows_per_sample_ = 1;  ///< neighbours of filtered torque are no independent samples
   std::vector<bool> has_rotor_, left_out_;
   MatrixXd tau_;
   VectorXd accelerations_;  ///< sum of squares
