@@ -20,8 +20,8 @@ struct Fold {
 };
 
 /// The rows of all logs, one after the other, as blocks and folds. With validate logs there is one fold, which they
-/// judge; else every block of today's session is judged by a fit of all other blocks. A block is a log, but for a
-/// single train log without a validate log, which is cut.
+/// judge, and a block is a log. Else today's logs are cut: a fold is a part of each of them, judged by a fit of all
+/// others. A whole log left out would ask the others for what their motion does not show.
 struct Blocks {
   std::vector<Block> all;
   std::vector<Block> of_log;     ///< by log: all of its rows

@@ -4,8 +4,10 @@
 #include <cmath>
 
 #include "host_tools/diagnose/autoregression.hpp"
+#include "host_tools/diagnose/features.hpp"
 #include "host_tools/diagnose/models.hpp"
 #include "host_tools/diagnose/velocity_doubt.hpp"
+#include "host_tools/regression/solver.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn::diagnosis {
@@ -18,6 +20,9 @@ namespace {
 
 /// Standard deviations in the median of a normal variable's magnitude: 1 / Phi^-1(3 / 4).
 constexpr double sigma_of_median = 1.4826;
+
+/// Of a function's own square: what it may be of the others and still counts. A numeric choice.
+constexpr double dependent = 1e-4;
 
 /// Standard deviation of normal noise from its median: what sticks may be far off without being noise.
 double robust_sigma(const Blocks& blocks, const VectorXd& residual) {
@@ -74,6 +79,30 @@ double NoiseModel::log_scale(std::size_t joint) const {
   return sum;
 }
 
+/// A residual without what functions of the state explain of the healthy session's rows: structure is no noise, and an
+/// autoregression of it would whiten away whatever is as slow.
+VectorXd without_background(const LogColumns& columns, const Blocks& blocks, std::size_t joint, VectorXd e) {
+  const std::vector<std::size_t>& structured = columns.background();
+  if (std::find(structured.begin(), structured.end(), joint) == structured.end()) return e;
+  const std::size_t n = columns.joints();
+  const NoiseModel white(blocks, std::vector<VectorXd>(n, VectorXd::Zero(1)),
+                         std::vector<VectorXd>(n, VectorXd::Zero(blocks.rows())), 1);
+  MatrixXd f = features(columns, white, blocks, joint, true);
+  VectorXd y = VectorXd::Zero(e.size());
+  for (const Block& b : blocks.of_log) {
+    if (b.healthy) {
+      y.segment(b.first, b.count) = e.segment(b.first, b.count);
+    } else {
+      f.middleRows(b.first, b.count).setZero();
+    }
+  }
+  const VectorXd size = f.colwise().norm().transpose();
+  f = f * size.unaryExpr([](double s) { return s > 0 ? 1 / s : 0.0; }).asDiagonal();
+  MatrixXd gram = f.transpose() * f;
+  gram.diagonal().array() += dependent;
+  return e - f * SymmetricSolver(gram).solve(f.transpose() * y);
+}
+
 NoiseModel estimate_noise(const LogColumns& columns, const BlockSolver& solver, const LinearFit& fit,
                           std::vector<VectorXd> whitening) {
   const Blocks& blocks = solver.blocks();
@@ -85,6 +114,7 @@ NoiseModel estimate_noise(const LogColumns& columns, const BlockSolver& solver, 
     const VectorXd e = solver.residual(j, fit);
     const double sigma = std::max(robust_sigma(blocks, e), 1e-12 / std::sqrt(solver.weights()[k]));
     doubts[j].resize(blocks.rows());
+    const VectorXd of_noise = without_background(columns, blocks, j, e);
     std::vector<VectorXd> parts;
     for (std::size_t l = 0; l < columns.logs().size(); ++l) {
       const Block& b = blocks.of_log[l];
@@ -92,7 +122,7 @@ NoiseModel estimate_noise(const LogColumns& columns, const BlockSolver& solver, 
                                         columns.robot(l).structural().col(k), sigma);
       doubts[j].segment(b.first, b.count) = u;
       const bool use = columns.has_baseline() ? b.healthy : b.fits;
-      if (use) parts.emplace_back((e.segment(b.first, b.count).array() / (1 + u.array()).sqrt()).matrix());
+      if (use) parts.emplace_back((of_noise.segment(b.first, b.count).array() / (1 + u.array()).sqrt()).matrix());
     }
     coefficients[j] = autoregression(parts);
   });

@@ -44,11 +44,12 @@ TEST(BlocksOfLogs, ValidateLogsJudgeAll) {
   EXPECT_EQ(blocks.fit_of(false), (Places{0}));
 }
 
-TEST(BlocksOfLogs, SeveralTrainLogsJudgeOneAnother) {
+TEST(BlocksOfLogs, WithoutValidateLogsAFoldIsAPartOfEveryTrainLog) {
   const Blocks blocks = make_blocks({log(false, true), log(false, true), log(true, true)});
-  ASSERT_EQ(blocks.folds.size(), 2U);  // the healthy session never judges
-  EXPECT_EQ(blocks.folds[1].fit, (Places{0, 2}));
-  EXPECT_EQ(blocks.folds[1].judge, (Places{1}));
+  ASSERT_EQ(blocks.all.size(), 11U);
+  ASSERT_EQ(blocks.folds.size(), 5U);  // the healthy session never judges
+  EXPECT_EQ(blocks.folds[1].judge, (Places{1, 6}));
+  EXPECT_EQ(blocks.folds[1].fit, (Places{0, 2, 3, 4, 5, 7, 8, 9, 10}));
 }
 
 TEST(BlocksOfLogs, ASingleTrainLogIsCut) {
