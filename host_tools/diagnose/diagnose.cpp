@@ -195,7 +195,9 @@ class Diagnoser {
       found.current = models_.current;
       add_deviations(found, *outcome.problem);
     } else if (outcome.structured()) {
-      refit(found, logs_, plain(), 4);
+      Models in_band = found;
+      refit(in_band, logs_, plain(), 4);
+      if (!is_worse_anywhere(found.current, in_band.current)) found = std::move(in_band);
       Linearised problem(found, logs_, plain());
       problem.solver().set_weights(diluted(problem));
       add_deviations(found, problem);
@@ -222,6 +224,14 @@ class Diagnoser {
 
  private:
   std::size_t joints() const { return project_.robot.size(); }
+  /// On the logs that judge, by more than a name may raise the error.
+  bool is_worse_anywhere(const IdentifiedModel& before, const IdentifiedModel& after) const {
+    const VectorXd of_before = plain_error(before, logs_), of_after = plain_error(after, logs_);
+    for (Index j = 0; j < of_after.size(); ++j) {
+      if (is_worse(options().gate, of_before, of_after, j)) return true;
+    }
+    return false;
+  }
   const Options& options() const { return models_.options; }
   std::vector<VectorXd> plain() const { return std::vector<VectorXd>(joints(), VectorXd::Zero(1)); }
   void add_notes(const std::vector<std::string>& notes) { notes_.insert(notes_.end(), notes.begin(), notes.end()); }
@@ -377,9 +387,9 @@ class Diagnoser {
     Outcome background;
     background.models = alone;
     background.look_again(before);
-    SearchSettings modest = settings_;  // it need not be named, only taken out
-    modest.max_effects = std::min<std::size_t>(2, settings_.max_effects);
-    modest.most = std::max<std::size_t>(2, joints());
+    // All that has a form: what stays is taken out of today's logs without one.
+    SearchSettings modest = settings_;
+    modest.most = std::max<std::size_t>(2, joints() * settings_.max_effects);
     bool structured = background.structured();
     if (!structured) {
       // Ripple is finer than the functions that the test knows.
@@ -388,7 +398,7 @@ class Diagnoser {
       structured = !ripples_only.run({}, progress_).groups.empty();
     }
     if (structured) {
-      background = explore(alone, before, modest, never_, 1, progress_);
+      background = explore(alone, before, modest, never_, 2, progress_);
       alone = background.models;
       for (std::size_t j = 0; j < joints(); ++j) {
         for (EffectFit& fit : alone.current.joints[j].effects) {
@@ -414,7 +424,7 @@ class Diagnoser {
       if (id.body) {
         model.body[id.effect].named = gate.robot_closure[i] >= options().gate.least_closure;
       } else {
-        model.joints[id.joint].effects[id.effect].named = gate.accepted[id.joint];
+        model.joints[id.joint].effects[id.effect].named = gate.believed[i];
       }
     }
   }

@@ -53,6 +53,12 @@ json to_json(const NamedEffect& effect) {
            {"held_out_closure", or_null(effect.held_out_closure)},
            {"alternatives", effect.alternatives},
            {"model_share", effect.model_share}};
+  if (effect.odds_nothing) {
+    out["certainty"] = effect.established ? "established" : "likely";
+    out["log10_odds_nothing"] = *effect.odds_nothing;
+    out["log10_odds_rival"] = or_null(effect.odds_rival);
+    out["rival"] = effect.rival.empty() ? json(nullptr) : json(effect.rival);
+  }
   if (!effect.signal.empty()) out["signal"] = effect.signal;
   if (effect.joints) out["joints"] = *effect.joints;
   return out;
@@ -66,6 +72,12 @@ NamedEffect effect_of(const json& file) {
   out.score = number_of(file.at("score"));
   out.held_out_closure = optional_of(file.at("held_out_closure"));
   out.signal = file.value("signal", "");
+  if (file.contains("certainty")) {
+    out.established = file.at("certainty") == "established";
+    out.odds_nothing = optional_of(file.at("log10_odds_nothing"));
+    out.odds_rival = optional_of(file.at("log10_odds_rival"));
+    if (file.at("rival").is_string()) out.rival = file.at("rival");
+  }
   out.alternatives = strings_of(file.at("alternatives"));
   out.model_share = number_of(file.at("model_share"));
   if (file.contains("joints")) out.joints = file.at("joints").get<std::vector<std::size_t>>();

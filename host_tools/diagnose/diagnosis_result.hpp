@@ -36,6 +36,11 @@ struct NamedEffect {
   std::optional<double> held_out_closure;
   std::string signal;  ///< "q - qlink": a deflection shows it; empty: the torque does
   std::vector<std::string> alternatives;
+  /// On data that fitted none of it, log10 of the odds against nothing, whatever else is missing at its joint, and
+  /// against the effect that comes nearest; none: not known, or no other comes near.
+  std::optional<double> odds_nothing, odds_rival;
+  std::string rival;                               ///< that effect
+  bool established = false;                        ///< both are 1000 to 1; else it is likely
   double model_share = 0;                          ///< of the model's torque
   std::optional<std::vector<std::size_t>> joints;  ///< on the robot: those that feel it, from 1
 };

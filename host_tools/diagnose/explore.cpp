@@ -51,6 +51,18 @@ std::vector<VectorXd> colours(const Models& models, const std::vector<SessionLog
   return out;
 }
 
+/// Friction that the healthy session has beside the nominal one: it may have changed, which is no second one of it.
+std::vector<EffectCandidate> friction_of_background(const Models& models) {
+  std::vector<EffectCandidate> out;
+  for (std::size_t j = 0; j < models.current.joints.size(); ++j) {
+    for (const EffectFit& fit : models.current.joints[j].effects) {
+      const EffectInfo& info = *find_effect(fit.effect);
+      if (!fit.named && info.friction && !info.nominal && !info.several) out.push_back({fit.effect, j, fit.shape});
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 bool Outcome::structured() const {
@@ -85,6 +97,7 @@ Outcome explore(Models models, const std::vector<SessionLog>& logs, const Search
     std::vector<EffectCandidate> skip = never;
     for (const std::size_t g : in_model(problem)) skip.push_back(problem.groups()[g].candidate);
     std::erase_if(skip, [](const EffectCandidate& c) { return find_effect(c.effect)->several; });
+    for (const EffectCandidate& has : friction_of_background(models)) skip.push_back(has);
     problem.add_all(dictionary(problem, skip));
     progress.step();
     Search search(problem, settings);
@@ -119,7 +132,8 @@ Outcome explore(Models models, const std::vector<SessionLog>& logs, const Search
     }
     if (lost) refit(models, logs, problem.noise().whitening(), 2);
     out.found.clear();
-    for (std::size_t i = 0; i < ids.size(); ++i) out.found.push_back({ids[i], found[i].score, found[i].alternatives});
+    for (std::size_t i = 0; i < ids.size(); ++i)
+      out.found.push_back({ids[i], found[i].score, found[i].alternatives, found[i].rival});
     out.models = models;
     // Without a baseline the gap was part of what looked like noise.
     whitening = changed && !models.has_baseline ? colours(models, logs) : problem.noise().whitening();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@ struct Finding {
   EffectId id;
   double score = 0;
   std::vector<Alternative> alternatives;
+  std::optional<Rival> rival{};
 };
 
 /// What a search came to.

@@ -232,6 +232,25 @@ MatrixXd features(const LogColumns& columns, const NoiseModel& noise, const Bloc
   return out;
 }
 
+MatrixXd position_waves(const Linearised& problem, std::size_t joint, Index count) {
+  const LogColumns& columns = problem.log_columns();
+  const Blocks& blocks = problem.blocks();
+  const Scales scales = scales_of(columns, blocks);
+  const auto j = static_cast<Index>(joint);
+  MatrixXd out = MatrixXd::Zero(blocks.rows(), count);
+  for (std::size_t l = 0; l < columns.logs().size(); ++l) {
+    const SessionLog& entry = columns.logs()[l];
+    if (entry.healthy) continue;
+    const ArrayXd u = (columns.motion(l).q.col(j).array() - scales.low[j]) / scales.range[j];
+    MatrixXd full(u.size(), count);
+    for (Index m = 0; m < count; ++m) full.col(m) = (static_cast<double>(m + 1) * std::numbers::pi * u).cos();
+    const Block& b = blocks.of_log[l];
+    out.middleRows(b.first, b.count) =
+        problem.noise().apply(l, joint, entry.log.decimate(entry.log.filter_columns(full)));
+  }
+  return out;
+}
+
 MatrixXd features(const Linearised& problem, std::size_t joint, bool healthy) {
   return features(problem.log_columns(), problem.noise(), problem.blocks(), joint, healthy);
 }

@@ -17,6 +17,10 @@ Eigen::MatrixXd features(const LogColumns& columns, const NoiseModel& noise, con
                          bool healthy);
 Eigen::MatrixXd features(const Linearised& problem, std::size_t joint, bool healthy = false);
 
+/// Cosines over the own position's range, as finely as is asked for, made like features(); zero on the healthy
+/// session's rows.
+Eigen::MatrixXd position_waves(const Linearised& problem, std::size_t joint, Eigen::Index count);
+
 /// Features of time alone: what changes with time does not come back.
 constexpr Eigen::Index time_features = 15;
 

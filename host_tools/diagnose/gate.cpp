@@ -4,10 +4,12 @@
 #include <cmath>
 #include <memory>
 
+#include "host_tools/diagnose/base_parameters.hpp"
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/regression/solver.hpp"
 #include "host_tools/support/parallel.hpp"
 #include "model/effects/payload.hpp"
 
@@ -115,6 +117,35 @@ HeldOut judge(const Outcome& outcome, const std::vector<SessionLog>& logs, const
 
 VectorXd gap_of(const HeldOut& held) { return (held.before - held.after).cwiseMax(0.0) + held.excess; }
 
+/// Standard deviations by which an effect's coefficients together are off nothing: the root of theta^T C^-1 theta.
+double deviations_off_nothing(const Linearised& problem, const EffectId& id, const MatrixXd& covariance) {
+  std::vector<Index> place;
+  for (std::size_t c = 0; c < problem.unknowns().size(); ++c) {
+    const Unknown& u = problem.unknowns()[c];
+    const bool its = u.body == id.body && u.effect == id.effect && (id.body || u.joint == id.joint);
+    if (its && u.kind == Unknown::Kind::linear && !u.change) place.push_back(static_cast<Index>(c));
+  }
+  if (place.empty()) return 0;
+  VectorXd theta(static_cast<Index>(place.size()));
+  for (std::size_t i = 0; i < place.size(); ++i)
+    theta[static_cast<Index>(i)] = problem.unknowns()[static_cast<std::size_t>(place[i])].value;
+  const MatrixXd own = covariance(place, place);
+  return std::sqrt(std::max(0.0, theta.dot(SymmetricSolver(own).solve(theta))));
+}
+
+/// By group; a share, which is 1 by definition, is not asked.
+std::vector<double> deviations_off_nothing(const Linearised& problem, const std::vector<std::size_t>& groups) {
+  std::vector<double> out(groups.size(), 1e300);
+  if (groups.empty()) return out;
+  const LinearFit fit = problem.solver().solve(problem.unknown_columns());
+  const MatrixXd covariance = SymmetricSolver(fit.information).inverse();
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    const Group& group = problem.groups()[groups[i]];
+    if (!find_effect(group.candidate.effect)->share) out[i] = deviations_off_nothing(problem, group.id, covariance);
+  }
+  return out;
+}
+
 /// Whether an effect brings anything: over all joints, and as a share of the gap at its own.
 bool holds(const Outcome& outcome, const Group& group, const HeldOut& held, std::size_t i) {
   const GateOptions& options = outcome.models.options.gate;
@@ -130,22 +161,6 @@ bool holds(const Outcome& outcome, const Group& group, const HeldOut& held, std:
   // With nothing left over the noise is what it says it is, and a small effect beside a large one is no less sure.
   if (!outcome.structured(j)) return brings > std::min(options.sure_gain, options.least_share * gap);
   return brings > options.least_share_in_structure * gap;
-}
-
-/// Mean squares of the filtered error on the logs that judge; empty: there are none.
-VectorXd plain_error(const IdentifiedModel& model, const std::vector<SessionLog>& logs) {
-  std::vector<VectorXd> squares(logs.size());
-  parallel_for(logs.size(), [&](std::size_t l) {
-    if (logs[l].fits) return;
-    const ProcessedLog& log = logs[l].log;
-    const MatrixXd error = log.filter_columns(log.tau - predict(model, log));
-    squares[l] = error.middleRows(log.first, log.last - log.first).colwise().squaredNorm().transpose();
-  });
-  VectorXd sum;
-  for (const VectorXd& square : squares) {
-    if (square.size() > 0) sum = sum.size() > 0 ? VectorXd(sum + square) : square;
-  }
-  return sum;
 }
 
 /// How fast drift comes to its end shows on the data that follow.
@@ -195,12 +210,28 @@ void conclude(Gate& gate, const Outcome& outcome, const std::vector<bool>& still
   }
 }
 
+/// Which effects at a joint are believed: those of a joint whose gap they close together, and those that have evidence
+/// of their own. None that a free curve of its variable is better than.
+void believe(Gate& gate, const Outcome& outcome) {
+  const GateOptions& options = outcome.models.options.gate;
+  gate.own = own_evidence(*outcome.problem, gate.groups, outcome.features);
+  gate.believed.assign(gate.groups.size(), false);
+  for (std::size_t i = 0; i < gate.groups.size(); ++i) {
+    const Group& group = outcome.problem->groups()[gate.groups[i]];
+    if (group.on_body) continue;
+    const OwnEvidence& own = gate.own[i];
+    const bool holds = own.form >= (own.alike > 1 ? options.sure_closure : options.least_closure);
+    const bool by_itself = !own.of_time && own.gain >= options.sure_gain && own.form >= options.sure_closure;
+    gate.believed[i] = holds && (gate.accepted[group.candidate.joint] || by_itself);
+  }
+}
+
 /// The named effect that goes first, as a place in the gate's groups; their number: all hold.
 /// @param before, after mean squares of the plain error on the logs that judge
 std::size_t weakest(const Gate& gate, const Outcome& outcome, const VectorXd& before, const VectorXd& after) {
-  const double worse = outcome.models.options.gate.worse;
-  const auto rises = [&](Index j) { return before.size() > 0 && after[j] > worse * worse * before[j]; };
+  const auto rises = [&](Index j) { return is_worse(outcome.models.options.gate, before, after, j); };
   const std::size_t none = gate.groups.size();
+  const std::vector<double> off_nothing = deviations_off_nothing(*outcome.problem, gate.groups);
   std::size_t worst = none;
   bool worst_on_body = false;
   for (std::size_t i = 0; i < none; ++i) {
@@ -209,7 +240,8 @@ std::size_t weakest(const Gate& gate, const Outcome& outcome, const VectorXd& be
     // Whatever it brings there: a load that others make up for in the linear fit may be far off in the model.
     for (std::size_t j = 0; group.on_body && j < outcome.problem->joints(); ++j)
       spoils |= outcome.problem->solver().rows(j).place(group.first) >= 0 && rises(static_cast<Index>(j));
-    if (!spoils && holds(outcome, group, gate.held, i)) continue;
+    const bool sure = off_nothing[i] >= outcome.models.options.gate.sure_deviations;
+    if (!spoils && sure && holds(outcome, group, gate.held, i)) continue;
     // An effect on the robot that spoils joints goes before theirs, which may have been bent by it.
     const bool on_body = spoils && group.on_body;
     const bool first = worst == none || (on_body && !worst_on_body);
@@ -223,14 +255,63 @@ std::size_t weakest(const Gate& gate, const Outcome& outcome, const VectorXd& be
   for (std::size_t i = 0; i < none; ++i) {
     const Group& group = outcome.problem->groups()[gate.groups[i]];
     const std::size_t j = group.candidate.joint;
-    if (group.on_body || outcome.problem->background(j) == nullptr || outcome.structured(j) || gate.accepted[j])
+    if (group.on_body || outcome.problem->background(j) == nullptr || outcome.structured(j) || gate.believed[i])
       continue;
     if (worst == none || gate.held.alone[i].sum() < gate.held.alone[worst].sum()) worst = i;
   }
   return worst;
 }
 
+/// Whether any joint is worse off: of those with names of their own, these are gone by now.
+bool is_spoiled(const Outcome& outcome, const VectorXd& before, const VectorXd& after) {
+  for (Index j = 0; j < after.size(); ++j) {
+    if (is_worse(outcome.models.options.gate, before, after, j)) return true;
+  }
+  return false;
+}
+
+/// Base parameters as they were before anything was named; what was named explains torque by itself.
+void hold_base(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs) {
+  Models& models = outcome.models;
+  models.base_held = true;
+  for (std::size_t k = 0; k < nominal.base.size(); ++k) {
+    const double step = nominal.base[k].value - models.current.base[k].value;
+    add_to_base(models.current, k, step);
+    if (models.has_baseline) add_to_base(models.healthy, k, step);
+  }
+  refit(models, logs, outcome.whitening, 4);
+  outcome.look_again(logs);
+}
+
+/// The effect that brings least, as a place in the gate's groups.
+std::size_t least(const Gate& gate) {
+  std::size_t out = 0;
+  for (std::size_t i = 1; i < gate.groups.size(); ++i) {
+    if (gate.held.alone[i].sum() < gate.held.alone[out].sum()) out = i;
+  }
+  return out;
+}
+
 }  // namespace
+
+VectorXd plain_error(const IdentifiedModel& model, const std::vector<SessionLog>& logs) {
+  std::vector<VectorXd> squares(logs.size());
+  parallel_for(logs.size(), [&](std::size_t l) {
+    if (logs[l].fits) return;
+    const ProcessedLog& log = logs[l].log;
+    const MatrixXd error = log.filter_columns(log.tau - predict(model, log));
+    squares[l] = error.middleRows(log.first, log.last - log.first).colwise().squaredNorm().transpose();
+  });
+  VectorXd sum;
+  for (const VectorXd& square : squares) {
+    if (square.size() > 0) sum = sum.size() > 0 ? VectorXd(sum + square) : square;
+  }
+  return sum;
+}
+
+bool is_worse(const GateOptions& options, const VectorXd& before, const VectorXd& after, Index joint) {
+  return before.size() > 0 && after[joint] > options.worse * options.worse * before[joint];
+}
 
 std::size_t Gate::place(const Linearised& problem, const EffectId& id) const {
   for (std::size_t i = 0; i < groups.size(); ++i) {
@@ -248,10 +329,18 @@ Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<Se
     gate.groups = in_model(*outcome.problem);
     gate.held = judge(outcome, logs, gate.groups);
     conclude(gate, outcome, still);
+    believe(gate, outcome);
     const VectorXd after =
         gate.groups.empty() || before.size() == 0 ? before : plain_error(outcome.models.current, logs);
-    const std::size_t worst = weakest(gate, outcome, before, after);
-    if (worst == gate.groups.size()) break;
+    std::size_t worst = weakest(gate, outcome, before, after);
+    if (worst == gate.groups.size()) {
+      if (gate.groups.empty() || !is_spoiled(outcome, before, after)) break;
+      if (!outcome.models.base_held && outcome.models.rotors.empty()) {
+        hold_base(outcome, nominal, logs);
+        continue;
+      }
+      worst = least(gate);
+    }
     const EffectId gone = outcome.problem->groups()[gate.groups[worst]].id;
     std::erase_if(outcome.found, [&](const Finding& f) { return f.id == gone; });
     std::vector<EffectId> ids;

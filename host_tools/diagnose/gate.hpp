@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "host_tools/diagnose/explore.hpp"
+#include "host_tools/diagnose/own_evidence.hpp"
 #include "host_tools/effects/forward.hpp"
 
 namespace fxdyn::diagnosis {
@@ -25,16 +26,26 @@ struct Gate {
   Eigen::VectorXd closure;
   std::vector<double> robot_closure;  ///< by group; effects on the body only
   std::vector<bool> remains;          ///< structure that counts is left
-  std::vector<bool> accepted;         ///< joint's names are believed
+  std::vector<bool> accepted;         ///< the joint's gap is closed by its names
+  std::vector<OwnEvidence> own;       ///< by group; effects at a joint only
+  std::vector<bool> believed;         ///< by group; effects at a joint only
 
   /// Place of an effect in `groups`; groups.size(): it has none.
   std::size_t place(const Linearised& problem, const EffectId& id) const;
 };
 
+/// Mean squares of the filtered error on the logs that judge, by joint; empty: there are none.
+Eigen::VectorXd plain_error(const IdentifiedModel& model, const std::vector<SessionLog>& logs);
+/// Whether a joint's error is larger than before by more than a name may raise it. @param before, after plain_error()
+bool is_worse(const GateOptions& options, const Eigen::VectorXd& before, const Eigen::VectorXd& after,
+              Eigen::Index joint);
+
 /// Judges each fold by a fit of the others; time constants of drift are chosen by that, and names that do not hold are
 /// taken out of the outcome one by one: those that bring nothing; those at joints whose plain error on the validate
 /// logs is larger than that of `nominal` (rows near standstill, of which the search believes little, count there too);
-/// and those not believed at joints that show no more structure than their background.
+/// and those not believed at joints that show no more structure than their background. Where the error of a joint
+/// rises through what was found elsewhere, the base parameters go back to the nominal model's and stay there; names
+/// that still raise it go, the one that brings least first.
 Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs,
           const std::vector<bool>& still);
 

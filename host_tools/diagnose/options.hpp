@@ -37,6 +37,8 @@ struct PriorOptions {
   double refitted_rotor = 0.005;
   /// -; a share that is 1 by definition; theory: any value far below the data's own deviation holds it at 1
   double share = 1e-3;
+  /// share of itself; a base parameter that stays what it is; theory: far below the data's own deviation
+  double held = 1e-4;
   /// standard deviations; a coefficient that moved further has changed; theory: 2 Phi(-2) = 4.6 % of healthy ones
   double changed = 2;
 };
@@ -95,8 +97,6 @@ struct SearchOptions {
   double same_ripple = 0.1;
   /// score; an alternative is at most so far behind; theory: a Bayes factor of exp(5) = 150; the level by hand
   double alternative = 10;
-  /// score, share of the finding's; an alternative's candidate may begin so far behind; hand
-  double alternative_behind = 25, alternative_behind_share = 0.1;
 };
 
 /// Structure in what a fit leaves.
@@ -123,18 +123,25 @@ struct GateOptions {
   double least_gain = 4;
   /// share of the gap at its joint; .. and at least that; hand, decision 0005
   double least_share = 0.01;
-  /// noise variances; .. unless it brings that; theory: 4 deviations of one coefficient, 6e-5 of noise brings more
+  /// noise variances; .. unless it brings that; theory: 4 deviations of one coefficient, 6e-5 of noise brings more.
+  /// What brings that beside free curves of all other variables is believed whatever else is missing
   double sure_gain = 16;
   /// share of the gap at its joint; .. where the joint has structure left; hand, decision 0005: it is no noise
   double least_share_in_structure = 0.02;
   /// times the plain error before; a name may raise it so far; hand
   double worse = 1.02;
-  /// share of the gap above the noise; what a name closes; hand: more than is left
+  /// share of the gap above the noise; what a name closes; hand: more than is left. Likewise of what a free curve of
+  /// its variable closes in its place
   double least_closure = 0.5;
-  /// share of the gap above the noise; .. where structure remains; hand: another effect may only resemble it
+  /// share of the gap above the noise; .. where structure remains; hand: another effect may only resemble it. Likewise
+  /// of what a free curve closes: several names in one variable, and those that are believed whatever else is missing
   double sure_closure = 0.8;
   /// share of the gap with the healthy session's own structure; .. beside a background; hand, decision 0005
   double beside_background = 0.25;
+  /// standard deviations; coefficients of a name are off nothing by; theory: 2 Phi(-2) = 4.6 % of noise is further off
+  double sure_deviations = 2;
+  /// log10 odds against nothing and against the closest rival; an effect is established; theory: 1000 to 1
+  double established = 3;
   /// noise variances; from there on a joint feels an effect on the robot; hand
   double least_felt = 6;
 };

@@ -187,8 +187,8 @@ std::vector<Search::Scored> Search::score_all(const Choice& state, bool with_thr
   std::vector<Scored> out;
   for (std::size_t g = 0; g < problem_.groups().size(); ++g) {
     const Gain& gain = candidates.gain[g];
-    if (candidates.usable[g] == 0 || gain.square <= 0) continue;
     const Group& group = problem_.groups()[g];
+    if (candidates.usable[g] == 0 || gain.square <= 0) continue;
     double likelihood = gain.square;
     if (!group.on_body && find_effect(group.candidate.effect)->acts_on == ActsOn::torque) {
       // all of it is one joint's
@@ -297,12 +297,8 @@ Choice Search::run(const std::vector<std::size_t>& start, Progress& progress) {
     std::set<std::vector<std::size_t>> seen;
     const std::size_t width = level < beam_levels ? beam.size() : 1;
     for (std::size_t s = 0; s < width; ++s) {
-      const std::vector<Scored> scored = score_all(beam[s], s == 0);
-      std::set<std::pair<std::string, std::size_t>> tried;
-      for (const Scored& one : scored) {
-        const Group& group = problem_.groups()[one.group];
-        if (tried.size() >= most_refined || one.score < options().refine_from * threshold(one.group)) break;
-        if (!tried.insert({group.candidate.effect, group.on_body ? 0 : group.candidate.joint}).second) continue;
+      for (const Scored& one : worth_trying(score_all(beam[s], s == 0))) {
+        if (one.score < options().refine_from * threshold(one.group)) continue;
         const double needed = threshold(one.group);
         std::vector<std::size_t> groups = beam[s].groups;
         groups.push_back(refine(beam[s], one.group));
@@ -322,9 +318,9 @@ Choice Search::run(const std::vector<std::size_t>& start, Progress& progress) {
     beam = std::move(next);
     best = beam.front();
   }
-  // Early choices stand in for others: swap and drop, the last round drops only.
+  // Early choices stand in for others: swap, trade and drop, the last round drops only.
   for (int round = 0; round < swap_rounds; ++round) {
-    bool changed = false;
+    bool changed = round < swap_rounds - 1 && trade(best);
     for (std::size_t i = 0; i < best.groups.size(); ++i) {
       std::vector<std::size_t> others = best.groups;
       others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
@@ -335,13 +331,8 @@ Choice Search::run(const std::vector<std::size_t>& start, Progress& progress) {
         break;
       }
       if (round == swap_rounds - 1) continue;
-      std::size_t tried = 0;
-      std::set<std::pair<std::string, std::size_t>> names;
-      for (const Scored& one : score_all(without, false)) {
-        const Group& group = problem_.groups()[one.group];
-        if (tried >= most_refined || one.score < best.score - without.score - options().swap_behind) break;
-        if (!names.insert({group.candidate.effect, group.on_body ? 0 : group.candidate.joint}).second) continue;
-        ++tried;
+      for (const Scored& one : worth_trying(score_all(without, false))) {
+        if (one.score < best.score - without.score - options().swap_behind) continue;
         std::vector<std::size_t> groups = others;
         groups.push_back(refine(without, one.group));
         Choice choice = evaluate(groups);
@@ -355,8 +346,70 @@ Choice Search::run(const std::vector<std::size_t>& start, Progress& progress) {
   return best;
 }
 
+/// The choice with what is not needed beside `kept` left out, least needed first.
+Choice Search::pruned(Choice choice, std::size_t kept) const {
+  while (choice.groups.size() > 1) {
+    std::optional<Choice> best;
+    for (const std::size_t g : choice.groups) {
+      if (g == kept) continue;
+      std::vector<std::size_t> others = choice.groups;
+      std::erase(others, g);
+      Choice without = evaluate(others);
+      const bool needed = choice.possible && choice.score - without.score >= threshold(g);
+      if (!needed && without.possible && (!best || without.score > best->score)) best = std::move(without);
+    }
+    if (!best) break;
+    choice = std::move(*best);
+  }
+  return choice;
+}
+
+bool Search::trade(Choice& best) {
+  if (best.groups.size() < 2) return false;
+  std::set<std::string> tried;
+  for (const Scored& one : score_all(best, false)) {
+    const Group& group = problem_.groups()[one.group];
+    if (!group.on_body || !tried.insert(group.candidate.effect).second) continue;
+    std::vector<std::size_t> groups = best.groups;
+    const std::size_t added = refine(best, one.group);
+    groups.push_back(added);
+    Choice choice = pruned(evaluate(groups), added);
+    const bool shorter = choice.groups.size() <= best.groups.size();
+    if (!choice.possible || !shorter || choice.score <= best.score + options().swap_gain) continue;
+    best = std::move(choice);
+    return true;
+  }
+  return false;
+}
+
+/// The best of each effect at each joint, so many of them; and the best of each effect on the robot: its first score is
+/// of a linear likelihood, where those of joints count how much of the joint's whole gap they close.
+std::vector<Search::Scored> Search::worth_trying(const std::vector<Scored>& scored) const {
+  std::vector<Scored> out;
+  std::set<std::pair<std::string, std::size_t>> seen;
+  std::size_t of_joints = 0;
+  for (const Scored& one : scored) {
+    const Group& group = problem_.groups()[one.group];
+    if (!group.on_body && of_joints == most_refined) continue;
+    if (!seen.insert({group.candidate.effect, group.on_body ? 0 : group.candidate.joint}).second) continue;
+    if (!group.on_body) ++of_joints;
+    out.push_back(one);
+  }
+  return out;
+}
+
+double Search::held_out(const Choice& choice, const VectorXd& weights) const {
+  const BlockSolver& solver = problem_.solver();
+  double sum = 0;
+  for (const Fold& fold : problem_.blocks().folds)
+    sum += solver.square(solver.solve(choice.fit.columns, fold.fit), fold.judge).dot(weights);
+  return sum;
+}
+
 std::vector<Found> Search::explain(const Choice& choice) {
   std::vector<Found> out;
+  const VectorXd weights = weights_of(choice.fit);
+  const double own = held_out(choice, weights);
   for (std::size_t i = 0; i < choice.groups.size(); ++i) {
     Found found;
     found.group = choice.groups[i];
@@ -365,20 +418,21 @@ std::vector<Found> Search::explain(const Choice& choice) {
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
     const Choice without = evaluate(others);
     found.score = choice.score - without.score;
-    std::set<std::pair<std::string, std::size_t>> names;
-    names.insert({mine.candidate.effect, mine.on_body ? 0 : mine.candidate.joint});
-    std::size_t tried = 0;
-    const double behind = std::max(options().alternative_behind, options().alternative_behind_share * found.score);
-    for (const Scored& one : score_all(without, false)) {
+    for (const Scored& one : worth_trying(score_all(without, false))) {
+      if (one.score <= 0) break;
       const Group group = problem_.groups()[one.group];
-      if (tried >= most_refined || one.score < found.score - behind) break;
-      if (!names.insert({group.candidate.effect, group.on_body ? 0 : group.candidate.joint}).second) continue;
-      ++tried;
+      if (group.candidate.effect == mine.candidate.effect && group.on_body == mine.on_body &&
+          (mine.on_body || group.candidate.joint == mine.candidate.joint))
+        continue;
       std::vector<std::size_t> groups = others;
       groups.push_back(refine(without, one.group));
       const Choice instead = evaluate(groups);
       if (instead.possible && instead.score > choice.score - options().alternative)
         found.alternatives.push_back({problem_.groups()[groups.back()].candidate, choice.score - instead.score});
+      if (!instead.possible) continue;
+      const double gain = held_out(instead, weights) - own;
+      if (!found.rival || gain < found.rival->gain)
+        found.rival = Rival{problem_.groups()[groups.back()].candidate, gain};
     }
     std::sort(found.alternatives.begin(), found.alternatives.end(),
               [](const Alternative& a, const Alternative& b) { return a.behind < b.behind; });

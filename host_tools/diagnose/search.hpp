@@ -30,11 +30,18 @@ struct Alternative {
   double behind = 0;  ///< score of the set with it in place of the chosen one, less
 };
 
+/// The effect that comes nearest to a chosen one.
+struct Rival {
+  EffectCandidate candidate;
+  double gain = 0;  ///< what the set with the chosen one is better by on data that fitted neither [noise variances]
+};
+
 /// One effect of the outcome.
 struct Found {
   std::size_t group = 0;
   double score = 0;  ///< what the set loses without it
   std::vector<Alternative> alternatives;
+  std::optional<Rival> rival{};  ///< none: nothing else explains any of it
 };
 
 struct SearchSettings {
@@ -55,6 +62,8 @@ class Search {
   Choice unite(Choice best);
   std::vector<Found> explain(const Choice& choice);
   Choice evaluate(const std::vector<std::size_t>& groups) const;
+  /// Squares that a choice leaves on the folds' judges, in variances of what it leaves where it was fitted.
+  double held_out(const Choice& choice, const Eigen::VectorXd& weights) const;
   /// By group, at the start of run(): share of its columns that the nuisance and the named effects do not absorb (the
   /// largest over their directions), squared.
   const std::vector<double>& not_absorbed() const { return kept_; }
@@ -80,6 +89,11 @@ class Search {
   void estimate_thresholds(const Choice& state, const Candidates& candidates);
   Eigen::VectorXd scores_of_noise(std::size_t joint, const Choice& state, const Candidates& candidates) const;
   std::vector<Scored> score_all(const Choice& state, bool with_thresholds);
+  std::vector<Scored> worth_trying(const std::vector<Scored>& scored) const;
+  /// One effect on the robot for several of others: it is added whatever it brings beside them, and what is not needed
+  /// any more goes. Swaps, one for one, don't get from two gains of joints to one load.
+  bool trade(Choice& best);
+  Choice pruned(Choice choice, std::size_t kept) const;
   std::size_t refine(const Choice& state, std::size_t group);
   std::optional<Choice> united(const Choice& choice, const EffectInfo& info, std::size_t joint);
   bool is_better_held_out(const std::vector<std::size_t>& groups, const std::vector<std::size_t>& than,

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "host_tools/diagnose/dictionary.hpp"
+#include "host_tools/diagnose/models.hpp"
 #include "host_tools/diagnose/refine.hpp"
 #include "host_tools/diagnose/search.hpp"
 
@@ -89,6 +90,12 @@ bool Search::is_better_held_out(const std::vector<std::size_t>& groups, const st
 Choice Search::unite(Choice best) {
   for (const EffectInfo& info : effect_infos()) {
     for (std::size_t j = 0; info.unites_others() && j < problem_.joints(); ++j) {
+      // What the healthy session has already of that law is no finding, nor is it to be found twice.
+      const std::vector<EffectFit>& known = problem_.models().current.joints[j].effects;
+      if (std::any_of(known.begin(), known.end(), [&](const EffectFit& fit) {
+            return !fit.named && (fit.effect == info.name || is_united(info, fit.effect));
+          }))
+        continue;
       std::optional<Choice> tried = united(best, info, j);
       // As any effect it has to bring more than noise does: it holds its parts as special cases.
       if (!tried || tried->score <= best.score + threshold(tried->groups.back())) continue;

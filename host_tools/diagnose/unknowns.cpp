@@ -75,6 +75,10 @@ class Builder {
       Unknown u;
       u.index = k;
       u.value = now_.base[k].value;
+      if (models_.base_held) {
+        u.prior = u.value;
+        u.prior_std = models_.options.prior.held * std::fabs(u.value) + 1e-9;
+      }
       out_.all.push_back(u);
     }
   }

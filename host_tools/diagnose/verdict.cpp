@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "host_tools/diagnose/where.hpp"
 #include "host_tools/effects/effects.hpp"
@@ -197,7 +198,23 @@ class ReportWriter {
     out.parameters = parameters_of(fit, joint_of(id.joint), conclusion_.model.joints[id.joint].rated_torque);
     out.score = known ? found->score : 0.0;
     out.held_out_closure = closed;
+    add_odds(out, id, known && found->rival ? &*found->rival : nullptr);
     return out;
+  }
+
+  /// What speaks for an effect on the data that judged. @param rival null: nothing else comes near
+  void add_odds(NamedEffect& effect, const EffectId& id, const Rival* rival) const {
+    constexpr double variances = 2 * std::numbers::ln10;  // of chi^2, a factor of ten in likelihood
+    const Gate& gate = conclusion_.gate;
+    const std::size_t i = gate.place(problem_, id);
+    if (i == gate.groups.size()) return;
+    effect.odds_nothing = (id.body ? gate.held.alone[i].sum() : gate.own[i].gain) / variances;
+    if (rival != nullptr) {
+      effect.rival = rival->candidate.effect;
+      effect.odds_rival = rival->gain / variances;
+    }
+    const double least = problem_.models().options.gate.established;
+    effect.established = *effect.odds_nothing >= least && (rival == nullptr || *effect.odds_rival >= least);
   }
 
   JointDiagnosis still(std::size_t j) {
@@ -440,8 +457,8 @@ class ReportWriter {
 
 std::string gate_of(const std::vector<ProcessedLog>& now) {
   if (std::any_of(now.begin(), now.end(), is_validate)) return "validate logs";
-  return now.size() == 1 ? "blocks of the train log, each judged by coefficients fitted to the others"
-                         : "train logs, each judged by coefficients fitted to the others";
+  return fmt::format("blocks of the train log{}, each judged by coefficients fitted to the others",
+                     now.size() == 1 ? "" : "s");
 }
 
 DiagnosisResult verdicts(const Conclusion& conclusion) { return ReportWriter(conclusion).all(); }

@@ -22,14 +22,23 @@ class SearchOfEffects : public testing::Test {
   Choice run(std::size_t joint, const std::vector<EffectFit>& more, const std::vector<EffectCandidate>& candidates) {
     IdentifiedModel robot = model_;
     for (const EffectFit& fit : more) robot.joints[joint].effects.push_back(fit);
+    return run(robot, candidates);
+  }
+  Choice run(const IdentifiedModel& robot, const std::vector<EffectCandidate>& candidates) {
     logs_ = {test::small_session_log(robot, Role::train, 1), test::small_session_log(robot, Role::train, 2)};
     Models models = test::around(model_);
     models.options = options_;
+    if (baseline_) {
+      logs_.push_back(test::small_session_log(model_, Role::baseline, 3));
+      models.healthy = model_;
+      models.has_baseline = true;
+    }
     problem_ = std::make_unique<Linearised>(models, logs_, test::no_whitening());
     std::vector<Group> groups;
     for (const EffectCandidate& candidate : candidates) {
       Group group;
       group.candidate = candidate;
+      group.on_body = find_effect(candidate.effect)->acts_on == ActsOn::body;
       group.nonlinear = 1;
       for (const ParameterInfo& p : find_effect(candidate.effect)->linear) group.lower.push_back(p.lower);
       groups.push_back(group);
@@ -56,6 +65,7 @@ class SearchOfEffects : public testing::Test {
 
   IdentifiedModel model_;
   Options options_;
+  bool baseline_ = false;
   std::vector<SessionLog> logs_;
   std::unique_ptr<Linearised> problem_;
   std::vector<Found> found_;
@@ -118,6 +128,20 @@ TEST_F(SearchOfEffects, OneOfTheUnitedStaysWhereTheOtherDoesNotShow) {
   const Choice choice = run(1, {test::effect("stribeck", {0.2}, {1.5})}, stribeck_grid);
   ASSERT_EQ(choice.groups.size(), 1U) << names(choice);
   EXPECT_EQ(candidate(choice, 0).effect, "stribeck");
+}
+
+// Gains of the joints that feel a load do some of its work, and each scores as an effect of its joint alone does.
+TEST_F(SearchOfEffects, GivesOneLoadForSeveralGains) {
+  IdentifiedModel robot = model_;
+  robot.body.push_back(test::effect("payload", {}, {1, 0.02, -0.01, 0.03}));
+  std::vector<EffectCandidate> candidates{{"payload", 0, {}}};
+  for (std::size_t joint = 0; joint < 6; ++joint) {
+    for (const char* effect : {"torque_gain", "gravity_compensator", "spring", "load_friction"})
+      candidates.push_back({effect, joint, {}});
+  }
+  baseline_ = true;
+  const Choice choice = run(robot, candidates);
+  EXPECT_EQ(names(choice), "payload  at joint 1; ");
 }
 
 TEST_F(SearchOfEffects, NeedsLongerSetsToBringMore) {

@@ -1,0 +1,223 @@
+#include "host_tools/diagnose/own_evidence.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host_tools/diagnose/features.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/joint_fit.hpp"
+#include "host_tools/regression/solver.hpp"
+#include "host_tools/support/parallel.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Functions of one joint in families, on today's rows in which it moves for sure.
+class Curves {
+ public:
+  Curves(const Linearised& problem, std::size_t joint, const MatrixXd& features)
+      : joints_(problem.joints()), families_(families(problem.joints())) {
+    // The own position's are finer here: a curve has to follow what several effects in a row would.
+    const std::size_t own = place_of_own_position(problem.joints());
+    const MatrixXd fine = position_waves(problem, joint, fine_waves);
+    all_.resize(features.rows(), features.cols() + fine.cols());
+    all_ << features, fine;
+    families_[own] = {features.cols(), fine.cols()};
+    for (Index row = 0; row < all_.rows(); ++row) {
+      if (problem.noise().is_doubtful(joint, row)) all_.row(row).setZero();
+    }
+    for (const Block& block : problem.blocks().all) {
+      if (block.healthy) all_.middleRows(block.first, block.count).setZero();
+    }
+    // Of size one each, as their prior is.
+    const VectorXd size = (all_.colwise().norm() / std::sqrt(static_cast<double>(all_.rows()))).transpose();
+    all_ = all_ * size.unaryExpr([](double s) { return s > 1e-9 ? 1 / s : 0.0; }).asDiagonal();
+    if (const Background* background = problem.background(joint)) all_ = background->eliminate(all_);
+  }
+
+  std::size_t count() const { return families_.size(); }
+  /// Columns of some families side by side: rows, below them those that the joint's background adds.
+  MatrixXd of(const std::vector<std::size_t>& chosen) const {
+    Index cols = 0;
+    for (const std::size_t f : chosen) cols += families_[f].count;
+    MatrixXd out(all_.rows(), cols);
+    cols = 0;
+    for (const std::size_t f : chosen) {
+      out.middleCols(cols, families_[f].count) = all_.middleCols(families_[f].first, families_[f].count);
+      cols += families_[f].count;
+    }
+    return out;
+  }
+  /// The family of an effect's own variable.
+  std::size_t of_variable(const EffectCandidate& effect) const {
+    const EffectInfo& info = *find_effect(effect.effect);
+    const std::size_t position = place_of_own_position(joints_);
+    if (info.needs_peers) return joints_ > 1 ? position - 1 : 0;
+    if (drifts(effect.effect)) return count() - 1;
+    return turns_with_position(effect, info) ? position : position + 1;
+  }
+
+ private:
+  static constexpr Index fine_waves = 24;
+  /// After each other joint's position and their velocities.
+  static std::size_t place_of_own_position(std::size_t joints) { return joints > 1 ? joints : 0; }
+  /// Whether its torque at rest is another in another position.
+  static bool turns_with_position(const EffectCandidate& effect, const EffectInfo& info) {
+    if (info.acts_on != ActsOn::torque || info.needs_structural || info.needs_total) return false;
+    const VectorXd zero = VectorXd::Zero(16);
+    const JointSeries series{VectorXd::LinSpaced(16, -1, 1), zero, zero, {}, 1e-3};
+    const MatrixXd phi = effect_columns(effect.effect, effect.shape, 1, series);
+    return (phi.rowwise() - phi.row(0)).cwiseAbs().maxCoeff() > 1e-9;
+  }
+
+  std::size_t joints_;
+  std::vector<Family> families_;
+  MatrixXd all_;
+};
+
+/// Squared residual of one joint on a fold's judge, columns of the problem and curves of the joint fitted to the rest.
+double judged(const Linearised& problem, std::size_t joint, const std::vector<Index>& columns, const MatrixXd& curves,
+              double prior, const Fold& fold) {
+  const BlockSolver& solver = problem.solver();
+  const JointRows& rows = solver.rows(joint);
+  const double w = solver.weights()[static_cast<Index>(joint)];
+  MatrixXd gram;
+  VectorXd projection;
+  solver.normal(columns, fold.fit, gram, projection);
+  const Index p = gram.rows(), c = curves.cols();
+  MatrixXd whole = MatrixXd::Zero(p + c, p + c);
+  VectorXd right(p + c);
+  whole.topLeftCorner(p, p) = gram;
+  right.head(p) = projection;
+  right.tail(c).setZero();
+  if (c > 0) {
+    for (const std::size_t b : fold.fit) {
+      const Block& block = problem.blocks().all[b];
+      if (block.healthy) continue;
+      const auto f = curves.middleRows(block.first, block.count);
+      whole.bottomRightCorner(c, c).noalias() += w * f.transpose() * f;
+      right.tail(c).noalias() += w * f.transpose() * rows.y.segment(block.first, block.count);
+      for (Index i = 0; i < p; ++i) {
+        const Index local = rows.place(columns[static_cast<std::size_t>(i)]);
+        if (local < 0) continue;
+        const VectorXd product = w * f.transpose() * rows.x.col(local).segment(block.first, block.count);
+        whole.block(p, i, c, 1) += product;
+        whole.block(i, p, 1, c) += product.transpose();
+      }
+    }
+    const auto f = curves.bottomRows(curves.rows() - rows.y.size());
+    if (f.rows() > 0) {
+      whole.bottomRightCorner(c, c).noalias() += w * f.transpose() * f;
+      right.tail(c).noalias() += w * f.transpose() * rows.extra_y;
+      for (Index i = 0; i < p; ++i) {
+        const Index local = rows.place(columns[static_cast<std::size_t>(i)]);
+        if (local < 0) continue;
+        const VectorXd product = w * f.transpose() * rows.extra_x.col(local);
+        whole.block(p, i, c, 1) += product;
+        whole.block(i, p, 1, c) += product.transpose();
+      }
+    }
+    whole.bottomRightCorner(c, c).diagonal().array() += prior;
+  }
+  const VectorXd x = SymmetricSolver(whole).solve(right);
+  double sum = 0;
+  for (const std::size_t b : fold.judge) {
+    const Block& block = problem.blocks().all[b];
+    if (block.healthy) continue;
+    VectorXd e = rows.y.segment(block.first, block.count) - curves.middleRows(block.first, block.count) * x.tail(c);
+    for (Index i = 0; i < p; ++i) {
+      const Index local = rows.place(columns[static_cast<std::size_t>(i)]);
+      if (local >= 0) e -= x[i] * rows.x.col(local).segment(block.first, block.count);
+    }
+    sum += w * e.squaredNorm();
+  }
+  return sum;
+}
+
+/// One joint's groups.
+class AtJoint {
+ public:
+  AtJoint(const Linearised& problem, std::size_t joint, const std::vector<std::size_t>& groups,
+          const std::vector<std::size_t>& own, const MatrixXd& features)
+      : problem_(problem), joint_(joint), groups_(groups), curves_(problem, joint, features) {
+    // The curves' size: that of what is there without the joint's effects.
+    prior_ = 1 / std::max(1.0, judged(without(own), {}) / rows());
+    for (const std::size_t g : own) variable_.push_back(curves_.of_variable(problem.groups()[g].candidate));
+    for (std::size_t i = 0; i < own.size(); ++i) evidence_.push_back(of(own, i));
+  }
+  const std::vector<OwnEvidence>& evidence() const { return evidence_; }
+
+ private:
+  std::vector<std::size_t> without(const std::vector<std::size_t>& gone) const {
+    std::vector<std::size_t> left;
+    for (const std::size_t g : groups_) {
+      if (std::find(gone.begin(), gone.end(), g) == gone.end()) left.push_back(g);
+    }
+    return left;
+  }
+  double rows() const {
+    double sum = 0;
+    for (const Fold& fold : problem_.blocks().folds)
+      sum += problem_.solver().row_count(fold.judge)[static_cast<Index>(joint_)];
+    return std::max(sum, 1.0);
+  }
+  double judged(const std::vector<std::size_t>& groups, const std::vector<std::size_t>& families) const {
+    const MatrixXd curves = curves_.of(families);
+    double sum = 0;
+    for (const Fold& fold : problem_.blocks().folds)
+      sum += diagnosis::judged(problem_, joint_, problem_.columns_of(groups), curves, prior_, fold);
+    return sum;
+  }
+  OwnEvidence of(const std::vector<std::size_t>& own, std::size_t i) const {
+    OwnEvidence out;
+    std::vector<std::size_t> others, alike;
+    // Those of time, the last, say nothing of other times.
+    for (std::size_t f = 0; f + 1 < curves_.count(); ++f) {
+      if (f != variable_[i]) others.push_back(f);
+    }
+    for (std::size_t k = 0; k < own.size(); ++k) {
+      if (variable_[k] == variable_[i]) alike.push_back(own[k]);
+    }
+    out.gain = rows() * std::log(judged(without({own[i]}), others) / std::max(judged(groups_, others), 1e-300));
+    const std::vector<std::size_t> rest = without(alike);
+    const double nothing = judged(rest, {}), named = judged(groups_, {}), curve = judged(rest, {variable_[i]});
+    out.alike = alike.size();
+    out.of_time = variable_[i] + 1 == curves_.count();
+    out.form = nothing > curve ? std::max(0.0, nothing - named) / (nothing - curve) : 1.0;
+    return out;
+  }
+
+  const Linearised& problem_;
+  std::size_t joint_;
+  const std::vector<std::size_t>& groups_;
+  Curves curves_;
+  double prior_ = 1;
+  std::vector<std::size_t> variable_;  ///< by own group: a family
+  std::vector<OwnEvidence> evidence_;
+};
+
+}  // namespace
+
+std::vector<OwnEvidence> own_evidence(const Linearised& problem, const std::vector<std::size_t>& groups,
+                                      const std::vector<MatrixXd>& features) {
+  std::vector<OwnEvidence> out(groups.size());
+  parallel_for(problem.joints(), [&](std::size_t j) {
+    std::vector<std::size_t> own, place;
+    for (std::size_t i = 0; i < groups.size(); ++i) {
+      const Group& group = problem.groups()[groups[i]];
+      if (group.on_body || group.candidate.joint != j) continue;
+      own.push_back(groups[i]);
+      place.push_back(i);
+    }
+    if (own.empty()) return;
+    const AtJoint at(problem, j, groups, own, features[j]);
+    for (std::size_t k = 0; k < own.size(); ++k) out[place[k]] = at.evidence()[k];
+  });
+  return out;
+}
+
+}  // namespace fxdyn::diagnosis

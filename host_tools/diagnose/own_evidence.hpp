@@ -1,0 +1,30 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <vector>
+
+#include "host_tools/diagnose/linearised.hpp"
+
+namespace fxdyn::diagnosis {
+
+/// What speaks for one effect at its joint on data that fitted none of it, whatever else is missing there.
+struct OwnEvidence {
+  /// What it brings beside free curves of all variables but its own: rows times ln of the ratio of squares without and
+  /// with it, which is chi^2 where it is small. What is missing in another variable does not speak for it.
+  double gain = 0;
+  /// Of what a free curve of its own variable closes in its place, the share that it closes, together with the others
+  /// of that variable: the form holds.
+  double form = 1;
+  std::size_t alike = 1;  ///< effects of that variable at the joint
+  bool of_time = false;   ///< its variable is time, whose curve says nothing of other times
+};
+
+/// An effect's own variable is another joint's velocity, time, the own position, or else the own motion and load; its
+/// curve is the family of features() of that name. Coefficients of the functions have a normal prior of the size of the
+/// residual.
+/// @param groups of the problem, named in its model; those on the body get no answer
+/// @param features by joint, of the same problem
+std::vector<OwnEvidence> own_evidence(const Linearised& problem, const std::vector<std::size_t>& groups,
+                                      const std::vector<Eigen::MatrixXd>& features);
+
+}  // namespace fxdyn::diagnosis

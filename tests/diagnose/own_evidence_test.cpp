@@ -1,0 +1,88 @@
+// What speaks for a name whatever else is missing at its joint, and against several for one thing.
+
+#include "host_tools/diagnose/own_evidence.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "host_tools/diagnose/features.hpp"
+#include "tests/diagnose/small_problem.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::ArrayXd;
+using Eigen::MatrixXd;
+
+/// A torque of the second joint, of its own position and of the fourth's [rad].
+using Torque = std::function<ArrayXd(const ArrayXd& own, const ArrayXd& other)>;
+
+/// A PUMA 560 with that torque at its second joint, and a model with effects there instead.
+std::vector<OwnEvidence> evidence(const Torque& torque, const std::vector<EffectFit>& effects) {
+  const IdentifiedModel nominal = test::fitted_puma();
+  std::vector<SessionLog> logs;
+  for (const auto& [role, seed] : {std::pair{Role::train, 1}, std::pair{Role::validate, 2}}) {
+    logs.push_back(test::small_session_log(nominal, role, static_cast<std::uint64_t>(seed)));
+    const MatrixXd& q = logs.back().log.q;
+    logs.back().log.tau.col(1).array() += torque(q.col(1).array(), q.col(3).array());
+  }
+  Models models = test::around(nominal);
+  for (const EffectFit& fit : effects) models.current.joints[1].effects.push_back(fit);
+  const Linearised problem(models, logs, test::no_whitening());
+  std::vector<MatrixXd> functions(problem.joints());
+  for (std::size_t j = 0; j < functions.size(); ++j) functions[j] = features(problem, j);
+  return own_evidence(problem, in_model(problem), functions);
+}
+
+ArrayXd nothing(const ArrayXd& q) { return ArrayXd::Zero(q.size()); }
+ArrayXd wave(const ArrayXd& q) { return (3 * q).sin(); }
+
+TEST(EvidenceOfItsOwn, SpeaksForARippleThatIsThere) {
+  const auto own = evidence([](const ArrayXd& q, const ArrayXd&) -> ArrayXd { return 0.4 * (14 * q).cos(); },
+                            {test::named_effect("ripple", {14}, {0.4, 0})});
+  ASSERT_EQ(own.size(), 1U);
+  EXPECT_GT(own[0].gain, 100);
+  EXPECT_GT(own[0].form, 0.9);
+  EXPECT_EQ(own[0].alike, 1U);
+}
+
+TEST(EvidenceOfItsOwn, DoesNotSpeakForOneThatIsNot) {
+  const auto own = evidence([](const ArrayXd& q, const ArrayXd&) -> ArrayXd { return nothing(q); },
+                            {test::named_effect("ripple", {14}, {0.1, 0})});
+  EXPECT_LT(own[0].gain, 16);
+}
+
+// Another joint's position moves this one's torque ten times as much as the ripple does, and no effect says so.
+TEST(EvidenceOfItsOwn, SpeaksForANameBesideSomethingLargeOfAnotherVariable) {
+  const auto own =
+      evidence([](const ArrayXd& q, const ArrayXd& other) -> ArrayXd { return 0.3 * (14 * q).cos() + 3 * wave(other); },
+               {test::named_effect("ripple", {14}, {0.3, 0})});
+  EXPECT_GT(own[0].gain, 16);
+  EXPECT_GT(own[0].form, 0.8);
+}
+
+TEST(EvidenceOfItsOwn, DoesNotSpeakForANameThatOnlyResemblesWhatIsMissing) {
+  const auto own = evidence([](const ArrayXd&, const ArrayXd& other) -> ArrayXd { return 3 * wave(other); },
+                            {test::named_effect("viscous_cubic", {}, {0.05})});
+  EXPECT_LT(own[0].gain, 16);
+}
+
+// A bump over a tenth of the range: three ripples close a part of it, a free curve of the position all.
+TEST(EvidenceOfItsOwn, SeveralNamesForOneBumpAreWorseThanACurve) {
+  const auto bump = [](const ArrayXd& q, const ArrayXd&) -> ArrayXd {
+    return 2 * (-((q - 0.2) / 0.08).square()).exp();
+  };
+  const auto own =
+      evidence(bump, {test::named_effect("ripple", {2}, {0.3, 0.1}), test::named_effect("ripple", {4}, {0.3, 0.1}),
+                      test::named_effect("ripple", {6}, {0.3, 0.1})});
+  ASSERT_EQ(own.size(), 3U);
+  for (const OwnEvidence& one : own) {
+    EXPECT_EQ(one.alike, 3U);
+    EXPECT_LT(one.form, 0.8);
+    EXPECT_GT(one.gain, 16);  // each brings something: that alone is no proof of a name
+  }
+}
+
+}  // namespace
+}  // namespace fxdyn::diagnosis
