@@ -10,6 +10,7 @@
 #include "host_tools/signals/log.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/support/files.hpp"
+#include "tests/campaign/healthy_friction.hpp"
 #include "tests/campaign/truth.hpp"
 
 namespace fxdyn::campaign {
@@ -20,7 +21,9 @@ using Eigen::Index;
 using nlohmann::json;
 
 const fs::path source_dir = FXDYN_SOURCE_DIR;
-double role_duration_s(const Case& wanted) { return 4 * wanted.recording.log_s; }
+double role_duration_s(const Case& wanted) {
+  return static_cast<double>(wanted.recording.logs) * wanted.recording.log_s;
+}
 
 /// Seeds of the trajectories: no two roles and no two cases share one.
 std::uint64_t motion_seed(const Case& wanted, std::uint64_t role) { return (wanted.seed * 10 + role) * 10; }
@@ -31,8 +34,10 @@ std::vector<SessionLog> measured_logs(const Case& wanted) {
   double start = 0;
   std::uint64_t role = 1;
   for (const char* name : {"train", "validate", "test"}) {
-    for (const SessionLog& log : recording(name, motion_seed(wanted, role), start, wanted.recording.log_s))
-      logs.push_back(log);
+    const bool used = wanted.validate || std::string_view(name) != "validate";
+    for (const SessionLog& log : recording(name, motion_seed(wanted, role), start, wanted.recording)) {
+      if (used) logs.push_back(log);
+    }
     start += role_duration_s(wanted);
     ++role;
   }
@@ -127,31 +132,85 @@ json effect_json(std::optional<std::size_t> joint, const EffectFit& fit) {
   return out;
 }
 
-/// Adds what the simulator has no name for to the torques of a log, and takes the exact motion out of the file again.
-void add_outside(const std::vector<Outside>& outside, const fs::path& file, const Robot& robot, double clock_s) {
+/// Whether its logs are more than the simulator writes.
+bool is_finished_here(const Case& wanted) {
+  return wanted.friction != Friction::catalogue || wanted.recording.lost > 0 || wanted.recording.torque_step > 0;
+}
+
+/// What the joints' friction adds to the catalogue's, samples x joints.
+Eigen::MatrixXd friction_of(const Case& wanted, const Session& session, const Log& log, const Plan& plan) {
+  const Robot& robot = plan.healthy.robot;
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(log.samples(), static_cast<Index>(robot.size()));
+  for (std::size_t j = 0; wanted.friction != Friction::catalogue && j < robot.size(); ++j) {
+    const auto k = static_cast<Index>(j);
+    const DryFriction friction =
+        draw_friction(wanted.friction, session.coulomb[j], session.width[j], plan.largest_velocity[k],
+                      session.rotor_inertia[j], robot.joints[j].type == JointType::revolute, wanted.seed * 16 + j);
+    out.col(k) = added_friction(friction, log.t, log.dq.col(k));
+  }
+  return out;
+}
+
+/// .. to a noise-free log's truth.
+void add_to_truth(const Case& wanted, const Session& session, const fs::path& file, const Plan& plan) {
+  const Robot& robot = plan.healthy.robot;
+  const Log log = read_exact(file, robot);
+  fs::path truth_file = file;
+  truth_file.replace_extension(".truth.csv");
+  Log truth;
+  truth.t = log.t;
+  truth.tau = read_truth(truth_file, robot.size()) + friction_of(wanted, session, log, plan);
+  write_log(truth_file, truth);
+}
+
+/// Rows of a log that a recorder kept.
+void lose_rows(Log& log, double share, Random& random) {
+  std::vector<Index> kept;
+  for (Index k = 0; k < log.samples(); ++k) {
+    if (k == 0 || random.uniform() >= share) kept.push_back(k);
+  }
+  log.t = log.t(kept).eval();
+  for (Eigen::MatrixXd* columns : {&log.q, &log.tau, &log.qlink}) {
+    if (columns->size() > 0) *columns = (*columns)(kept, Eigen::all).eval();
+  }
+}
+
+/// Adds what the simulator has no name for to the torques of a log, measures it as the case's recorder does and takes
+/// the exact motion out of the file again.
+void finish(const Case& wanted, const Session& session, const std::vector<Outside>& outside, const fs::path& file,
+            const Plan& plan) {
+  const Robot& robot = plan.healthy.robot;
   Log log = read_exact(file, robot);
   fs::path truth_file = file;
   truth_file.replace_extension(".truth.csv");
-  Motion motion{"", log.step_s, log.t.array() - clock_s, log.q, log.dq, log.ddq};
+  Motion motion{"", log.step_s, log.t.array() - wanted.clock_s, log.q, log.dq, log.ddq};
   Log truth;
   truth.t = log.t;
   truth.tau = read_truth(truth_file, robot.size());
-  for (const Outside& effect : outside) {
-    const Eigen::VectorXd torque = outside_torque(effect, motion);
-    log.tau.col(static_cast<Index>(effect.joint)) += torque;
-    truth.tau.col(static_cast<Index>(effect.joint)) += torque;
-  }
+  Eigen::MatrixXd added = friction_of(wanted, session, log, plan);
+  for (const Outside& effect : outside) added.col(static_cast<Index>(effect.joint)) += outside_torque(effect, motion);
+  log.tau += added;
+  truth.tau += added;
   log.dq.resize(0, 0);
   log.ddq.resize(0, 0);
+  const Recording& recorded = wanted.recording;
+  if (session.noise) {
+    for (std::size_t j = 0; recorded.torque_step > 0 && j < robot.size(); ++j) {
+      const double step = recorded.torque_step * session.robot->rated_torque[j];
+      auto column = log.tau.col(static_cast<Index>(j)).array();
+      column = (column / step).round() * step;
+    }
+    Random random(wanted.seed * 389 + std::hash<std::string>{}(file.stem().string()));
+    if (recorded.lost > 0) lose_rows(log, recorded.lost, random);
+  }
   write_log(file, log);
   write_log(truth_file, truth);
 }
 
 std::string project_toml(const Case& wanted, const std::vector<std::pair<std::string, std::string>>& logs) {
-  const TestRobot& robot = test_robots()[wanted.robot];
-  std::string text =
-      fmt::format("[robot]\nurdf = \"robot.urdf\"\ngravity = [0.0, 0.0, -9.81]\nrated_torque = [{:.6f}]\n",
-                  fmt::join(robot.rated_torque, ", "));
+  const TestRobot& robot = robot_of(wanted);
+  std::string text = fmt::format("[robot]\nurdf = \"robot.urdf\"\ngravity = [{:.6f}]\nrated_torque = [{:.6f}]\n",
+                                 fmt::join(robot.gravity, ", "), fmt::join(robot.rated_torque, ", "));
   for (const auto& [file, role] : logs) text += fmt::format("\n[[log]]\nfile = \"{}\"\nrole = \"{}\"\n", file, role);
   return text;
 }
@@ -199,7 +258,7 @@ json expected_json(const Expected& expected) {
 
 /// What the scorer compares with.
 json truth_json(const Case& wanted, const Ground& ground) {
-  const TestRobot& robot = test_robots()[wanted.robot];
+  const TestRobot& robot = robot_of(wanted);
   json out{{"name", wanted.name},
            {"group", to_string(wanted.group)},
            {"robot", robot.name},
@@ -210,13 +269,27 @@ json truth_json(const Case& wanted, const Ground& ground) {
            {"link_encoders", wanted.link_encoders},
            {"clock_s", wanted.clock_s},
            {"friction_change", wanted.friction_change},
+           {"friction", to_string(wanted.friction)},
+           {"validate", wanted.validate},
+           {"sample_s", wanted.recording.sample_s},
+           {"encoder_bits", wanted.recording.encoder_bits},
            {"effects", json::array()},
            {"background", json::array()},
            {"rated_torque", robot.rated_torque}};
   for (const auto& [joint, fit] : ground.background) out["background"].push_back(effect_json(joint, fit));
-  const NoiseLevel noise{.pole = healthy_session(wanted).ar_pole, .step_s = wanted.recording.sample_s};
+  // What every joint of such a robot has: with a baseline it is no change, without one a name for it is right.
+  const std::vector<std::string> dry = wanted.friction == Friction::catalogue ? std::vector<std::string>{}
+                                       : wanted.friction == Friction::smooth_sign
+                                           ? names_of_form("exponential_stribeck")
+                                           : std::vector<std::string>{"presliding", "stribeck", "lugre"};
+  for (std::size_t j = 0; !dry.empty() && j < ground.plan.joints(); ++j)
+    out["background"].push_back({{"effect", to_string(wanted.friction)}, {"joint", j + 1}, {"names", dry}});
+  const NoiseLevel noise{.white = wanted.recording.noise,
+                         .coloured = 0.3 * wanted.recording.noise,
+                         .pole = healthy_session(wanted).ar_pole,
+                         .step_s = wanted.recording.sample_s};
   const auto add = [&](json entry, const std::vector<Eigen::MatrixXd>& change, std::optional<std::size_t> joint,
-                       const std::string& name, const Wanted& asked) {
+                       const std::vector<std::string>& names, const Wanted& asked) {
     Index feels = 0;
     const Eigen::VectorXd shares = shares_of_rated(ground.plan, change);
     entry["share"] = shares.maxCoeff(&feels);
@@ -225,13 +298,13 @@ json truth_json(const Case& wanted, const Ground& ground) {
     if (asked.deflection > 0) entry["wanted_deflection"] = asked.deflection;
     entry["feels"] = feels + 1;
     const std::size_t where = joint ? *joint : static_cast<std::size_t>(feels);
-    entry["expected"] = expected_json(expect(ground.plan, change, {name}, where, wanted.baseline, noise));
+    entry["expected"] = expected_json(expect(ground.plan, change, names, where, wanted.baseline, noise));
     out["effects"].push_back(entry);
   };
   std::size_t at = 0;
   for (const auto& [joint, fit] : ground.effects) {
     add(effect_json(joint, fit), torque_change(ground.plan, with_effect(ground.plan.healthy, joint, fit)), joint,
-        fit.effect, wanted.effects[at]);
+        {fit.effect}, wanted.effects[at]);
     ++at;
   }
   for (const Outside& outside : ground.outside) {
@@ -240,8 +313,14 @@ json truth_json(const Case& wanted, const Ground& ground) {
       change.emplace_back(Eigen::MatrixXd::Zero(motion.q.rows(), motion.q.cols()));
       change.back().col(static_cast<Index>(outside.joint)) = outside_torque(outside, motion);
     }
-    add({{"effect", outside.effect}, {"joint", outside.joint + 1}, {"outside", true}, {"other", outside.other + 1}},
-        change, outside.joint, "", wanted.effects[at]);
+    json entry{{"effect", outside.effect}, {"joint", outside.joint + 1}, {"other", outside.other + 1}};
+    const std::vector<std::string> stands_for = names_of_form(outside.effect);
+    if (stands_for.empty()) {
+      entry["outside"] = true;
+    } else {
+      entry["names"] = stands_for;
+    }
+    add(entry, change, outside.joint, stands_for, wanted.effects[at]);
     ++at;
   }
   return out;
@@ -251,8 +330,11 @@ json truth_json(const Case& wanted, const Ground& ground) {
 
 Ground plan_case(const Case& wanted, const fs::path& folder) {
   fs::create_directories(folder);
-  fs::copy_file(source_dir / test_robots()[wanted.robot].urdf, folder / "robot.urdf",
-                fs::copy_options::overwrite_existing);
+  if (const TestRobot& robot = robot_of(wanted); !robot.urdf_text.empty()) {
+    write_file(folder / "robot.urdf", robot.urdf_text);
+  } else {
+    fs::copy_file(source_dir / robot.urdf, folder / "robot.urdf", fs::copy_options::overwrite_existing);
+  }
   Session session = healthy_session(wanted);
   session.noise = false;
   session.exact_motion = true;
@@ -265,7 +347,7 @@ Ground plan_case(const Case& wanted, const fs::path& folder) {
     bends |= info != nullptr && info->acts_on == ActsOn::position;
   }
   session.sample_s = bends ? 0.002 : 0.005;
-  session.logs = recording("train", motion_seed(wanted, 1), 0, wanted.recording.log_s);
+  session.logs = recording("train", motion_seed(wanted, 1), 0, wanted.recording);
   const auto files = play(session, folder / "plan.toml", folder / "plan");
   const IdentifiedModel healthy = read_model(folder / "plan" / "truth.json");
 
@@ -282,8 +364,7 @@ Ground plan_case(const Case& wanted, const fs::path& folder) {
   ground.measured = ground.plan.healthy;
   std::optional<std::size_t> first;
   for (const Wanted& one : wanted.effects) {
-    const auto& names = outside_effects();
-    if (std::find(names.begin(), names.end(), one.effect) != names.end()) {
+    if (is_outside(one.effect)) {
       const std::size_t joint = one.joint ? *one.joint : random.next() % ground.plan.joints();
       Outside outside = draw_outside(one.effect, joint, ground.plan, random.next());
       scale(outside, one.share, ground.plan);
@@ -311,15 +392,19 @@ void generate(const Case& wanted, const fs::path& data, const fs::path& truth) {
     Session session = healthy_session(wanted);
     session.effects = ground.background;
     session.seed = wanted.seed * 2;
-    session.logs = recording("baseline", motion_seed(wanted, 0), 0, wanted.recording.log_s);
-    for (const fs::path& file : play(session, truth / "baseline.toml", made))
+    session.logs = recording("baseline", motion_seed(wanted, 0), 0, wanted.recording);
+    session.exact_motion = is_finished_here(wanted);
+    for (const fs::path& file : play(session, truth / "baseline.toml", made)) {
+      if (is_finished_here(wanted)) finish(wanted, session, {}, file, ground.plan);
       logs.emplace_back(file.filename().string(), "baseline");
+    }
     part("baseline", made, data, truth);
   }
   Session session = measured_session(wanted, ground);
-  session.exact_motion = !ground.outside.empty();  // their torque needs it
+  const bool changed_after = is_finished_here(wanted) || !ground.outside.empty();
+  session.exact_motion = changed_after;
   for (const fs::path& file : play(session, truth / "measured.toml", made)) {
-    if (!ground.outside.empty()) add_outside(ground.outside, file, ground.plan.healthy.robot, wanted.clock_s);
+    if (changed_after) finish(wanted, session, ground.outside, file, ground.plan);
     const std::string name = file.filename().string();
     logs.emplace_back(name, name.substr(0, name.find('_')));
   }
@@ -329,8 +414,10 @@ void generate(const Case& wanted, const fs::path& data, const fs::path& truth) {
     session.noise = false;
     session.exact_motion = true;
     session.link_encoders = false;
-    session.logs = recording("test", motion_seed(wanted, 3), 2 * role_duration_s(wanted), wanted.recording.log_s);
-    play(session, truth / "exact.toml", truth / "exact");
+    session.logs = recording("test", motion_seed(wanted, 3), 2 * role_duration_s(wanted), wanted.recording);
+    for (const fs::path& file : play(session, truth / "exact.toml", truth / "exact")) {
+      if (wanted.friction != Friction::catalogue) add_to_truth(wanted, session, file, ground.plan);
+    }
   }
   fs::copy_file(truth / "robot.urdf", data / "robot.urdf");
   write_file(data / "project.toml", project_toml(wanted, logs));

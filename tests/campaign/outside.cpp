@@ -1,5 +1,6 @@
 #include "tests/campaign/outside.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -23,8 +24,31 @@ const std::vector<std::string>& outside_effects() {
       "jerk",                   // d(ddq)/dt
       "acceleration_squared",   // ddq |ddq|
       "wandering_friction",     // Coulomb friction that follows a random temperature
+      "end_stop",               // a soft stop before the end of the range
   };
   return names;
+}
+
+const std::vector<std::string>& other_forms() {
+  static const std::vector<std::string> names{"exponential_stribeck", "power_viscous", "hardening_spring",
+                                              "offset_compensator", "slip_elements"};
+  return names;
+}
+
+std::vector<std::string> names_of_form(const std::string& effect) {
+  if (effect == "exponential_stribeck" || effect == "power_viscous")
+    return {"stribeck", "viscous_quadratic", "viscous_cubic"};
+  if (effect == "hardening_spring" || effect == "offset_compensator")
+    return {"spring", "gravity_compensator", "ripple"};
+  if (effect == "slip_elements") return {"presliding", "lugre", "maxwell_slip"};
+  return {};
+}
+
+bool is_outside(const std::string& effect) {
+  const auto in = [&](const std::vector<std::string>& names) {
+    return std::find(names.begin(), names.end(), effect) != names.end();
+  };
+  return in(outside_effects()) || in(other_forms());
 }
 
 Outside draw_outside(const std::string& effect, std::size_t joint, const Plan& plan, std::uint64_t seed) {
@@ -70,6 +94,32 @@ VectorXd outside_torque(const Outside& o, const Motion& motion) {
     column = differentiate(motion.ddq.col(j), motion.step_s) / o.acceleration;
   } else if (o.effect == "acceleration_squared") {
     column = ddq * ddq.abs() / (o.acceleration * o.acceleration);
+  } else if (o.effect == "end_stop") {
+    const double range = o.high - o.low, begins = o.high - range * random.uniform(0.08, 0.2);
+    column = (q - begins).max(0.0) / range * 10;
+  } else if (o.effect == "exponential_stribeck") {
+    column = sign * (-dq.abs() / (o.velocity * random.uniform(0.02, 0.08))).exp();
+  } else if (o.effect == "power_viscous") {
+    const double power = random.uniform(1.4, 1.7);
+    column = sign * (dq.abs() / o.velocity).pow(power);
+  } else if (o.effect == "hardening_spring") {
+    const ArrayXd u = 2 * (q - o.low) / (o.high - o.low) - 1 + random.uniform(-0.3, 0.3);
+    column = u + random.uniform(0.3, 0.8) * u.cube();
+  } else if (o.effect == "offset_compensator") {
+    // A spring between two points: its lever and its length turn with the joint.
+    const double near = random.uniform(0.3, 0.6);
+    const ArrayXd angle = q + phase;
+    column = angle.sin() * near / (1 + near * near - 2 * near * angle.cos()).sqrt();
+  } else if (o.effect == "slip_elements") {
+    const double widest = (o.high - o.low) * random.uniform(1e-3, 4e-3);
+    column = ArrayXd::Zero(q.size());
+    for (const double share : {0.3, 0.7, 1.6}) {
+      double z = 0;
+      for (Index i = 0; i < q.size(); ++i) {
+        if (i > 0) z = std::clamp(z + q[i] - q[i - 1], -share * widest, share * widest);
+        column[i] += z / (share * widest) / 3 - sign[i] / 3;
+      }
+    }
   } else if (o.effect == "wandering_friction") {
     ArrayXd temperature = ArrayXd::Zero(motion.t.size());
     for (int i = 0; i < 5; ++i) {

@@ -10,6 +10,12 @@ namespace fxdyn::campaign {
 
 /// Torques that the catalogue has no name for.
 const std::vector<std::string>& outside_effects();
+/// Torques of another form than the catalogue's column, and the names under which each is right: those of its class.
+/// Empty for any other name.
+const std::vector<std::string>& other_forms();
+std::vector<std::string> names_of_form(const std::string& effect);
+/// Whether an effect is one of these, not one of the catalogue.
+bool is_outside(const std::string& effect);
 
 /// One of them with everything drawn that it needs.
 struct Outside {

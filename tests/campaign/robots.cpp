@@ -1,5 +1,7 @@
 #include "tests/campaign/case.hpp"
 
+#include <mutex>
+
 namespace fxdyn::campaign {
 
 const std::vector<TestRobot>& test_robots() {
@@ -66,8 +68,34 @@ std::string to_string(Group group) {
       return "dual_encoder";
     case Group::controlled:
       return "controlled";
+    case Group::drawn:
+      return "drawn";
   }
   return "";
+}
+
+std::string to_string(Friction friction) {
+  switch (friction) {
+    case Friction::catalogue:
+      return "catalogue";
+    case Friction::lugre:
+      return "lugre";
+    case Friction::maxwell:
+      return "maxwell";
+    case Friction::smooth_sign:
+      return "smooth_sign";
+  }
+  return "";
+}
+
+const TestRobot& robot_of(const Case& wanted) {
+  if (!wanted.drawn_robot) return test_robots()[wanted.robot];
+  static std::mutex mutex;
+  static std::map<std::uint64_t, TestRobot> drawn;  // references to a map's values stay
+  const std::lock_guard lock(mutex);
+  const auto known = drawn.find(*wanted.drawn_robot);
+  if (known != drawn.end()) return known->second;
+  return drawn.emplace(*wanted.drawn_robot, draw_robot(*wanted.drawn_robot)).first->second;
 }
 
 }  // namespace fxdyn::campaign

@@ -29,8 +29,12 @@ std::vector<Named> of(const json& list, std::size_t joint) {
   return named;
 }
 
+/// A truth whose form deviates from the catalogue's is right under the names of its class.
 bool is_right(const Named& named, const json& effect) {
-  return named.effect == effect.at("effect").get<std::string>() && named.joint == true_joint(effect);
+  if (named.joint != true_joint(effect)) return false;
+  if (!effect.contains("names")) return named.effect == effect.at("effect").get<std::string>();
+  const auto names = effect.at("names").get<std::vector<std::string>>();
+  return std::find(names.begin(), names.end(), named.effect) != names.end();
 }
 
 /// Among the name and its first two alternatives, at the right joint. An alternative on the body counts whatever the
@@ -124,6 +128,7 @@ json score(const json& truth, const json& diagnosis, std::optional<double> closu
     out["accepted"] = std::any_of(named.begin(), named.end(),
                                   [&](const Named& one) { return !flagged || !unexplained.contains(one.joint); });
     out["named_beside"] = taken && flagged;
+    out["taken"] = taken;
     out["right_joint"] = flagged || taken;
     out["passed"] = flagged;
     return out;

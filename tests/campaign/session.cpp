@@ -34,7 +34,8 @@ std::string effect_toml(std::optional<std::size_t> joint, const EffectFit& fit) 
 
 }  // namespace
 
-std::vector<SessionLog> recording(const std::string& role, std::uint64_t seed, double start_s, double log_s) {
+std::vector<SessionLog> recording(const std::string& role, std::uint64_t seed, double start_s,
+                                  const Recording& recorded) {
   // Fourier series: order / period is the highest frequency. The scale is set by the tightest limit, so a high order is
   // bound by acceleration and a low one by velocity or range.
   std::vector<SessionLog> logs{{role + "_fast", 10, 1, 0, 5, 0},
@@ -42,7 +43,8 @@ std::vector<SessionLog> recording(const std::string& role, std::uint64_t seed, d
                                {role + "_slow", 10, 0.12, 0, 5, 0},
                                {role + "_reversals", 5, 0.03, 0, 8, 0}};
   // The same frequencies in shorter logs: as much shorter periods of as much lower orders.
-  const double shorter = log_s / 10;
+  const double log_s = recorded.log_s, shorter = log_s / 10;
+  logs.resize(std::min(recorded.logs, logs.size()));
   for (std::size_t i = 0; i < logs.size(); ++i) {
     logs[i].period_s *= shorter;
     logs[i].order = static_cast<int>(std::lround(shorter * logs[i].order));
@@ -53,7 +55,7 @@ std::vector<SessionLog> recording(const std::string& role, std::uint64_t seed, d
 }
 
 Session healthy_session(const Case& wanted) {
-  const TestRobot& robot = test_robots()[wanted.robot];
+  const TestRobot& robot = robot_of(wanted);
   Session session;
   session.urdf = "robot.urdf";
   session.robot = &robot;
@@ -65,7 +67,9 @@ Session healthy_session(const Case& wanted) {
   session.log_s = wanted.recording.log_s;
   session.sample_s = wanted.recording.sample_s;
   session.encoder_bits = wanted.recording.encoder_bits;
-  Random random(wanted.seed * 31 + wanted.robot);
+  session.jitter = wanted.recording.jitter;
+  session.torque_noise = wanted.recording.noise;
+  Random random(wanted.seed * 31 + (wanted.drawn_robot ? 7 : wanted.robot));
   const auto moved = [&](std::vector<double> values, double by) {
     for (double& value : values) value *= random.uniform(1 - by, 1 + by);
     return values;
@@ -82,15 +86,17 @@ Session healthy_session(const Case& wanted) {
 std::string to_toml(const Session& s) {
   std::string text = fmt::format("seed = {}\nplant = \"{}\"\n", s.seed, s.mujoco ? "mujoco" : "internal");
   text += fmt::format("motion = \"{}\"\n", s.closed_loop ? "closed_loop" : "prescribed");
-  text += fmt::format(
-      "[robot]\nurdf = \"{}\"\ngravity = [0.0, 0.0, -9.81]\nrated_torque = [{:.6f}]\nacceleration = [{:.6f}]\n\n",
-      s.urdf, fmt::join(s.robot->rated_torque, ", "), fmt::join(s.robot->acceleration, ", "));
+  text +=
+      fmt::format("[robot]\nurdf = \"{}\"\ngravity = [{:.6f}]\nrated_torque = [{:.6f}]\nacceleration = [{:.6f}]\n\n",
+                  s.urdf, fmt::join(s.robot->gravity, ", "), fmt::join(s.robot->rated_torque, ", "),
+                  fmt::join(s.robot->acceleration, ", "));
   text += fmt::format("[sensors]\nsample_s = {}\n", s.sample_s);
   text += fmt::format("start_s = {:.6f}\n", s.clock_s);
+  if (s.jitter > 0 && s.noise) text += fmt::format("jitter = {:.6f}\n", s.jitter);
   if (s.exact_motion) text += "exact_motion = true\n";
   if (s.noise) {
-    text += fmt::format("encoder_bits = {}\ntorque_noise = 0.01\n", s.encoder_bits);
-    text += fmt::format("ar_noise = 0.003\nar_pole = {:.6f}\n", s.ar_pole);
+    text += fmt::format("encoder_bits = {}\ntorque_noise = {}\n", s.encoder_bits, s.torque_noise);
+    text += fmt::format("ar_noise = {}\nar_pole = {:.6f}\n", 0.3 * s.torque_noise, s.ar_pole);
     if (s.link_encoders) text += "link_encoders = \"all\"\nlink_encoder_bits = 19\n";
   }
   for (std::size_t j = 0; j < s.viscous.size(); ++j) {

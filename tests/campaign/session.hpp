@@ -17,7 +17,8 @@ struct SessionLog {
 };
 /// fast, mid (up to 3.5 Hz), slow, and reversals (creeping to and fro), each log_s long. Every role has trajectories of
 /// its own.
-std::vector<SessionLog> recording(const std::string& role, std::uint64_t seed, double start_s, double log_s);
+std::vector<SessionLog> recording(const std::string& role, std::uint64_t seed, double start_s,
+                                  const Recording& recorded);
 
 /// What a scenario file is made of.
 struct Session {
@@ -27,7 +28,7 @@ struct Session {
   std::vector<std::pair<std::optional<std::size_t>, EffectFit>> effects;
   std::vector<SessionLog> logs;
   std::uint64_t seed = 1;
-  double clock_s = 0, sample_s = 0.002, ar_pole = 0.95;
+  double clock_s = 0, sample_s = 0.002, ar_pole = 0.95, jitter = 0, torque_noise = 0.01;
   double log_s = 10;
   int encoder_bits = 17;
   bool mujoco = false, closed_loop = false, link_encoders = false;
