@@ -1,7 +1,9 @@
 #include "host_tools/diagnose/unknowns.hpp"
 #include "host_tools/diagnose/base_parameters.hpp"
 #include "host_tools/diagnose/models.hpp"
+#include "host_tools/effects/lugre_check.hpp"
 #include "model/effects/coulomb.hpp"
+#include "model/effects/lugre.hpp"
 #include "model/effects/offset.hpp"
 #include "model/effects/payload.hpp"
 
@@ -264,6 +266,22 @@ void add_to(IdentifiedModel& model, const Unknown& u, double step) {
   }
 }
 
+namespace {
+
+/// Bristles whose damping drives the joint are no friction, however well they fit.
+void keep_friction(IdentifiedModel& model) {
+  constexpr double within = 0.999;
+  for (JointFit& joint : model.joints) {
+    const auto most = most_lugre_damping(joint, joint.dq_limit);
+    if (!most) continue;
+    for (EffectFit& fit : joint.effects) {
+      if (fit.effect == Lugre::name) fit.linear[1] = std::clamp(fit.linear[1], 0.0, within * *most);
+    }
+  }
+}
+
+}  // namespace
+
 void update(Models& models, const std::vector<Unknown>& unknowns, const LinearFit& fit, double share) {
   constexpr double longest_step = 0.4;  // of a logarithm
   for (std::size_t i = 0; i < fit.columns.size(); ++i) {
@@ -286,6 +304,8 @@ void update(Models& models, const std::vector<Unknown>& unknowns, const LinearFi
         u.kind != Unknown::Kind::base && u.kind != Unknown::Kind::width && effect_of(models.current, u).named;
     if (models.has_baseline && !u.change && !named) add_to(models.healthy, in_healthy(u), step);
   }
+  keep_friction(models.current);
+  if (models.has_baseline) keep_friction(models.healthy);
 }
 
 }  // namespace fxdyn::diagnosis

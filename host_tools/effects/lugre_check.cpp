@@ -24,24 +24,32 @@ std::optional<std::string> out_of_range(const EffectFit& fit, const EffectInfo& 
   return check(info.linear[0], fit.linear[0]);
 }
 
+/// At which the rule is asked: the Stribeck velocity, or the joint's limit where that is less.
+double judged_speed(const EffectFit& fit, double dq_limit) {
+  return dq_limit > 0 ? std::min(fit.shape[1], dq_limit) : fit.shape[1];
+}
+
 }  // namespace
+
+std::optional<double> most_lugre_damping(const JointFit& joint, double dq_limit) {
+  const EffectFit* fit = joint.find("lugre");
+  if (fit == nullptr) return std::nullopt;
+  const double velocity = fit->shape[1], share = fit->shape[2], speed = judged_speed(*fit, dq_limit);
+  const EffectFit* viscous = joint.find("viscous");
+  const double n = share + (1 - share) * std::exp(-speed * speed / (velocity * velocity));
+  // static + viscous v + damping v (1 - 1 / n) >= 0
+  return (fit->linear[0] / speed + (viscous == nullptr ? 0 : std::max(0.0, viscous->linear[0]))) * n / (1 - n);
+}
 
 std::optional<std::string> lugre_is_no_friction(const JointFit& joint, double dq_limit) {
   const EffectFit* fit = joint.find("lugre");
   if (fit == nullptr) return std::nullopt;
   if (auto why = out_of_range(*fit, *find_effect("lugre"))) return why;
-  const double velocity = fit->shape[1], share = fit->shape[2], static_friction = fit->linear[0],
-               damping = fit->linear[1];
-  const EffectFit* viscous = joint.find("viscous");
-  const double speed = dq_limit > 0 ? std::min(velocity, dq_limit) : velocity;
-  const double n = share + (1 - share) * std::exp(-speed * speed / (velocity * velocity));
-  // static + viscous v + damping v (1 - 1 / n) >= 0
-  const double most =
-      (static_friction / speed + (viscous == nullptr ? 0 : std::max(0.0, viscous->linear[0]))) * n / (1 - n);
+  const double damping = fit->linear[1], most = *most_lugre_damping(joint, dq_limit);
   if (damping <= most) return std::nullopt;
   return fmt::format(
       "lugre: with a damping of {:.4g} it would drive the joint at {:.3g}/s instead of braking it; at most {:.4g} here",
-      damping, speed, most);
+      damping, judged_speed(*fit, dq_limit), most);
 }
 
 }  // namespace fxdyn

@@ -18,4 +18,8 @@ namespace fxdyn {
 /// @param dq_limit of the joint [rad/s | m/s]; 0: not known
 std::optional<std::string> lugre_is_no_friction(const JointFit& joint, double dq_limit);
 
+/// The largest damping with which the joint's `lugre` is friction, by the same rule [N*m*s/rad | N*s/m]; nothing where
+/// there is none.
+std::optional<double> most_lugre_damping(const JointFit& joint, double dq_limit);
+
 }  // namespace fxdyn

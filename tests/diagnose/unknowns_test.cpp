@@ -3,6 +3,7 @@
 #include "host_tools/diagnose/unknowns.hpp"
 #include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/link_parameters.hpp"
+#include "host_tools/effects/lugre_check.hpp"
 
 #include <gtest/gtest.h>
 
@@ -61,6 +62,30 @@ TEST_F(UnknownsOfAModel, FrictionMayChangeALittleFromSessionToSession) {
   EXPECT_NEAR(change->value, 0.5, 1e-12);
   EXPECT_NEAR(change->prior_std, std::hypot(0.3 * 2, 1e-3 * 100), 1e-12);
   EXPECT_EQ(change->prior, 0);
+}
+
+// model.json with more damping would be refused: bristles would drive the joint.
+TEST_F(UnknownsOfAModel, LuGreStaysFriction) {
+  models_.current.joints[1].effects.push_back(test::named_effect("lugre", {0.01, 0.02, 0.6}, {5, 30}));
+  const Unknowns unknowns = make_unknowns(models_);
+  const auto damping = std::find_if(unknowns.all.begin(), unknowns.all.end(), [](const Unknown& u) {
+    return u.kind == Kind::linear && u.joint == 1 && u.effect == 3 && u.index == 1;
+  });
+  ASSERT_NE(damping, unknowns.all.end());
+  update(models_, unknowns.all, only(unknowns, static_cast<std::size_t>(damping - unknowns.all.begin()), 1e5), 1);
+  const JointFit& joint = models_.current.joints[1];
+  EXPECT_EQ(lugre_is_no_friction(joint, joint.dq_limit), std::nullopt);
+  EXPECT_NEAR(joint.find("lugre")->linear[1], *most_lugre_damping(joint, joint.dq_limit), 1);
+}
+
+TEST_F(UnknownsOfAModel, BaseParametersStayWhereTheyAreHeld) {
+  models_.base_held = true;
+  const Unknowns unknowns = make_unknowns(models_);
+  for (const Unknown& u : unknowns.all) {
+    if (u.kind != Kind::base) continue;
+    EXPECT_EQ(u.prior, u.value);
+    EXPECT_LT(u.prior_std, 1e-3 * std::fabs(u.value) + 1e-8);
+  }
 }
 
 TEST_F(UnknownsOfAModel, HowMuchIsAThreshold) {
