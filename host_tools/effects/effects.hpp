@@ -45,6 +45,12 @@ std::vector<std::string_view> identified_effects();
 /// The motion that tells two effects apart: the first that both name, empty if there is none.
 std::string_view telling_experiment(const EffectTraits& a, const EffectTraits& b);
 
+/// What effects are confused with beside each other.
+inline constexpr std::string_view base_parameters_name = "base parameters";
+
+/// Which experiment would separate two effects, or an effect from `base_parameters_name`: from their traits alone.
+std::string cure(std::string_view e, std::string_view f);
+
 /// Whether base parameters may hold this effect of the joint, or it drifts.
 bool in_base(std::string_view effect);
 bool drifts(std::string_view effect);

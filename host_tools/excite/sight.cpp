@@ -22,7 +22,6 @@ using Eigen::VectorXd;
 /// rho^2 below which nothing is left of a direction.
 constexpr double nothing_left = 1e-5;
 constexpr double confused_from = 0.95;
-constexpr std::string_view base_parameters = "base parameters";
 /// Smallest effect that still counts as seen, share of rated torque.
 constexpr double seen_below = 0.005;
 /// Eigenvalues of a normalised information matrix below this count as zero.
@@ -116,27 +115,6 @@ double correlation(const MatrixXd& e, const MatrixXd& f, const MatrixXd& between
   if (e.cols() == 0 || f.cols() == 0) return 0;
   return std::min(1.0, std::sqrt((e.transpose() * between * f).squaredNorm() / static_cast<double>(e.cols())));
 }
-
-/// Base parameters too are confused with effects.
-const EffectTraits& traits_of(std::string_view name) {
-  static constexpr EffectTraits of_base{.words = "inertia of the links",
-                                        .experiments = {experiments::hopeless, experiments::wide_range_or_baseline}};
-  return name == base_parameters ? of_base : *find_effect(name);
-}
-
-}  // namespace
-
-std::string cure(const std::string& e, const std::string& f) {
-  const EffectTraits &one = traits_of(e), &other = traits_of(f);
-  if (const std::string_view telling = telling_experiment(one, other); !telling.empty()) return std::string(telling);
-  if (e == base_parameters || f == base_parameters)
-    return "the same motions recorded without it (role = \"baseline\"), or inertias known beforehand";
-  const bool couples =
-      one.named_experiment(experiments::one_at_a_time) || other.named_experiment(experiments::one_at_a_time);
-  return std::string((couples ? experiments::one_at_a_time : experiments::all_poses).text);
-}
-
-namespace {
 
 void check(const IdentifiedModel& nominal, const std::vector<Motion>& motions, const SightSettings& settings) {
   const auto n = static_cast<Index>(nominal.robot.size());
@@ -270,7 +248,7 @@ EffectSight Judge::effect(std::string_view name, std::optional<std::size_t> join
   // What no column of a joint's friction is needed for, the base parameters take.
   const auto here = columns_from(typical.first, typical.count);
   const Directions alone = directions(info_.gram(here, here), after_base_(here, here));
-  if (alone.square.size() > 0) note(std::string(base_parameters), std::sqrt(1 - alone.square.mean()));
+  if (alone.square.size() > 0) note(std::string(base_parameters_name), std::sqrt(1 - alone.square.mean()));
   for (std::size_t b = 0; b < info_.blocks.size(); ++b) {
     const Block& other = info_.blocks[b];
     if (other.candidate.effect == name) continue;

@@ -35,7 +35,7 @@ struct Visibility {
 
 /// Another effect that looks the same once the nominal model has taken its part.
 struct Confusion {
-  std::string effect;  ///< or "base parameters"
+  std::string effect;  ///< or `base_parameters_name` (effects.hpp)
   double correlation =
       0;             ///< multiple correlation: share (RMS) of what is left of this effect that the other one can take
   std::string cure;  ///< what would separate the two
@@ -78,9 +78,6 @@ struct Sight {
 /// motion too short for its filter
 Sight see(const IdentifiedModel& nominal, const std::vector<Motion>& motions, const SightSettings& settings,
           Progress& progress);
-
-/// Which experiment would tell two effects (or "base parameters") apart.
-std::string cure(const std::string& e, const std::string& f);
 
 /// The key "sight" of excite.json: percent of rated torque, correlations, shapes and parameters with units; a value
 /// that can't be reached is null.

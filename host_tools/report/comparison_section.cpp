@@ -4,8 +4,9 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "host_tools/page/comparison_plots.hpp"
 #include "host_tools/page/page.hpp"
-#include "host_tools/report/comparison_plots.hpp"
+#include "host_tools/report/comparison_result.hpp"
 #include "host_tools/report/section.hpp"
 #include "host_tools/support/files.hpp"
 
