@@ -6,7 +6,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/identify/gate_data.hpp"
@@ -129,14 +128,7 @@ struct Refit {
 
 Refit refit(const Project& project, const IdentifiedModel& old, const StoredInformation& stored,
             std::vector<ProcessedLog>& logs, double forgetting) {
-  const auto is_drift = [](const std::string& name) {
-    const auto& infos = effect_infos();
-    return std::any_of(infos.begin(), infos.end(), [&](const EffectInfo& info) {
-      return info.drifts() && name.find(fmt::format(": {},", info.name)) != std::string::npos;
-    });
-  };
-  const bool fits_drift = std::any_of(stored.unknowns.begin(), stored.unknowns.end(), is_drift);
-  const KeptEffects kept(old, logs, !fits_drift);
+  const KeptEffects kept(old, logs, !stored.fits_drift);
   std::vector<JointFit> design = kept.design();
   kept.mark_hidden(logs);
   Fitter fitter(project.robot, logs, design);
