@@ -363,6 +363,11 @@ json to_json(const IdentifiedModel& model) {
   return out;
 }
 
+const Robot& robot_of(const IdentifiedModel& model) { return model.robot; }
+const std::vector<JointFit>& joints_of(const IdentifiedModel& model) { return model.joints; }
+const std::vector<EffectFit>& body_of(const IdentifiedModel& model) { return model.body; }
+double tick_of(const IdentifiedModel& model) { return model.tick_s; }
+
 IdentifiedModel read_model(const std::filesystem::path& file) {
   const std::string text = read_file(file);
   try {

@@ -9,6 +9,7 @@
 #include "host_tools/effects/filter_fit.hpp"
 #include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/effects/log_reference.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/numbers/formats.hpp"
 #include "host_tools/robot/robot.hpp"
 #include "host_tools/signals/log.hpp"
@@ -79,7 +80,6 @@ struct IdentifiedModel {
   }
 };
 
-nlohmann::json to_json(const IdentifiedModel& model);
 /// "flexible" of a joint in model.json.
 nlohmann::json flexible_json(const FlexibleJoint& joint, const Robot& robot);
 /// Formats as in model.json and export.json.

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "host_tools/effects/effects.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/excite/effect_information.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/parallel.hpp"
@@ -117,7 +117,7 @@ double correlation(const MatrixXd& e, const MatrixXd& f, const MatrixXd& between
 }
 
 void check(const IdentifiedModel& nominal, const std::vector<Motion>& motions, const SightSettings& settings) {
-  const auto n = static_cast<Index>(nominal.robot.size());
+  const auto n = static_cast<Index>(robot_of(nominal).size());
   if (motions.empty()) throw InputError("no motion to judge");
   if (settings.noise.size() != n || !(settings.noise.minCoeff() > 0))
     throw InputError(fmt::format("torque noise: expected {} positive values, one a joint", n));
@@ -134,8 +134,8 @@ void check(const IdentifiedModel& nominal, const std::vector<Motion>& motions, c
       throw InputError(fmt::format("motion '{}': expected {} joints with q, dq and ddq", motion.name, n));
     }
   }
-  for (std::size_t j = 0; j < nominal.joints.size(); ++j) {
-    if (!(nominal.joints[j].rated_torque > 0))
+  for (std::size_t j = 0; j < joints_of(nominal).size(); ++j) {
+    if (!(joints_of(nominal)[j].rated_torque > 0))
       throw InputError(fmt::format("joint {}: its rated torque is not known", j + 1));
   }
 }
@@ -164,9 +164,9 @@ class Judge {
 
 Judge::Judge(const IdentifiedModel& nominal, const Information& information, double threshold)
     : info_(information), threshold_(threshold) {
-  rated_.resize(static_cast<Index>(nominal.joints.size()));
-  for (std::size_t j = 0; j < nominal.joints.size(); ++j)
-    rated_[static_cast<Index>(j)] = nominal.joints[j].rated_torque;
+  rated_.resize(static_cast<Index>(joints_of(nominal).size()));
+  for (std::size_t j = 0; j < joints_of(nominal).size(); ++j)
+    rated_[static_cast<Index>(j)] = joints_of(nominal)[j].rated_torque;
   const Index base = info_.base;
   const Block& last = info_.blocks[info_.nominal_blocks - 1];
   nominal_columns_ = columns_from(0, last.first + last.count);
@@ -282,9 +282,9 @@ Sight see(const IdentifiedModel& nominal, const std::vector<Motion>& motions, co
           Progress& progress) {
   check(nominal, motions, settings);
   const Information information(nominal, motions, settings.noise, settings.torque_cutoff_hz, progress);
-  const double known = static_cast<double>(nominal.robot.size()) * information.independent_samples;
+  const double known = static_cast<double>(robot_of(nominal).size()) * information.independent_samples;
   const double asked =
-      static_cast<double>(information.base) + static_cast<double>(nominal_effects().size() * nominal.robot.size());
+      static_cast<double>(information.base) + static_cast<double>(nominal_effects().size() * robot_of(nominal).size());
   if (known < 2 * asked) {
     throw DataError(
         fmt::format("{:.2f} s of motion hold {:.0f} independent torques for {:.0f} nominal parameters: plan "
@@ -293,14 +293,14 @@ Sight see(const IdentifiedModel& nominal, const std::vector<Motion>& motions, co
   }
   const Judge judge(nominal, information, settings.threshold);
   Sight sight;
-  sight.robot = nominal.robot;
+  sight.robot = robot_of(nominal);
   sight.torque_cutoff_hz = information.filter.torque_cutoff_hz;
   sight.threshold = settings.threshold;
   sight.seconds = information.seconds;
   sight.independent_samples = information.independent_samples;
   sight.noise = information.noise;
   for (Index j = 0; j < sight.noise.size(); ++j)
-    sight.noise[j] /= nominal.joints[static_cast<std::size_t>(j)].rated_torque;
+    sight.noise[j] /= joints_of(nominal)[static_cast<std::size_t>(j)].rated_torque;
   std::vector<std::pair<std::string_view, std::optional<std::size_t>>> questions;
   for (const Block& block : information.blocks) {
     const auto joint = block.on_body ? std::nullopt : std::optional(block.candidate.joint);
