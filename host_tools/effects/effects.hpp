@@ -21,7 +21,7 @@ struct EffectInfo : EffectTraits {
   bool has_constant;  ///< one of its phi is 1
   /// Bends under the load: acts on the position and needs the rigid-body torque.
   bool bends() const { return acts_on == ActsOn::position && needs_structural; }
-  /// Tells a rotor from the base parameters: it follows the load without the rotor's own inertia.
+  /// Separates a rotor from the base parameters: it follows the load without the rotor's own inertia.
   bool separates_rotor() const { return needs_structural; }
   /// Its wavenumber comes from a spectrum.
   bool of_spectrum() const { return !shape.empty() && shape[0].values.search == ShapeSearch::spectrum; }
@@ -42,7 +42,7 @@ std::vector<std::string_view> joint_effect_names();
 const std::vector<std::string>& nominal_effects();
 std::vector<std::string_view> identified_effects();
 
-/// The motion that tells two effects apart: the first that both name, empty if there is none.
+/// The motion that separates two effects: the first that both name, empty if there is none.
 std::string_view telling_experiment(const EffectTraits& a, const EffectTraits& b);
 
 /// What effects are confused with beside each other.

@@ -175,7 +175,7 @@ Judge::Judge(const IdentifiedModel& nominal, const Information& information, dou
   const auto all = nominal_columns_;
   const auto inertia = columns_from(0, base), friction = columns_from(base, last.first + last.count - base);
   after_base_ = schur(g, g.topRows(base), g.topLeftCorner(base, base));
-  // A healthy recording of the same motions tells the base parameters, its friction fitted apart.
+  // A healthy recording of the same motions determines the base parameters, its friction fitted apart.
   MatrixXd nuisance = g(all, all);
   nuisance.topLeftCorner(base, base) += schur(g(inertia, inertia), g(friction, inertia), g(friction, friction));
   after_healthy_ = schur(g, g(all, Eigen::all), nuisance);

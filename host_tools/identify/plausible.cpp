@@ -380,7 +380,7 @@ std::vector<Suspicion> check_plausible(const Robot& robot, const std::vector<Pro
   Rows::Fit fit = best_signs(rows, 1, n);
   if (Rows::Fit other = best_signs(rows, -1, n); other.score < fit.score - options.flip) fit = std::move(other);
 
-  // The other joints can't tell which of two opposite signs all have: inertia and friction can.
+  // The other joints can't decide which of two opposite signs all have: inertia and friction can.
   VectorXd signs = fit.signs;
   std::vector<std::string> why(robot.size(), "the other joints' torques fit together only with the opposite sign");
   std::vector<Suspicion> out;

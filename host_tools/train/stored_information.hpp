@@ -7,7 +7,7 @@
 
 namespace fxdyn {
 
-/// What the logs that a model was trained on told of its coefficients: where `fxdyn update` goes on. In
+/// Information of the logs that a model was trained on about its coefficients: where `fxdyn update` goes on. In
 /// DIR/information.cbor.
 struct StoredInformation {
   std::vector<std::string> unknowns;  ///< Fitter::unknowns(): which coefficients, in which order
