@@ -175,6 +175,12 @@ const std::vector<std::string>& nominal_effects() {
   return names;
 }
 
+std::vector<std::string> nominal_effects_and(std::initializer_list<std::string_view> others) {
+  std::vector<std::string> names = nominal_effects();
+  names.insert(names.end(), others.begin(), others.end());
+  return names;
+}
+
 std::vector<std::string_view> identified_effects() {
   std::vector<const EffectInfo*> found;
   for (const EffectInfo& info : effect_infos()) {

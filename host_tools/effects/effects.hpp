@@ -41,6 +41,8 @@ std::vector<std::string_view> joint_effect_names();
 /// Names of those that every joint has, and of those that `identify` adds by itself, in its order.
 const std::vector<std::string>& nominal_effects();
 std::vector<std::string_view> identified_effects();
+/// The nominal effects and then these.
+std::vector<std::string> nominal_effects_and(std::initializer_list<std::string_view> others);
 
 /// The motion that separates two effects: the first that both name, empty if there is none.
 std::string_view telling_experiment(const EffectTraits& a, const EffectTraits& b);
