@@ -19,6 +19,7 @@
 #include "host_tools/support/files.hpp"
 #include "host_tools/train/kept_effects.hpp"
 #include "host_tools/train/stored_information.hpp"
+#include "host_tools/update/update_result.hpp"
 
 namespace fxdyn {
 namespace {
@@ -230,31 +231,26 @@ std::string table_of(const IdentifiedModel& model, const NewSession& session, co
   return out;
 }
 
-json update_json(const IdentifiedModel& before, const NewSession& session, const Judged& held_out,
-                 const std::optional<Judged>& test, double forgetting) {
-  json joints = json::array();
+UpdateResult result_of(const IdentifiedModel& before, const NewSession& session, const Judged& held_out,
+                       const std::optional<Judged>& test, double forgetting) {
+  UpdateResult out;
+  out.log = session.reference.file;
+  out.hash = session.reference.hash;
+  out.refit_s = session.refit_s;
+  out.held_out_s = session.held_out_s;
+  out.forgetting = forgetting;
   const auto change = [](const Judged& judged, std::size_t j) {
-    return json{{"old", judged.before.rmse[j]}, {"new", judged.after.rmse[j]}};
+    return UpdateResult::Change{judged.before.rmse[j], judged.after.rmse[j]};
   };
   for (std::size_t j = 0; j < before.joints.size(); ++j) {
-    joints.push_back(
-        {{"joint", before.robot.joints[j].name},
-         {"index", j + 1},
-         {"unit", before.robot.joints[j].torque_unit()},
-         {"rated_torque", before.joints[j].rated_torque},
-         {"rmse", {{"held_out", change(held_out, j)}, {"test", test ? change(*test, j) : json(nullptr)}}}});
+    const Joint& joint = before.robot.joints[j];
+    out.joints.push_back({joint.name, joint.torque_unit(), before.joints[j].rated_torque, change(held_out, j),
+                          test ? std::optional(change(*test, j)) : std::nullopt});
   }
-  return {{"schema", "fxdyn.update/1"},
-          {"log", session.reference.file},
-          {"hash", session.reference.hash},
-          {"refit_seconds", session.refit_s},
-          {"held_out_seconds", session.held_out_s},
-          {"forgetting", forgetting},
-          {"joints", joints},
-          {"mean_log_ratio", mean_log_ratio(held_out)},
-          {"tables_crc", {{"old", before.tables_crc}, {"new", nullptr}}},
-          {"sequence", {{"old", before.lineage.sequence}, {"new", nullptr}}},
-          {"accepted", false}};
+  out.mean_log_ratio = mean_log_ratio(held_out);
+  out.tables_crc.before = before.tables_crc;
+  out.sequence.before = before.lineage.sequence;
+  return out;
 }
 
 /// A folder for files that replace those of `directory` together; gone with the object.
@@ -321,10 +317,10 @@ Update update(Pipeline& pipeline, const UpdateSettings& settings) {
   }
   progress.step();
   progress.done();
-  Update out{mean_log_ratio(held_out) < 0, table_of(old, session, held_out, test, forgetting)};
-  json report = update_json(old, session, held_out, test, forgetting);
+  UpdateResult result = result_of(old, session, held_out, test, forgetting);
+  Update out{result.mean_log_ratio < 0, table_of(old, session, held_out, test, forgetting)};
   if (!out.accepted) {
-    write_file(directory / "update.json", report.dump(1) + "\n");
+    write_file(directory / "update.json", to_json(result).dump(1) + "\n");
     return out;
   }
 
@@ -357,10 +353,10 @@ Update update(Pipeline& pipeline, const UpdateSettings& settings) {
     metrics["notes"].push_back(updated.notes.back());
     write_file(staging.path() / "metrics.json", metrics.dump(1) + "\n");
   }
-  report["accepted"] = true;
-  report["tables_crc"]["new"] = updated.tables_crc;
-  report["sequence"]["new"] = updated.lineage.sequence;
-  write_file(staging.path() / "update.json", report.dump(1) + "\n");
+  result.accepted = true;
+  result.tables_crc.after = updated.tables_crc;
+  result.sequence.after = updated.lineage.sequence;
+  write_file(staging.path() / "update.json", to_json(result).dump(1) + "\n");
   staging.replace("model.json");
   return out;
 }
