@@ -1,5 +1,6 @@
 #pragma once
 
+#include "host_tools/identify/options.hpp"
 #include "host_tools/regression/fitter.hpp"
 #include "host_tools/regression/information.hpp"
 

@@ -2,6 +2,7 @@
 
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/dataset.hpp"
+#include "host_tools/train/options.hpp"
 
 namespace fxdyn {
 
@@ -25,7 +26,7 @@ class KeptEffects {
   /// model's rigid body: exact where the fit ends at `model`, else off by the kept effects' share of the difference.
   std::vector<Eigen::MatrixXd> torque(const IdentifiedModel& model, const std::vector<ProcessedLog>& logs) const;
   /// Marks the samples as saturated at which a named saturation hides what the total was: before the Fitter is made.
-  void mark_hidden(std::vector<ProcessedLog>& logs) const;
+  void mark_hidden(std::vector<ProcessedLog>& logs, const KeptOptions& options = {}) const;
 
  private:
   bool is_kept(std::size_t joint, const EffectFit& fit) const;

@@ -30,11 +30,6 @@ using Eigen::VectorXd;
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-/// Of the new log, in time: what refits; the rest judges.
-constexpr double refit_share = 2.0 / 3;
-/// Shorter ones show too little of the motion to say anything of it.
-constexpr double shortest_s = 6;
-
 /// The new log in two parts, and the logs that the fit never saw.
 struct NewSession {
   LogReference reference;
@@ -45,7 +40,7 @@ struct NewSession {
 };
 
 NewSession read_session(const Pipeline& pipeline, const IdentifiedModel& model, double row_interval_s,
-                        const fs::path& file) {
+                        const fs::path& file, const UpdateOptions& options) {
   const Project& project = pipeline.project();
   NewSession out;
   out.reference = {file.filename().string(), "update", hash_of_file(file), 0, 0};
@@ -66,13 +61,13 @@ NewSession read_session(const Pipeline& pipeline, const IdentifiedModel& model, 
   {
     const Log whole = read_log_for(model, file, {}, {});
     const double from = whole.t[0], to = whole.t[whole.samples() - 1];
-    if (to - from < shortest_s)
+    if (to - from < options.shortest_s)
       throw DataError(
           fmt::format("{}: {:.1f} s are too short to refit from two thirds and judge by the rest; record {:g} s "
                       "at least",
-                      file.string(), to - from, shortest_s));
+                      file.string(), to - from, options.shortest_s));
     check_torque(whole, model.robot);
-    cut_s = from + refit_share * (to - from);
+    cut_s = from + options.refit_share * (to - from);
     out.refit_s = cut_s - from;
     out.held_out_s = to - cut_s;
     out.reference.from_s = from;
@@ -293,7 +288,7 @@ class Staging {
 
 }  // namespace
 
-Update update(Pipeline& pipeline, const UpdateSettings& settings) {
+Update update(Pipeline& pipeline, const UpdateSettings& settings, const UpdateOptions& options) {
   const Project& project = pipeline.project();
   const fs::path& directory = pipeline.directory();
   const double forgetting = settings.forgetting.value_or(project.identify.forgetting);
@@ -304,7 +299,7 @@ Update update(Pipeline& pipeline, const UpdateSettings& settings) {
 
   Progress progress;
   progress.stage("refitting, judging", 3);
-  NewSession session = read_session(pipeline, old, stored.row_interval_s, settings.log);
+  NewSession session = read_session(pipeline, old, stored.row_interval_s, settings.log, options);
   progress.step();
   auto [updated, known] = refit(project, old, stored, session.refit, forgetting);
   progress.step();
