@@ -76,7 +76,7 @@ bool SocketBus::receive(Frame& frame, Duration timeout) {
 std::string SocketBus::trouble() {
   hal::CanErrors errors = socket_.errors();
   hal::linux::CanLink link;
-  // Error frames tell when the state changes, so what it was before the socket was opened only the controller knows.
+  // Error frames say when the state changes, so what it was before the socket was opened only the controller knows.
   if (hal::linux::query_link(socket_.interface(), link) == 0 && link.controlled)
     errors = {link.state, link.transmit_errors, link.receive_errors, errors.lost};
   return hal::linux::explain(errors, socket_.interface(), link.bit_rate);

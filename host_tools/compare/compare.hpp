@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/compare/comparison_result.hpp"
 #include "host_tools/project/project.hpp"
+#include "host_tools/report/comparison_result.hpp"
 
 namespace fxdyn {
 

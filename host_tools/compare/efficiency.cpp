@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <nlohmann/json.hpp>
-
 #include "host_tools/compare/compare.hpp"
 #include "host_tools/identify/identify.hpp"
 #include "host_tools/project/provenance.hpp"
@@ -18,7 +16,6 @@
 namespace fxdyn {
 namespace {
 
-using nlohmann::json;
 namespace fs = std::filesystem;
 
 const std::vector<double> seconds{5, 10, 20, 40, 60, 120};
@@ -74,38 +71,31 @@ class Efficiency {
     }
   }
 
-  json run() {
-    json curve = json::array(), mix = json::array();
-    for (const double s : seconds) add(curve, s, 0.5, methods);
+  EfficiencyResult run() {
+    EfficiencyResult out{.project_hash = project_hash(project_), .made_from = made_from(project_, directory_, false)};
+    for (const double s : seconds) add(out.curve, s, 0.5, methods);
     for (const double s : mixed_seconds) {
-      for (const double share : slow_shares) add(mix, s, share, mixed_methods);
+      for (const double share : slow_shares) add(out.mix, s, share, mixed_methods);
     }
-    return {{"schema", "fxdyn.efficiency/1"},
-            {"project_hash", project_hash(project_)},
-            {"made_from", made_from(project_, directory_, false)},
-            {"curve", curve},
-            {"mix", mix}};
+    return out;
   }
 
  private:
   /// Nothing where the logs are shorter.
-  void add(json& to, double s, double slow_share, const std::vector<std::string>& names) {
+  void add(std::vector<EfficiencyPoint>& to, double s, double slow_share, const std::vector<std::string>& names) {
     Project part = project_;
     std::erase_if(part.logs, [](const LogEntry& entry) { return entry.role == Role::train; });
     if (!take(part, fast_, s * (1 - slow_share)) || !take(part, slow_, s * slow_share)) return;
-    json errors;
-    std::string why;
+    EfficiencyPoint point{.seconds = s, .slow_share = slow_share};
     for (const std::string& name : names) {
       try {
-        errors[name] = compare_methods(part, directory_, {name}).methods.front().mean_percent_rated;
+        point.percent_rated[name] = compare_methods(part, directory_, {name}).methods.front().mean_percent_rated;
       } catch (const DataError& error) {
-        errors[name] = nullptr;
-        why = error.what();
+        point.percent_rated[name] = std::nullopt;
+        point.failed = error.what();
       }
     }
-    json point{{"seconds", s}, {"slow_share", slow_share}, {"percent_rated", errors}};
-    if (!why.empty()) point["failed"] = why;
-    to.push_back(point);
+    to.push_back(std::move(point));
   }
 
   static bool take(Project& part, const std::vector<Source>& from, double s) {
@@ -127,26 +117,26 @@ class Efficiency {
 
 }  // namespace
 
-json efficiency(const fs::path& project, const fs::path& directory) {
-  const json result = Efficiency(project, directory).run();
-  write_file(directory / "efficiency.json", result.dump(1) + "\n");
+EfficiencyResult efficiency(const fs::path& project, const fs::path& directory) {
+  EfficiencyResult result = Efficiency(project, directory).run();
+  write_file(directory / "efficiency.json", to_json(result).dump(1) + "\n");
   return result;
 }
 
-std::string efficiency_table(const json& result) {
-  const auto cell = [](const json& errors, const std::string& name) {
-    if (!errors.contains(name) || errors.at(name).is_null()) return fmt::format("{:>13}", "-");
-    return fmt::format("{:>13.3g}", errors.at(name).get<double>());
+std::string efficiency_table(const EfficiencyResult& result) {
+  const auto cell = [](const EfficiencyPoint& point, const std::string& name) {
+    const auto found = point.percent_rated.find(name);
+    if (found == point.percent_rated.end() || !found->second) return fmt::format("{:>13}", "-");
+    return fmt::format("{:>13.3g}", *found->second);
   };
   std::string out = "test error, % of rated, mean of the joints\n   seconds  slow";
   for (const std::string& name : methods) out += fmt::format("{:>13}", name);
-  for (const char* part : {"curve", "mix"}) {
+  for (const auto* part : {&result.curve, &result.mix}) {
     out += "\n";
-    for (const json& point : result.at(part)) {
-      out += fmt::format("{:>10g} {:>4.0f} %", point.at("seconds").get<double>(),
-                         100 * point.at("slow_share").get<double>());
-      for (const std::string& name : methods) out += cell(point.at("percent_rated"), name);
-      if (point.contains("failed")) out += "  -: " + point.at("failed").get<std::string>();
+    for (const EfficiencyPoint& point : *part) {
+      out += fmt::format("{:>10g} {:>4.0f} %", point.seconds, 100 * point.slow_share);
+      for (const std::string& name : methods) out += cell(point, name);
+      if (!point.failed.empty()) out += "  -: " + point.failed;
       out += "\n";
     }
   }

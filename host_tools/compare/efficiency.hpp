@@ -1,8 +1,9 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
+
+#include "host_tools/report/efficiency_result.hpp"
 
 namespace fxdyn {
 
@@ -14,9 +15,9 @@ namespace fxdyn {
 /// Logs that are cut lose the filter's edges like others. Methods that choose by validate logs (mlp, bls_physical) have
 /// all of them whatever S is, the structural ones need none. Errors as in compare().
 /// @throws DataError: no test or validate log, no slow or no fast train log
-nlohmann::json efficiency(const std::filesystem::path& project, const std::filesystem::path& directory);
+EfficiencyResult efficiency(const std::filesystem::path& project, const std::filesystem::path& directory);
 
 /// For the terminal.
-std::string efficiency_table(const nlohmann::json& result);
+std::string efficiency_table(const EfficiencyResult& result);
 
 }  // namespace fxdyn

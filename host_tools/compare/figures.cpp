@@ -5,8 +5,8 @@
 #include <cmath>
 #include <functional>
 
+#include "host_tools/page/comparison_plots.hpp"
 #include "host_tools/page/plot.hpp"
-#include "host_tools/report/comparison_plots.hpp"
 #include "host_tools/support/files.hpp"
 
 namespace fxdyn {

@@ -26,7 +26,7 @@ struct ComparedLog {
   Eigen::MatrixXd train_q;
 };
 
-/// Draws comparison_plots (report/comparison_plots.hpp), as far as the methods are there; earlier ones are removed.
+/// Draws comparison_plots (page/comparison_plots.hpp), as far as the methods are there; earlier ones are removed.
 /// @throws InputError where gnuplot is missing or fails
 void write_comparison_plots(const ComparedLog& log, const std::filesystem::path& directory);
 

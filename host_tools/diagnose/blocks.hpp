@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "host_tools/diagnose/session_log.hpp"
+#include "host_tools/regression/split.hpp"
 
 namespace fxdyn::diagnosis {
 
@@ -14,11 +15,6 @@ struct Block {
   bool healthy = false, fits = true;
 };
 
-/// Places in Blocks::all.
-struct Fold {
-  std::vector<std::size_t> fit, judge;
-};
-
 /// The rows of all logs, one after the other, as blocks and folds. With validate logs there is one fold, which they
 /// judge, and a block is a log. Else today's logs are cut: a fold is a part of each of them, judged by a fit of all
 /// others. A whole log left out would ask the others for what their motion does not show.
@@ -26,7 +22,7 @@ struct Blocks {
   std::vector<Block> all;
   std::vector<Block> of_log;     ///< by log: all of its rows
   std::vector<std::size_t> fit;  ///< blocks that fit coefficients
-  std::vector<Fold> folds;
+  std::vector<Fold> folds;       ///< places in `all`
 
   Eigen::Index rows() const { return of_log.back().first + of_log.back().count; }
   /// Blocks of one session that fit.

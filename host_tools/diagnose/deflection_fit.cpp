@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/regression/dataset.hpp"
+#include "host_tools/regression/gauss_newton.hpp"
 #include "host_tools/regression/solver.hpp"
 
 namespace fxdyn::diagnosis {
@@ -89,7 +91,7 @@ Moved move_load(const DeflectionRows& start, const VectorXd& a, const Deflection
   if (rows.z().size() == 0 || !any_bends(from)) return best;
   const Index directions = rows.z().size();
   double cost = -from.score + rows.z().squaredNorm();
-  for (int round = 0; round < most_rounds; ++round) {
+  const auto step_of = [&](const VectorXd& here, int round) -> std::optional<VectorXd> {
     const MatrixXd own = design(rows, best.set.parts);
     const Index first = own.cols();
     VectorXd theta = VectorXd::Zero(first);
@@ -104,25 +106,22 @@ Moved move_load(const DeflectionRows& start, const VectorXd& a, const Deflection
     const VectorXd free = (1 + gram.diagonal().tail(directions).array() / best.set.noise).log();
     best.score = -cost - free.sum();
     best.z = rows.z();
-    if (round == most_rounds - 1) break;
+    if (round == most_rounds - 1) return {};
     gram.diagonal().tail(directions).array() += best.set.noise;
-    const VectorXd here = rows.z(), step = SymmetricSolver(gram).solve(right).tail(directions) - here;
-    bool better = false;
-    for (double share = 1; share > 0.05 && !better; share *= 0.4) {
-      rows.move(here + share * step);
-      DeflectionSet set = best.set;
-      fit(rows, a, set);
-      tune(rows, a, set, round == 0);
-      const double now = -set.score + rows.z().squaredNorm();
-      better = now < cost - 0.5;
-      if (!better) continue;
-      best.set = std::move(set);
-      cost = now;
-    }
-    if (better) continue;
-    rows.move(here);
-    break;
-  }
+    return SymmetricSolver(gram).solve(right).tail(directions) - here;
+  };
+  const auto accept = [&](const VectorXd& there, int round) {
+    rows.move(there);
+    DeflectionSet set = best.set;
+    fit(rows, a, set);
+    tune(rows, a, set, round == 0);
+    const double now = -set.score + rows.z().squaredNorm();
+    if (!(now < cost - 0.5)) return false;
+    best.set = std::move(set);
+    cost = now;
+    return true;
+  };
+  gauss_newton(rows.z(), {.most_rounds = most_rounds}, step_of, accept);
   return best;
 }
 

@@ -8,8 +8,8 @@
 #include <numeric>
 
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/page/diagnosis_plot.hpp"
 #include "host_tools/page/plot.hpp"
-#include "host_tools/report/diagnosis_plot.hpp"
 #include "host_tools/signals/spectrum.hpp"
 #include "host_tools/support/files.hpp"
 

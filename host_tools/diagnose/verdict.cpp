@@ -10,7 +10,6 @@
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
-#include "host_tools/excite/sight.hpp"
 #include "host_tools/support/parallel.hpp"
 #include "model/effects/gravity_compensator.hpp"
 #include "model/effects/gravity_tilt.hpp"

@@ -104,6 +104,13 @@ bool has_constant() {
   return false;
 }
 
+/// Base parameters too are confused with effects.
+const EffectTraits& traits_of(std::string_view name) {
+  static constexpr EffectTraits of_base{.words = "inertia of the links",
+                                        .experiments = {experiments::hopeless, experiments::wide_range_or_baseline}};
+  return name == base_parameters_name ? of_base : *find_effect(name);
+}
+
 }  // namespace
 
 const std::vector<EffectInfo>& effect_infos() {
@@ -168,6 +175,12 @@ const std::vector<std::string>& nominal_effects() {
   return names;
 }
 
+std::vector<std::string> nominal_effects_and(std::initializer_list<std::string_view> others) {
+  std::vector<std::string> names = nominal_effects();
+  names.insert(names.end(), others.begin(), others.end());
+  return names;
+}
+
 std::vector<std::string_view> identified_effects() {
   std::vector<const EffectInfo*> found;
   for (const EffectInfo& info : effect_infos()) {
@@ -186,6 +199,16 @@ std::string_view telling_experiment(const EffectTraits& a, const EffectTraits& b
     if (b.named_experiment(own) && (best.text.empty() || own.order < best.order)) best = own;
   }
   return best.text;
+}
+
+std::string cure(std::string_view e, std::string_view f) {
+  const EffectTraits &one = traits_of(e), &other = traits_of(f);
+  if (const std::string_view telling = telling_experiment(one, other); !telling.empty()) return std::string(telling);
+  if (e == base_parameters_name || f == base_parameters_name)
+    return "the same motions recorded without it (role = \"baseline\"), or inertias known beforehand";
+  const bool couples =
+      one.named_experiment(experiments::one_at_a_time) || other.named_experiment(experiments::one_at_a_time);
+  return std::string((couples ? experiments::one_at_a_time : experiments::all_poses).text);
 }
 
 bool in_base(std::string_view effect) { return find_effect(effect)->in_base; }

@@ -21,7 +21,7 @@ struct EffectInfo : EffectTraits {
   bool has_constant;  ///< one of its phi is 1
   /// Bends under the load: acts on the position and needs the rigid-body torque.
   bool bends() const { return acts_on == ActsOn::position && needs_structural; }
-  /// Tells a rotor from the base parameters: it follows the load without the rotor's own inertia.
+  /// Separates a rotor from the base parameters: it follows the load without the rotor's own inertia.
   bool separates_rotor() const { return needs_structural; }
   /// Its wavenumber comes from a spectrum.
   bool of_spectrum() const { return !shape.empty() && shape[0].values.search == ShapeSearch::spectrum; }
@@ -41,9 +41,17 @@ std::vector<std::string_view> joint_effect_names();
 /// Names of those that every joint has, and of those that `identify` adds by itself, in its order.
 const std::vector<std::string>& nominal_effects();
 std::vector<std::string_view> identified_effects();
+/// The nominal effects and then these.
+std::vector<std::string> nominal_effects_and(std::initializer_list<std::string_view> others);
 
-/// The motion that tells two effects apart: the first that both name, empty if there is none.
+/// The motion that separates two effects: the first that both name, empty if there is none.
 std::string_view telling_experiment(const EffectTraits& a, const EffectTraits& b);
+
+/// What effects are confused with beside each other.
+inline constexpr std::string_view base_parameters_name = "base parameters";
+
+/// Which experiment would separate two effects, or an effect from `base_parameters_name`: from their traits alone.
+std::string cure(std::string_view e, std::string_view f);
 
 /// Whether base parameters may hold this effect of the joint, or it drifts.
 bool in_base(std::string_view effect);

@@ -120,15 +120,6 @@ EffectFit to_effect(const json& j) {
   return fit;
 }
 
-Formats to_formats(const json& j) {
-  Formats formats;
-  for (std::size_t i = 0; i < quantity_count; ++i) formats.quantity[i] = j.at(std::string(quantity_names[i]));
-  formats.force_sum = j.at("force_sum");
-  formats.torque_sum = j.at("torque_sum");
-  formats.deflection_sum = j.at("deflection_sum");
-  return formats;
-}
-
 json logs_json(const std::vector<LogReference>& logs) {
   json out = json::array();
   for (const LogReference& log : logs) {
@@ -295,6 +286,15 @@ json flexible_json(const FlexibleJoint& flexible, const Robot& robot) {
   return out;
 }
 
+Formats formats_of(const json& j) {
+  Formats formats;
+  for (std::size_t i = 0; i < quantity_count; ++i) formats.quantity[i] = j.at(std::string(quantity_names[i]));
+  formats.force_sum = j.at("force_sum");
+  formats.torque_sum = j.at("torque_sum");
+  formats.deflection_sum = j.at("deflection_sum");
+  return formats;
+}
+
 json formats_json(const Formats& formats) {
   json out;
   for (std::size_t i = 0; i < quantity_count; ++i) out[std::string(quantity_names[i])] = formats.quantity[i];
@@ -363,6 +363,11 @@ json to_json(const IdentifiedModel& model) {
   return out;
 }
 
+const Robot& robot_of(const IdentifiedModel& model) { return model.robot; }
+const std::vector<JointFit>& joints_of(const IdentifiedModel& model) { return model.joints; }
+const std::vector<EffectFit>& body_of(const IdentifiedModel& model) { return model.body; }
+double tick_of(const IdentifiedModel& model) { return model.tick_s; }
+
 IdentifiedModel read_model(const std::filesystem::path& file) {
   const std::string text = read_file(file);
   try {
@@ -405,7 +410,7 @@ IdentifiedModel read_model(const std::filesystem::path& file) {
     if (j.contains("session")) model.session = {j.at("session").at("start_s"), j.at("session").at("end_s")};
     model.notes = j.value("notes", std::vector<std::string>{});
     if (j.contains("formats")) {
-      model.formats = to_formats(j.at("formats"));
+      model.formats = formats_of(j.at("formats"));
       model.tables_crc = j.at("tables_crc");
     }
     model.lineage = {j.value("origin", 0U), j.value("sequence", 0U)};

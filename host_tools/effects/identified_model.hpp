@@ -7,8 +7,11 @@
 #include <vector>
 
 #include "host_tools/effects/filter_fit.hpp"
+#include "host_tools/effects/formats_json.hpp"
 #include "host_tools/effects/joint_fit.hpp"
+#include "host_tools/effects/lineage.hpp"
 #include "host_tools/effects/log_reference.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/numbers/formats.hpp"
 #include "host_tools/robot/robot.hpp"
 #include "host_tools/signals/log.hpp"
@@ -29,12 +32,6 @@ struct BaseParameter {
 struct TableLayout {
   std::vector<unsigned> parameters;  ///< per link, bit k: inertial parameter k is computed, else it is zero
   std::vector<int> node_bits;        ///< per joint: fractional bits of the BLS's node coefficients; 0 without one
-};
-
-/// Which page of tables is newer than which (model/table_page.hpp). No clock: the same input makes the same bytes.
-struct Lineage {
-  std::uint32_t origin = 0;    ///< CRC-32 of the parameters that the first export wrote
-  std::uint32_t sequence = 0;  ///< 0: not exported yet
 };
 
 /// When the robot ran, by the logs' own time stamps: what drifts has done so since the start.
@@ -79,11 +76,8 @@ struct IdentifiedModel {
   }
 };
 
-nlohmann::json to_json(const IdentifiedModel& model);
 /// "flexible" of a joint in model.json.
 nlohmann::json flexible_json(const FlexibleJoint& joint, const Robot& robot);
-/// Formats as in model.json and export.json.
-nlohmann::json formats_json(const Formats& formats);
 /// @throws InputError naming the file and the missing or wrong key.
 IdentifiedModel read_model(const std::filesystem::path& file);
 

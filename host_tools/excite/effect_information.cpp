@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "host_tools/effects/effects.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/parallel.hpp"
 
@@ -51,7 +51,7 @@ void Information::add_blocks(const IdentifiedModel& nominal, const std::vector<M
     torque.push_back(c.torque());
     structural.push_back(c.structural());
   }
-  const std::size_t n = nominal.robot.size();
+  const std::size_t n = robot_of(nominal).size();
   Index at = base;
   const auto add = [&](std::string_view effect, std::size_t joint, std::vector<double> shape) {
     const EffectInfo& info = *find_effect(effect);
@@ -70,7 +70,7 @@ void Information::add_blocks(const IdentifiedModel& nominal, const std::vector<M
   for (const EffectInfo& info : effect_infos()) {
     if (info.nominal || info.unites_others()) continue;  // what shows those shows it
     for (std::size_t j = 0; j < (info.acts_on == ActsOn::body ? 1 : n); ++j) {
-      for (const auto& shape : typical_shapes(info.name, j, nominal.robot, motions, torque, structural))
+      for (const auto& shape : typical_shapes(info.name, j, robot_of(nominal), motions, torque, structural))
         add(info.name, j, shape);
     }
   }
@@ -87,7 +87,7 @@ Information::Information(const IdentifiedModel& nominal, const std::vector<Motio
 
   std::vector<RobotColumns> columns;
   for (const Motion& motion : motions) columns.emplace_back(nominal, motion);
-  const DhChain chain = to_dh(nominal.robot);
+  const DhChain chain = to_dh(robot_of(nominal));
   const BaseSet base_set = find_base(chain);
   base = static_cast<Index>(base_set.columns.size());
   add_blocks(nominal, motions, columns);

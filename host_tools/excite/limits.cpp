@@ -59,7 +59,7 @@ MotionLimits motion_limits(const Project& project) {
     out.velocity[j] = given.velocity.empty() ? urdf.velocity : given.velocity[i];
     if (!(out.velocity[j] > 0)) fail("no velocity limit", "velocity");
     out.acceleration[j] = given.acceleration.empty() ? out.velocity[j] / ramp_s : given.acceleration[i];
-    // Too slow to go anywhere in a period: the plan would take hours, and tell nothing of the joint.
+    // Too slow to go anywhere in a period: the plan would take hours, and show nothing of the joint.
     const double least = 0.02 * (out.upper[j] - out.lower[j]), period = project.excite.period_s;
     const auto too_slow = [&](const char* key, double value, const char* per) {
       throw InputError(

@@ -77,7 +77,7 @@ class LimitCheck {
   std::vector<Eigen::Index> moving_;      ///< points that move at all
 };
 
-/// The model that tells the torque: directory/model.json, else the URDF's inertias, else none. Notes say which.
+/// The model that predicts the torque: directory/model.json, else the URDF's inertias, else none. Notes say which.
 /// @throws InputError where model.json is of another robot.
 std::optional<IdentifiedModel> torque_model(const Project& project, const std::filesystem::path& directory,
                                             std::vector<std::string>& notes);

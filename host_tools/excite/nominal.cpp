@@ -114,11 +114,15 @@ NominalModel nominal_from_urdf(const Robot& robot, const std::vector<double>& ra
     out.assumptions.push_back(fmt::format("{} links of the URDF have no inertia and count as massless", missing));
   }
   for (std::size_t j = 0; j < n; ++j) {
-    const double friction = friction_share * rated_torque[j];
-    for (const auto& [effect, value] : {std::pair{"viscous", friction / velocity[j]}, {"coulomb", friction}}) {
+    JointSeries fastest;
+    fastest.q = fastest.ddq = Eigen::VectorXd::Zero(1);
+    fastest.dq = Eigen::VectorXd::Constant(1, velocity[j]);
+    for (const EffectInfo& info : effect_infos()) {
+      if (!info.nominal || !info.friction || info.has_constant) continue;  // an offset may have either sign
+      const double phi = effect_columns(info.name, {}, model.joints[j].sign_width, fastest)(0, 0);
       EffectFit fit;
-      fit.effect = effect;
-      fit.linear = {value};
+      fit.effect = info.name;
+      fit.linear = {friction_share * rated_torque[j] / phi};
       model.joints[j].effects.push_back(std::move(fit));
     }
   }

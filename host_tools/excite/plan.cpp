@@ -220,7 +220,7 @@ class Planner {
 
   double value(const MatrixXd& information, double determinant_weight) const {
     const Conditioning c = conditioning(information);
-    // A plan that can't tell a parameter still compares with another one.
+    // A plan that can't determine a parameter still compares with another one.
     const auto log_of = [](double condition) { return std::min(std::log(condition), 40.0); };
     const double determinant = std::max(c.log_determinant / static_cast<double>(columns_.size()), -100.0);
     return log_of(c.base) + all_weight * log_of(c.all) - determinant_weight * determinant;

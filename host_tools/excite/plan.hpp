@@ -51,7 +51,7 @@ inline constexpr int random_plans = 100;
 /// the largest log det of the information and the smallest scaled condition number. The same seed gives the same plan.
 /// `directory`: where model.json may be.
 /// @throws InputError: limits that no pose meets, naming limit and joint. DataError: parameters that the best plan
-/// can't tell, naming them and the joint to move.
+/// can't determine, naming them and the joint to move.
 Plan make_plan(const Project& project, const std::filesystem::path& directory, Progress& progress);
 
 }  // namespace fxdyn

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "host_tools/effects/effects.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/excite/effect_information.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/parallel.hpp"
@@ -22,7 +22,6 @@ using Eigen::VectorXd;
 /// rho^2 below which nothing is left of a direction.
 constexpr double nothing_left = 1e-5;
 constexpr double confused_from = 0.95;
-constexpr std::string_view base_parameters = "base parameters";
 /// Smallest effect that still counts as seen, share of rated torque.
 constexpr double seen_below = 0.005;
 /// Eigenvalues of a normalised information matrix below this count as zero.
@@ -117,29 +116,8 @@ double correlation(const MatrixXd& e, const MatrixXd& f, const MatrixXd& between
   return std::min(1.0, std::sqrt((e.transpose() * between * f).squaredNorm() / static_cast<double>(e.cols())));
 }
 
-/// Base parameters too are confused with effects.
-const EffectTraits& traits_of(std::string_view name) {
-  static constexpr EffectTraits of_base{.words = "inertia of the links",
-                                        .experiments = {experiments::hopeless, experiments::wide_range_or_baseline}};
-  return name == base_parameters ? of_base : *find_effect(name);
-}
-
-}  // namespace
-
-std::string cure(const std::string& e, const std::string& f) {
-  const EffectTraits &one = traits_of(e), &other = traits_of(f);
-  if (const std::string_view telling = telling_experiment(one, other); !telling.empty()) return std::string(telling);
-  if (e == base_parameters || f == base_parameters)
-    return "the same motions recorded without it (role = \"baseline\"), or inertias known beforehand";
-  const bool couples =
-      one.named_experiment(experiments::one_at_a_time) || other.named_experiment(experiments::one_at_a_time);
-  return std::string((couples ? experiments::one_at_a_time : experiments::all_poses).text);
-}
-
-namespace {
-
 void check(const IdentifiedModel& nominal, const std::vector<Motion>& motions, const SightSettings& settings) {
-  const auto n = static_cast<Index>(nominal.robot.size());
+  const auto n = static_cast<Index>(robot_of(nominal).size());
   if (motions.empty()) throw InputError("no motion to judge");
   if (settings.noise.size() != n || !(settings.noise.minCoeff() > 0))
     throw InputError(fmt::format("torque noise: expected {} positive values, one a joint", n));
@@ -156,8 +134,8 @@ void check(const IdentifiedModel& nominal, const std::vector<Motion>& motions, c
       throw InputError(fmt::format("motion '{}': expected {} joints with q, dq and ddq", motion.name, n));
     }
   }
-  for (std::size_t j = 0; j < nominal.joints.size(); ++j) {
-    if (!(nominal.joints[j].rated_torque > 0))
+  for (std::size_t j = 0; j < joints_of(nominal).size(); ++j) {
+    if (!(joints_of(nominal)[j].rated_torque > 0))
       throw InputError(fmt::format("joint {}: its rated torque is not known", j + 1));
   }
 }
@@ -186,9 +164,9 @@ class Judge {
 
 Judge::Judge(const IdentifiedModel& nominal, const Information& information, double threshold)
     : info_(information), threshold_(threshold) {
-  rated_.resize(static_cast<Index>(nominal.joints.size()));
-  for (std::size_t j = 0; j < nominal.joints.size(); ++j)
-    rated_[static_cast<Index>(j)] = nominal.joints[j].rated_torque;
+  rated_.resize(static_cast<Index>(joints_of(nominal).size()));
+  for (std::size_t j = 0; j < joints_of(nominal).size(); ++j)
+    rated_[static_cast<Index>(j)] = joints_of(nominal)[j].rated_torque;
   const Index base = info_.base;
   const Block& last = info_.blocks[info_.nominal_blocks - 1];
   nominal_columns_ = columns_from(0, last.first + last.count);
@@ -197,7 +175,7 @@ Judge::Judge(const IdentifiedModel& nominal, const Information& information, dou
   const auto all = nominal_columns_;
   const auto inertia = columns_from(0, base), friction = columns_from(base, last.first + last.count - base);
   after_base_ = schur(g, g.topRows(base), g.topLeftCorner(base, base));
-  // A healthy recording of the same motions tells the base parameters, its friction fitted apart.
+  // A healthy recording of the same motions determines the base parameters, its friction fitted apart.
   MatrixXd nuisance = g(all, all);
   nuisance.topLeftCorner(base, base) += schur(g(inertia, inertia), g(friction, inertia), g(friction, friction));
   after_healthy_ = schur(g, g(all, Eigen::all), nuisance);
@@ -270,7 +248,7 @@ EffectSight Judge::effect(std::string_view name, std::optional<std::size_t> join
   // What no column of a joint's friction is needed for, the base parameters take.
   const auto here = columns_from(typical.first, typical.count);
   const Directions alone = directions(info_.gram(here, here), after_base_(here, here));
-  if (alone.square.size() > 0) note(std::string(base_parameters), std::sqrt(1 - alone.square.mean()));
+  if (alone.square.size() > 0) note(std::string(base_parameters_name), std::sqrt(1 - alone.square.mean()));
   for (std::size_t b = 0; b < info_.blocks.size(); ++b) {
     const Block& other = info_.blocks[b];
     if (other.candidate.effect == name) continue;
@@ -304,9 +282,9 @@ Sight see(const IdentifiedModel& nominal, const std::vector<Motion>& motions, co
           Progress& progress) {
   check(nominal, motions, settings);
   const Information information(nominal, motions, settings.noise, settings.torque_cutoff_hz, progress);
-  const double known = static_cast<double>(nominal.robot.size()) * information.independent_samples;
+  const double known = static_cast<double>(robot_of(nominal).size()) * information.independent_samples;
   const double asked =
-      static_cast<double>(information.base) + static_cast<double>(nominal_effects().size() * nominal.robot.size());
+      static_cast<double>(information.base) + static_cast<double>(nominal_effects().size() * robot_of(nominal).size());
   if (known < 2 * asked) {
     throw DataError(
         fmt::format("{:.2f} s of motion hold {:.0f} independent torques for {:.0f} nominal parameters: plan "
@@ -315,14 +293,14 @@ Sight see(const IdentifiedModel& nominal, const std::vector<Motion>& motions, co
   }
   const Judge judge(nominal, information, settings.threshold);
   Sight sight;
-  sight.robot = nominal.robot;
+  sight.robot = robot_of(nominal);
   sight.torque_cutoff_hz = information.filter.torque_cutoff_hz;
   sight.threshold = settings.threshold;
   sight.seconds = information.seconds;
   sight.independent_samples = information.independent_samples;
   sight.noise = information.noise;
   for (Index j = 0; j < sight.noise.size(); ++j)
-    sight.noise[j] /= nominal.joints[static_cast<std::size_t>(j)].rated_torque;
+    sight.noise[j] /= joints_of(nominal)[static_cast<std::size_t>(j)].rated_torque;
   std::vector<std::pair<std::string_view, std::optional<std::size_t>>> questions;
   for (const Block& block : information.blocks) {
     const auto joint = block.on_body ? std::nullopt : std::optional(block.candidate.joint);

@@ -30,12 +30,12 @@ struct Visibility {
   /// Smallest effect found: RMS of its unfiltered torque over the motions at the joint that feels it most, share of
   /// rated torque.
   double smallest = std::numeric_limits<double>::infinity();
-  std::vector<double> parameters{};  ///< smallest value of each column's parameter alone; infinite: can't be told
+  std::vector<double> parameters{};  ///< smallest value of each column's parameter alone; infinite: not identifiable
 };
 
 /// Another effect that looks the same once the nominal model has taken its part.
 struct Confusion {
-  std::string effect;  ///< or "base parameters"
+  std::string effect;  ///< or `base_parameters_name` (effects.hpp)
   double correlation =
       0;             ///< multiple correlation: share (RMS) of what is left of this effect that the other one can take
   std::string cure;  ///< what would separate the two
@@ -53,7 +53,7 @@ struct EffectSight {
   std::string effect;
   std::optional<std::size_t> joint;  ///< index from 0; none: the robot as a whole
   SightVerdict verdict = SightVerdict::not_identifiable;
-  Visibility typical, worst;          ///< over the shapes of typical_shapes() (information.hpp)
+  Visibility typical, worst;          ///< over the shapes of typical_shapes() (effect_information.hpp)
   std::optional<Visibility> healthy;  ///< with a recording of the same motions from when the effect was not there
   std::vector<Confusion> confused;    ///< correlation >= 0.95, largest first
 };
@@ -79,15 +79,12 @@ struct Sight {
 Sight see(const IdentifiedModel& nominal, const std::vector<Motion>& motions, const SightSettings& settings,
           Progress& progress);
 
-/// Which experiment would tell two effects (or "base parameters") apart.
-std::string cure(const std::string& e, const std::string& f);
-
 /// The key "sight" of excite.json: percent of rated torque, correlations, shapes and parameters with units; a value
 /// that can't be reached is null.
 nlohmann::json sight_json(const Sight& sight, const std::vector<std::string>& assumptions = {});
 
 /// For the terminal, at most 100 characters wide: one row an effect with its best and worst joint, then what can't be
-/// told apart and what would help.
+/// separated and what would help.
 std::string sight_table(const Sight& sight, const std::vector<std::string>& assumptions = {});
 
 }  // namespace fxdyn

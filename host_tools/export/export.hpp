@@ -8,14 +8,21 @@
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/forward.hpp"
 #include "host_tools/regression/dataset.hpp"
+#include "host_tools/signals/motion.hpp"
 
 namespace fxdyn {
 
-/// States of a log at the drive's ticks (linear interpolation of the filtered motion), samples x joints.
-struct TickStates {
+/// States of a log at the drive's ticks (linear interpolation of the filtered motion).
+struct TickStates : MotionRows {
   std::string name;
-  Eigen::VectorXd t;
-  Eigen::MatrixXd q, dq, ddq;
+  Eigen::VectorXd t;  ///< [s]
+
+  TickStates() = default;
+  TickStates(std::string named, Eigen::VectorXd times, Eigen::MatrixXd position, Eigen::MatrixXd velocity,
+             Eigen::MatrixXd acceleration)
+      : MotionRows{std::move(position), std::move(velocity), std::move(acceleration)},
+        name(std::move(named)),
+        t(std::move(times)) {}
 };
 /// `whole`: with the edges that the filters disturb, which figures leave out.
 TickStates at_ticks(const ProcessedLog& log, double tick_s, bool whole = false);

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "host_tools/effects/effects.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/export/proof.hpp"
 #include "host_tools/numbers/bounded.hpp"
@@ -67,7 +67,7 @@ Formats lowered(Formats formats, const IdentifiedModel& model, const Ranges& ran
 
   // Every partial sum of a joint's contributions, bounded by the sum of the magnitudes.
   double torque_sum = 0, deflection_sum = 0;
-  for (const JointFit& joint : model.joints) {
+  for (const JointFit& joint : joints_of(model)) {
     double torque = ranges[Q::torque], deflection = 0;
     for (const EffectFit& fit : joint.effects) {
       const EffectInfo& info = *find_effect(fit.effect);
@@ -111,8 +111,8 @@ Formats formats_for(const IdentifiedModel& model, const Ranges& ranges) {
   formats.force_sum = formats.torque_sum = formats.deflection_sum = std::numeric_limits<int>::max();
   formats = lowered(formats, model, ranges, room_for_updates);
   int least = formats[Q::torque];
-  for (std::size_t j = 0; j < model.joints.size(); ++j) {
-    if (model.joints[j].bls) least = std::max(least, node_bits(model, j) + small_bits);
+  for (std::size_t j = 0; j < joints_of(model).size(); ++j) {
+    if (joints_of(model)[j].bls) least = std::max(least, node_bits(model, j) + small_bits);
   }
   if (formats.torque_sum < least || formats.deflection_sum < formats[Q::position]) {
     throw DataError(
@@ -170,7 +170,7 @@ TickStates perturbed(const TickStates& states, const IdentifiedModel& model, std
   Random random(seed);
   for (Eigen::Index k = 0; k < out.t.size(); ++k) {
     for (Eigen::Index j = 0; j < out.q.cols(); ++j) {
-      const JointFit& joint = model.joints[static_cast<std::size_t>(j)];
+      const JointFit& joint = joints_of(model)[static_cast<std::size_t>(j)];
       const double spike = random.uniform() < 0.01 ? 200 : 1;
       out.q(k, j) += 0.01 * spike * (joint.q_upper - joint.q_lower) * random.normal();
       out.dq(k, j) += 0.01 * spike * joint.dq_limit * random.normal();
@@ -182,12 +182,12 @@ TickStates perturbed(const TickStates& states, const IdentifiedModel& model, std
 
 TickStates within_limits(const IdentifiedModel& model, Eigen::Index count, std::uint64_t seed) {
   Random random(seed);
-  const auto n = static_cast<Eigen::Index>(model.joints.size());
-  TickStates s{"random", Eigen::VectorXd::LinSpaced(count, 0, model.tick_s * static_cast<double>(count - 1)),
+  const auto n = static_cast<Eigen::Index>(joints_of(model).size());
+  TickStates s{"random", Eigen::VectorXd::LinSpaced(count, 0, tick_of(model) * static_cast<double>(count - 1)),
                Eigen::MatrixXd(count, n), Eigen::MatrixXd(count, n), Eigen::MatrixXd(count, n)};
   for (Eigen::Index k = 0; k < count; ++k) {
     for (Eigen::Index j = 0; j < n; ++j) {
-      const JointFit& joint = model.joints[static_cast<std::size_t>(j)];
+      const JointFit& joint = joints_of(model)[static_cast<std::size_t>(j)];
       const auto share = [&] { return k % 2 == 0 ? (random.uniform() < 0.5 ? -1.0 : 1.0) : random.uniform(-1, 1); };
       s.q(k, j) = random.uniform(joint.q_lower, joint.q_upper);
       s.dq(k, j) = joint.dq_limit * share() * (random.uniform() < 0.1 ? 1e-4 : 1);
@@ -200,11 +200,11 @@ TickStates within_limits(const IdentifiedModel& model, Eigen::Index count, std::
 TickStates creeping(const IdentifiedModel& model, const Formats& formats) {
   constexpr Eigen::Index run_up = 500;
   const Eigen::Index count = run_up + static_cast<Eigen::Index>(creeping_ticks);
-  const auto n = static_cast<Eigen::Index>(model.joints.size());
-  TickStates s{"creeping", Eigen::VectorXd::LinSpaced(count, 0, model.tick_s * static_cast<double>(count - 1)),
+  const auto n = static_cast<Eigen::Index>(joints_of(model).size());
+  TickStates s{"creeping", Eigen::VectorXd::LinSpaced(count, 0, tick_of(model) * static_cast<double>(count - 1)),
                Eigen::MatrixXd(count, n), Eigen::MatrixXd(count, n), Eigen::MatrixXd::Zero(count, n)};
   for (Eigen::Index j = 0; j < n; ++j) {
-    const JointFit& joint = model.joints[static_cast<std::size_t>(j)];
+    const JointFit& joint = joints_of(model)[static_cast<std::size_t>(j)];
     s.q.col(j).setConstant((joint.q_lower + joint.q_upper) / 2);
     s.dq.col(j).setConstant(from_raw(1, formats[Quantity::velocity]));
     s.dq.col(j).head(run_up).setConstant(-joint.dq_limit / 2);

@@ -16,9 +16,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// A torque that does not change while its joint covers this share of its range is stuck. A current sensor's step is
-/// seen as often as the friction is even: over a few per cent of the range.
-constexpr double stuck_share = 0.3;
 /// A parabola has three coefficients.
 constexpr Index fewest_given = 3;
 
@@ -38,7 +35,7 @@ void check_length(const Log& raw, Index given) {
   }
 }
 
-void check_torque(const IdentifiedModel& model, const Log& raw) {
+void check_torque(const IdentifiedModel& model, const Log& raw, double stuck_share) {
   for (Index j = 0; j < raw.joints(); ++j) {
     const auto q = raw.q.col(j), tau = raw.tau.col(j);
     const double range = q.maxCoeff() - q.minCoeff();
@@ -112,9 +109,10 @@ MatrixXd driving_torque(const IdentifiedModel& model, const ProcessedLog& log) {
   return lead == 0 ? torque : at_other_times(torque, -lead);
 }
 
-Forward simulate_forward(const IdentifiedModel& model, const Log& raw, const ProcessedLog& log, Index given) {
+Forward simulate_forward(const IdentifiedModel& model, const Log& raw, const ProcessedLog& log, Index given,
+                         const ForwardOptions& options) {
   check_length(raw, given);
-  check_torque(model, raw);
+  check_torque(model, raw, options.stuck_share);
   check_robot(model, log);
   const IdentifiedModel plant = with_load_of(log, model);
   const Index from = given - 1, count = raw.samples() - from;

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <string>
 
+#include "host_tools/forward/options.hpp"
 #include "host_tools/regression/dataset.hpp"
 
 namespace fxdyn {
@@ -31,6 +32,7 @@ struct Forward {
 /// @param given at least 3 and fewer than the log's samples
 /// @throws InputError: too few samples; a torque that stands still while its joint moves; the model explains none of
 /// the torque, so it is another robot's.
-Forward simulate_forward(const IdentifiedModel& model, const Log& raw, const ProcessedLog& log, Eigen::Index given);
+Forward simulate_forward(const IdentifiedModel& model, const Log& raw, const ProcessedLog& log, Eigen::Index given,
+                         const ForwardOptions& options = {});
 
 }  // namespace fxdyn

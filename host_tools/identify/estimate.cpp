@@ -92,8 +92,8 @@ Estimate finish_model(const Fitter& fitter, const Project& project, const GateDa
     solution.beta = out.recursion->solution.beta;
     solution.theta = out.recursion->solution.theta;
   }
-  out.weak = weak_in_logs(fitter, solution, options.structure.worrying_error);
-  // With a joint at rest the bodies on either side of it can't be told apart; that is asked for.
+  out.weak = weak_in_logs(fitter, solution, options.structure);
+  // With a joint at rest the bodies on either side of it can't be separated; that is asked for.
   if (data.logs.front().left_out.empty()) check_identifiable(out.weak, project.robot);
   const Solution essential = essential_parameters(solution, equations);
   if (settings.physical) {

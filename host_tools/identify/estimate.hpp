@@ -11,7 +11,7 @@ namespace fxdyn {
 struct Estimate : FitFigures {
   IdentifiedModel model;  ///< with everything that model.json records
 };
-/// @throws DataError: the train logs tell nothing of some base parameters; names them and the joint to move.
+/// @throws DataError: the train logs say nothing about some base parameters; names them and the joint to move.
 Estimate finish_model(const Fitter& fitter, const Project& project, const GateData& data,
                       const IdentifyOptions& options = {});
 

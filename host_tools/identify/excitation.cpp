@@ -11,7 +11,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-std::vector<WeakParameter> weak_in_logs(const Fitter& fitter, const Solution& solution, double above) {
+std::vector<WeakParameter> weak_in_logs(const Fitter& fitter, const Solution& solution,
+                                        const StructureOptions& options) {
   const auto n = static_cast<Index>(fitter.joints());
   const auto& columns = fitter.base().columns;
   const auto nb = static_cast<Index>(columns.size());
@@ -55,14 +56,14 @@ std::vector<WeakParameter> weak_in_logs(const Fitter& fitter, const Solution& so
   std::vector<WeakParameter> weak;
   for (Index c = 0; c < nb; ++c) {
     double lost = 0;
-    for (Index k = 0; k < nb && eigen.eigenvalues()[k] < 1e-12; ++k)
+    for (Index k = 0; k < nb && eigen.eigenvalues()[k] < options.no_information; ++k)
       lost += eigen.eigenvectors()(c, k) * eigen.eigenvectors()(c, k);
     const Index column = columns[static_cast<std::size_t>(c)];
     WeakParameter parameter;
     parameter.name = parameter_name(column);
     parameter.error = solution.beta_std[c] * share[c];
-    parameter.identifiable = lost < 0.1;
-    if (parameter.identifiable && parameter.error < above) continue;
+    parameter.identifiable = lost < options.lost;
+    if (parameter.identifiable && parameter.error < options.worrying_error) continue;
     // all joints up to its link move it
     movement.head(column / static_cast<Index>(parameters_per_link) + 1).minCoeff(&parameter.joint);
     weak.push_back(parameter);

@@ -11,7 +11,9 @@
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/regression/gauss_newton.hpp"
 #include "host_tools/regression/regressor.hpp"
+#include "host_tools/regression/sandwich.hpp"
 #include "host_tools/support/parallel.hpp"
 #include "model/effects/backlash.hpp"
 #include "model/effects/eccentricity.hpp"
@@ -38,18 +40,9 @@ LeastSquares least_squares(Eigen::MatrixXd x, const Eigen::VectorXd& y, const st
   out.theta = scale.cwiseProduct(qr.solve(y));
   out.residual = y - x * out.theta;
   out.power = out.residual.squaredNorm() / static_cast<double>(y.size());
-  const Eigen::Index p = x.cols();
-  Eigen::MatrixXd middle = Eigen::MatrixXd::Zero(p, p);
-  Eigen::Index from = 0;
-  for (const Eigen::Index end : ends) {
-    const Eigen::VectorXd sum = unit.middleRows(from, end - from).transpose() * out.residual.segment(from, end - from);
-    middle += sum * sum.transpose();
-    from = end;
-  }
-  const double blocks = static_cast<double>(ends.size()), parameters = static_cast<double>(p);
-  middle *= blocks / std::max(1.0, blocks - parameters);
   const Eigen::MatrixXd inverse = (unit.transpose() * unit).completeOrthogonalDecomposition().pseudoInverse();
-  out.covariance = scale.asDiagonal() * (inverse * middle * inverse) * scale.asDiagonal();
+  out.covariance =
+      scale.asDiagonal() * sandwich(inverse, middle_of_blocks(unit, out.residual, ends)) * scale.asDiagonal();
   out.x = std::move(x);
   return out;
 }
@@ -173,8 +166,8 @@ GearFit fit_gear(const JointData& data, bool with_rotor, const Eigen::MatrixXd& 
   // A load that lags by less than nothing is noise; a little of it is let through, so that the mean is right.
   const double step = data.step_s(), lowest = -0.4 * step, probe = 0.05 * step;
   const Eigen::Index rows = data.deflection().size();
-  for (int round = 0; round < rounds; ++round) {
-    const double r = fit.relaxation;
+  const auto step_of = [&](const Eigen::VectorXd& relaxation, int) -> std::optional<Eigen::VectorXd> {
+    const double r = relaxation[0];
     Eigen::MatrixXd slope = (data.load(r + probe) - data.load(r - probe)) / (2 * probe);
     Eigen::MatrixXd x(rows, 2 + (with_rotor ? 1 : 0) + 1 + others.cols());
     x.col(0) = data.load(r);
@@ -187,11 +180,16 @@ GearFit fit_gear(const JointData& data, bool with_rotor, const Eigen::MatrixXd& 
     fit.least_squares = least_squares(x, data.deflection(), data.block_ends());
     const Eigen::VectorXd& theta = fit.least_squares.theta;
     fit.compliance = theta[0];
-    if (fit.compliance == 0) break;  // no load at all
+    if (fit.compliance == 0) return {};  // no load at all
     if (with_rotor) fit.rotor = -theta[2] / theta[0];
-    fit.relaxation = std::clamp(r + theta[1] / theta[0], lowest, most_relaxation_s);
-    if (std::fabs(fit.relaxation - r) < 1e-6 * step) break;
-  }
+    return Eigen::VectorXd::Constant(1, theta[1] / theta[0]);
+  };
+  const GaussNewton rules{.most_rounds = rounds,
+                          .tolerance = 1e-6 * step,
+                          .lower = Eigen::VectorXd::Constant(1, lowest),
+                          .upper = Eigen::VectorXd::Constant(1, most_relaxation_s)};
+  fit.relaxation = gauss_newton(Eigen::VectorXd::Constant(1, fit.relaxation), rules, step_of,
+                                [](const Eigen::VectorXd&, int) { return true; })[0];
   return fit;
 }
 

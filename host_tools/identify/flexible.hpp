@@ -24,14 +24,14 @@ struct FlexibleInput {
 
 /// K, B and J_eff of every joint that has a link encoder, in chain order. J_eff is the model's `rotor_inertia` where it
 /// has one. On the first joints, where rotor inertia cannot be distinguished from link inertia by torque (it is in the
-/// base parameters), the deflection tells them apart: the rotor's share bends no gear. Standard deviations are those of
+/// base parameters), the deflection separates them: the rotor's share bends no gear. Standard deviations are those of
 /// a residual that is correlated over up to half a second, and of the load by those of the base parameters (taken as
 /// independent, which is mostly too much). Play and a once-a-turn error of the gear or the encoder are taken out where
 /// the data shows them, and noted. A joint that does not bend measurably, or whose load is not known well enough, comes
 /// back with found = false.
 std::vector<FlexibleJoint> identify_flexible(const FlexibleInput& input, const FlexibleOptions& options = {});
 
-/// The same gear as an effect of the model: compliance 1 / K, relaxation B / K (0 where B is not told from 0).
+/// The same gear as an effect of the model: compliance 1 / K, relaxation B / K (0 where B is not significant).
 EffectFit elasticity_effect(const FlexibleJoint& joint, const FlexibleOptions& options = {});
 
 }  // namespace fxdyn

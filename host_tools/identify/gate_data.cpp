@@ -13,11 +13,6 @@
 namespace fxdyn {
 namespace {
 
-/// Of all logs together.
-constexpr double most_rows = 60'000;
-/// Samples from which on memory counts more than time.
-constexpr Eigen::Index long_logs = 1'500'000;
-
 /// What is assumed where the project says nothing.
 void add_notes(const Project& project, std::size_t logs, std::vector<std::string>& notes) {
   if (project.limits.position.empty() || project.limits.velocity.empty() || project.limits.acceleration.empty()) {
@@ -62,7 +57,7 @@ void add_extremes(const ProcessedLog& processed, const Robot& robot, GateData& d
 
 }  // namespace
 
-GateData read_gate_data(const Project& project, const std::filesystem::path& directory) {
+GateData read_gate_data(const Project& project, const std::filesystem::path& directory, const GateOptions& options) {
   if (!project.has_role(Role::train)) {
     throw InputError(project.file.string() + ": no log to learn from; add a [[log]] with role = \"train\"");
   }
@@ -83,16 +78,16 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
   // At one interval for all logs, so that their noise is alike from row to row.
   double seconds = 0;
   for (const Log& log : logs) seconds += log.step_s * static_cast<double>(log.samples());
-  settings.shortest_interval_s = seconds / most_rows;
+  settings.shortest_interval_s = seconds / options.most_rows;
   Eigen::Index samples = 0;
   for (const Log& log : logs) samples += log.samples();
-  most_threads = samples > long_logs ? 1 : threads_allowed();
+  most_threads = static_cast<double>(samples) > options.long_logs ? 1 : threads_allowed();
   for (Log& log : logs) {
     if (log.resampled) {
       data.notes.push_back(
           fmt::format("{}: irregular time stamps, resampled to {:.6g} s", log.file.filename().string(), log.step_s));
     }
-    check_torque(log, project.robot);
+    check_torque(log, project.robot, options);
     data.references.push_back(
         {log.file.filename().string(), to_string(log.role), hash_of_file(log.file), log.from_s, log.to_s});
     data.logs.push_back(process(std::move(log), data.filter, settings));
@@ -101,11 +96,10 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
   return data;
 }
 
-void check_torque(const Log& log, const Robot& robot) {
-  constexpr double parked = 1e-3;  // rad or m; a brake may hold the joint, its drive off
+void check_torque(const Log& log, const Robot& robot, const GateOptions& options) {
   for (Eigen::Index j = 0; j < log.tau.cols(); ++j) {
     if (log.tau.col(j).maxCoeff() > log.tau.col(j).minCoeff()) continue;
-    if (log.q.col(j).maxCoeff() - log.q.col(j).minCoeff() < parked) continue;
+    if (log.q.col(j).maxCoeff() - log.q.col(j).minCoeff() < options.parked) continue;
     throw DataError(fmt::format("{}: torque of joint {} ({}) never changes: check the column and its gain",
                                 log.file.string(), j + 1, robot.joints[static_cast<std::size_t>(j)].name));
   }
@@ -113,18 +107,17 @@ void check_torque(const Log& log, const Robot& robot) {
 
 namespace {
 
-/// Whether a URDF's position limits are the joint's. Placeholders are wider than any gear's hoses (8 turns), or than
-/// ten times what the slide moved.
-bool has_range(const Joint& joint, double moved) {
-  constexpr double widest_turn = 8 * 2 * std::numbers::pi, widest_slide = 10;
+/// Whether a URDF's position limits are the joint's and no placeholders.
+bool has_range(const Joint& joint, double moved, const GateOptions& options) {
+  const double widest_turn = options.widest_turns * 2 * std::numbers::pi;
   const double range = joint.limits->upper - joint.limits->lower;
-  return range > 0 && range <= (joint.type == JointType::revolute ? widest_turn : widest_slide * moved);
+  return range > 0 && range <= (joint.type == JointType::revolute ? widest_turn : options.widest_slide * moved);
 }
 
 }  // namespace
 
-std::vector<JointFit> initial_joints(const Project& project, const GateData& data) {
-  constexpr double margin = 1.2;
+std::vector<JointFit> initial_joints(const Project& project, const GateData& data, const GateOptions& options) {
+  const double margin = options.margin;
   std::vector<JointFit> joints(project.robot.size());
   const LimitSettings& given = project.limits;
   for (std::size_t j = 0; j < joints.size(); ++j) {
@@ -134,7 +127,8 @@ std::vector<JointFit> initial_joints(const Project& project, const GateData& dat
     // A URDF's placeholder limits (1e6 N) would cost resolution for ranges that never occur.
     const auto choose = [&](const std::vector<double>& set, double from_urdf, double measured) {
       if (!set.empty()) return set[j];
-      return urdf && from_urdf > 0 && from_urdf <= 10 * measured ? std::max(from_urdf, measured) : margin * measured;
+      return urdf && from_urdf > 0 && from_urdf <= options.widest_limit * measured ? std::max(from_urdf, measured)
+                                                                                   : margin * measured;
     };
     joint.rated_torque = project.rated_torque.empty() ? data.largest_torque[k] : project.rated_torque[j];
     joint.dq_limit = choose(given.velocity, urdf ? urdf->velocity : 0, data.dq[k]);
@@ -148,12 +142,12 @@ std::vector<JointFit> initial_joints(const Project& project, const GateData& dat
       const double middle = (data.q_lower[k] + data.q_upper[k]) / 2, half = (data.q_upper[k] - data.q_lower[k]) / 2;
       joint.q_lower = middle - margin * half;
       joint.q_upper = middle + margin * half;
-      if (urdf && has_range(project.robot.joints[j], 2 * half)) {
+      if (urdf && has_range(project.robot.joints[j], 2 * half, options)) {
         joint.q_lower = std::min(urdf->lower, data.q_lower[k]);
         joint.q_upper = std::max(urdf->upper, data.q_upper[k]);
       }
     }
-    joint.sign_width = std::max(0.01 * data.dq[k], 1e-6);  // of a joint at rest
+    joint.sign_width = std::max(options.sign_width * data.dq[k], 1e-6);  // of a joint at rest
   }
   return joints;
 }

@@ -8,6 +8,7 @@
 #include "host_tools/effects/filter_fit.hpp"
 #include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/effects/log_reference.hpp"
+#include "host_tools/identify/options.hpp"
 #include "host_tools/project/project.hpp"
 #include "host_tools/regression/dataset.hpp"
 
@@ -23,13 +24,14 @@ struct GateData {
   Eigen::VectorXd q_lower, q_upper, dq, ddq;  ///< largest of the filtered motion
 };
 /// @throws InputError where the project names no train log.
-GateData read_gate_data(const Project& project, const std::filesystem::path& directory);
+GateData read_gate_data(const Project& project, const std::filesystem::path& directory,
+                        const GateOptions& options = {});
 
 /// @throws DataError: a torque column that never changes, of a joint that moves
-void check_torque(const Log& log, const Robot& robot);
+void check_torque(const Log& log, const Robot& robot, const GateOptions& options = {});
 
 /// Limits and ratings of each joint: the project's, else 1.2 times the largest in the logs; URDF limits where the logs
 /// come within a factor of ten of them.
-std::vector<JointFit> initial_joints(const Project& project, const GateData& data);
+std::vector<JointFit> initial_joints(const Project& project, const GateData& data, const GateOptions& options = {});
 
 }  // namespace fxdyn

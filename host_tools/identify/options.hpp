@@ -17,8 +17,36 @@ struct StructureOptions {
   double same_lead = 0.2;
   /// share of the joints; how many must agree on the lead; hand
   double agreeing = 0.8;
+  /// share of the torque cut-off's period; longest lead that is tried; hand
+  double longest_lead = 0.2;
+  /// s; longest lead that is tried; hand
+  double longest_lead_s = 0.010;
   /// share of rated torque; standard deviation of a base parameter that gets a note; hand
   double worrying_error = 0.1;
+  /// share of the largest eigenvalue of the scaled information; a direction with less has none; hand
+  double no_information = 1e-12;
+  /// share of a parameter's square; with more of it in such directions it is not identifiable; hand
+  double lost = 0.1;
+};
+
+/// Reading of the logs, and the limits that they suggest.
+struct GateOptions {
+  /// rows of all logs together; longer logs are decimated more; hand: enough for a fit of a few hundred unknowns
+  double most_rows = 60'000;
+  /// samples of all logs together; from there on memory counts more than time, and one thread works; hand
+  double long_logs = 1'500'000;
+  /// rad | m; a joint that moves less may be parked, its drive off; hand
+  double parked = 1e-3;
+  /// times the largest in the logs; limits that nobody gave; hand
+  double margin = 1.2;
+  /// times the largest in the logs; velocity and torque limits of the URDF that are wider are placeholders; hand
+  double widest_limit = 10;
+  /// turns; likewise a revolute joint's position limits; hand: more than any gear's hoses allow
+  double widest_turns = 8;
+  /// times the range in the logs; likewise a slide's; hand
+  double widest_slide = 10;
+  /// share of the fastest dq; width of the sign before it is fitted; hand
+  double sign_width = 0.01;
 };
 
 /// Signs and units of the torque. Scores are sums over joints of ln(residual square).
@@ -75,6 +103,17 @@ struct FlexibleOptions {
 struct LoadOptions {
   /// share of a column's square; what the others leave of one that is identifiable; hand
   double least_share_left = 1e-6;
+  /// share of the largest column's length; a shorter column is no column; hand
+  double no_column = 1e-9;
+  /// of a unit vector; part that a parameter has in a direction without information, from which on it is not
+  /// identifiable; hand
+  double part = 0.03;
+  /// share of the residual's power; the autocovariance is summed until it falls below; hand
+  double faded = 0.02;
+  /// N*m; a joint at which 1 kg weighs less does not lift the load; hand
+  double least_lift = 0.1;
+  /// kg/m^3; the ball that stands for a load of which nothing but the mass is known; hand: plastic
+  double density = 2000;
   /// relative standard deviation; a mass that is known no better is none; hand
   double largest_uncertainty = 0.3;
 };

@@ -11,6 +11,7 @@
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/effects/link_parameters.hpp"
 #include "host_tools/regression/physical.hpp"
+#include "host_tools/regression/sandwich.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/error.hpp"
 #include "model/effects/coulomb.hpp"
@@ -83,18 +84,6 @@ Rows build_rows(const IdentifiedModel& model, const DhChain& chain, const Proces
   return rows;
 }
 
-/// Sums of neighbouring residuals' products over lags 0 .. last, until they fade.
-VectorXd autocovariance(const VectorXd& r) {
-  std::vector<double> out;
-  const Index rows = r.size();
-  for (Index lag = 0; lag < rows / 4; ++lag) {
-    const double c = r.head(rows - lag).dot(r.tail(rows - lag)) / static_cast<double>(rows);
-    if (lag > 0 && c < 0.02 * out.front()) break;
-    out.push_back(c);
-  }
-  return Eigen::Map<const VectorXd>(out.data(), static_cast<Index>(out.size()));
-}
-
 struct Fit {
   MatrixXd information;
   VectorXd projection, solution;
@@ -104,7 +93,7 @@ struct Fit {
   double correlated = 1;  ///< rows for an independent one, mean
 };
 
-Fit solve(const Rows& rows) {
+Fit solve(const Rows& rows, double faded) {
   const auto n = static_cast<Index>(rows.columns.size());
   const Index p = ten + nuisances * n;
   Fit fit;
@@ -138,22 +127,15 @@ Fit solve(const Rows& rows) {
     }
     fit.solution = SymmetricSolver(fit.information).solve(fit.projection);
   }
-  // Sandwich with the residuals' autocovariance: sum over lags of gamma X_k^T X_{k+lag}.
   MatrixXd middle = MatrixXd::Zero(p, p);
   fit.correlated = 0;
   for (Index j = 0; j < n; ++j) {
     const MatrixXd& x = rows.columns[static_cast<std::size_t>(j)];
-    const VectorXd gamma = autocovariance(residual(j));
-    MatrixXd sum = gamma[0] * x.transpose() * x;
-    for (Index lag = 1; lag < gamma.size(); ++lag) {
-      const MatrixXd across = gamma[lag] * x.topRows(x.rows() - lag).transpose() * x.bottomRows(x.rows() - lag);
-      sum += across + across.transpose();
-    }
-    place(middle, j, weights[j] * weights[j] * sum);
+    const VectorXd gamma = autocovariance(residual(j), faded);
+    place(middle, j, weights[j] * weights[j] * middle_of_lags(x, gamma));
     fit.correlated += (2 * gamma.sum() / gamma[0] - 1) / static_cast<double>(n);
   }
-  const MatrixXd inverse = SymmetricSolver(fit.information).inverse();
-  const MatrixXd covariance = inverse * middle * inverse.transpose();
+  const MatrixXd covariance = sandwich(SymmetricSolver(fit.information).inverse(), middle);
   fit.covariance = covariance.topLeftCorner(ten, ten);
   fit.nuisance_std = covariance.diagonal().tail(p - ten).cwiseMax(0).cwiseSqrt();
   const SymmetricSolver nuisance(fit.information.bottomRightCorner(p - ten, p - ten));
@@ -166,32 +148,32 @@ Fit solve(const Rows& rows) {
 }
 
 /// Which of the ten no sum of the others and of friction imitates.
-std::array<bool, 10> identifiable(const Fit& fit, double least_share_left) {
+std::array<bool, 10> identifiable(const Fit& fit, const LoadOptions& options) {
   VectorXd scale = fit.information.diagonal().head(ten).cwiseMax(0).cwiseSqrt();
   std::array<bool, 10> out{};
   for (Index k = 0; k < ten; ++k) {
-    out[static_cast<std::size_t>(k)] = scale[k] > 1e-9 * scale.maxCoeff();
+    out[static_cast<std::size_t>(k)] = scale[k] > options.no_column * scale.maxCoeff();
     scale[k] = out[static_cast<std::size_t>(k)] ? 1 / scale[k] : 0;
   }
   const MatrixXd scaled = scale.asDiagonal() * (fit.own + fit.own.transpose()) / 2 * scale.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(scaled);
   for (Index i = 0; i < ten; ++i) {
-    if (solver.eigenvalues()[i] > least_share_left) continue;
+    if (solver.eigenvalues()[i] > options.least_share_left) continue;
     for (Index k = 0; k < ten; ++k) {
-      if (std::fabs(solver.eigenvectors()(k, i)) > 0.03) out[static_cast<std::size_t>(k)] = false;
+      if (std::fabs(solver.eigenvectors()(k, i)) > options.part) out[static_cast<std::size_t>(k)] = false;
     }
   }
   return out;
 }
 
 /// The joint to move for a better view of the load.
-std::string what_to_move(const Robot& robot, const ProcessedLog& log, const Rows& rows) {
+std::string what_to_move(const Robot& robot, const ProcessedLog& log, const Rows& rows, double least_lift) {
   const VectorXd& gravity = rows.gravity;
   Index best = -1;
   double smallest = 0;
   for (Index j = 0; j < gravity.size(); ++j) {
     const auto& joint = robot.joints[static_cast<std::size_t>(j)];
-    if (gravity[j] < 0.1 || joint.type != JointType::revolute) continue;
+    if (gravity[j] < least_lift || joint.type != JointType::revolute) continue;
     if (best < 0 || log.q_range[j] < smallest) {
       best = j;
       smallest = log.q_range[j];
@@ -199,15 +181,15 @@ std::string what_to_move(const Robot& robot, const ProcessedLog& log, const Rows
   }
   if (best < 0)
     return "no joint of this robot lifts the load, so only its acceleration shows it: accelerate more, or weigh it";
-  if (rows.lifted < 0.1)
+  if (rows.lifted < least_lift)
     return "no joint of this robot lifts the axis of the last one, so gravity shows mass times distance only: weigh it";
   return fmt::format("move joint {} ({}, {:.2g} rad here) and the others that lift the load over a wider range",
                      best + 1, robot.joints[static_cast<std::size_t>(best)].name, smallest);
 }
 
-/// A ball of plastic (2000 kg/m^3) where the data sees the centre.
-Eigen::Matrix4d ball(double mass, const Vector3d& centre) {
-  const double radius = std::cbrt(3 * mass / (4 * std::numbers::pi * 2000));
+/// A ball where the data sees the centre.
+Eigen::Matrix4d ball(double mass, const Vector3d& centre, double density) {
+  const double radius = std::cbrt(3 * mass / (4 * std::numbers::pi * density));
   Inertial body;
   body.mass = mass;
   body.centre = centre;
@@ -280,7 +262,7 @@ void add_residuals(const Rows& rows, const Fit& fit, const VectorXd& theta, Load
 }
 
 /// The possible body that fits best, the prior's centre where the motion shows it.
-ConsistentFit possible_load(const Fit& fit, const std::array<bool, 10>& apart, Index joints) {
+ConsistentFit possible_load(const Fit& fit, const std::array<bool, 10>& apart, Index joints, double density) {
   const double mass = fit.solution[0];
   Vector3d centre = Vector3d::Zero();
   for (int k = 0; k < 3; ++k) {
@@ -295,7 +277,7 @@ ConsistentFit possible_load(const Fit& fit, const std::array<bool, 10>& apart, I
                          free,
                          MatrixXd::Identity(ten, ten),
                          columns,
-                         {ball(mass, centre)},
+                         {ball(mass, centre, density)},
                          fit.correlated});
 }
 
@@ -310,19 +292,19 @@ LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log, con
   const DhChain chain = to_dh(model.robot);
   const auto n = static_cast<Index>(model.robot.size());
   const Rows rows = build_rows(model, chain, log);
-  const Fit fit = solve(rows);
-  const std::array<bool, 10> apart = identifiable(fit, options.least_share_left);
+  const Fit fit = solve(rows, options.faded);
+  const std::array<bool, 10> apart = identifiable(fit, options);
   const double mass = fit.solution[0], mass_std = std::sqrt(std::max(0.0, fit.covariance(0, 0)));
   if (!apart[0]) {
     throw DataError(fmt::format("{}: the mass of the load cannot be identified from this motion: {}", log.name,
-                                what_to_move(model.robot, log, rows)));
+                                what_to_move(model.robot, log, rows, options.least_lift)));
   }
   if (!(mass > 0) || mass_std > options.largest_uncertainty * mass) {
     throw DataError(fmt::format("{}: no load to be seen: mass {:.3g} kg, standard deviation {:.3g} kg; {}", log.name,
-                                mass, mass_std, what_to_move(model.robot, log, rows)));
+                                mass, mass_std, what_to_move(model.robot, log, rows, options.least_lift)));
   }
 
-  const ConsistentFit possible = possible_load(fit, apart, n);
+  const ConsistentFit possible = possible_load(fit, apart, n, options.density);
   LoadFit out;
   out.constrained = possible.constrained;
   out.body = to_inertial(from_pseudo_inertia(possible.bodies[0]), Eigen::Isometry3d::Identity());

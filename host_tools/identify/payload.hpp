@@ -14,7 +14,7 @@ namespace fxdyn {
 struct LoadParameter {
   const char *name, *unit;
   double value = 0, std = 0;
-  bool identifiable = false;  ///< this motion tells it apart from the others; else the value is a guess
+  bool identifiable = false;  ///< this motion separates it from the others; else the value is a guess
 };
 
 /// A load on the last link, from what it adds to the torque of a model without it.
@@ -33,7 +33,7 @@ struct LoadFit {
 /// Weighted least squares of tau - predict(model) on the ten parameters of the last link, a Coulomb and an offset
 /// column a joint beside them (friction changes with the load), all filtered alike; made physically consistent.
 /// Standard deviations count the residual's autocorrelation.
-/// @throws DataError: the motion does not tell the mass, or there is none to be seen. InputError: the model has a
+/// @throws DataError: the motion does not determine the mass, or there is none to be seen. InputError: the model has a
 /// payload already, or the log has no torque.
 LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log, const LoadOptions& options = {});
 

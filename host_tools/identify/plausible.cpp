@@ -5,11 +5,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/link_parameters.hpp"
 #include "host_tools/regression/physical.hpp"
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/regression/solver.hpp"
-#include "model/math.hpp"
+#include "model/effects/coulomb.hpp"
+#include "model/effects/rotor_inertia.hpp"
+#include "model/effects/viscous.hpp"
 
 namespace fxdyn {
 namespace {
@@ -19,11 +22,29 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr Index samples_used = 400;
-/// Coulomb, viscous, offset and, where it is not absorbed, rotor inertia.
-constexpr Index own = 4, viscous = 1, rotor = 3;
+/// Columns of a joint beside the base parameters: the nominal effects.
+const auto own = static_cast<Index>(nominal_effects().size());
+Index column_of(std::string_view effect) {
+  const std::vector<std::string>& all = nominal_effects();
+  return std::find(all.begin(), all.end(), effect) - all.begin();
+}
+const Index coulomb = column_of(Coulomb::name), viscous = column_of(Viscous::name),
+            rotor = column_of(RotorInertia::name);
+
 struct Estimate {
   double value = 0, std = 0;
 };
+
+Eigen::RowVectorXd own_row(double sign_width, double dq, double ddq) {
+  JointSeries sample;
+  sample.q = VectorXd::Zero(1);
+  sample.dq = VectorXd::Constant(1, dq);
+  sample.ddq = VectorXd::Constant(1, ddq);
+  Eigen::RowVectorXd row(own);
+  for (Index i = 0; i < own; ++i)
+    row[i] = effect_columns(nominal_effects()[static_cast<std::size_t>(i)], {}, sign_width, sample)(0, 0);
+  return row;
+}
 
 /// Rows of all joints over a few hundred samples, the columns' gravity part apart.
 class Rows {
@@ -85,7 +106,8 @@ class Rows {
         const auto joint = static_cast<std::size_t>(j);
         gravity_[joint].row(k) = still.row(j);
         moving_[joint].row(k) = moving.row(j) - still.row(j);
-        own_[joint].row(k) << tanh_of(dq[j] / joints[joint].sign_width), dq[j], 1, has_rotor_[joint] ? ddq[j] : 0;
+        own_[joint].row(k) = own_row(joints[joint].sign_width, dq[j], ddq[j]);
+        if (!has_rotor_[joint]) own_[joint](k, rotor) = 0;
         own_inertia_[joint].row(k) = regressor(q, zero, VectorXd::Unit(n_, j)).row(j)(base_.columns) - still.row(j);
         tau_(k, j) = filtered(i, j);
       }
@@ -172,7 +194,7 @@ class Rows {
     const auto joint = static_cast<std::size_t>(j);
     const Index at = fit.solution.size() - own * (n_ - j);
     VectorXd row = VectorXd::Zero(fit.solution.size());
-    row[at] = 1;
+    row[at + coulomb] = 1;
     row[at + viscous] = own_[joint].col(viscous).norm() / std::sqrt(static_cast<double>(own_[joint].rows()));
     return estimate(fit, row);
   }
@@ -380,7 +402,7 @@ std::vector<Suspicion> check_plausible(const Robot& robot, const std::vector<Pro
   Rows::Fit fit = best_signs(rows, 1, n);
   if (Rows::Fit other = best_signs(rows, -1, n); other.score < fit.score - options.flip) fit = std::move(other);
 
-  // The other joints can't tell which of two opposite signs all have: inertia and friction can.
+  // The other joints can't decide which of two opposite signs all have: inertia and friction can.
   VectorXd signs = fit.signs;
   std::vector<std::string> why(robot.size(), "the other joints' torques fit together only with the opposite sign");
   std::vector<Suspicion> out;

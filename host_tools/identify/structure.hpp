@@ -1,15 +1,15 @@
 #pragma once
 
+#include "host_tools/effects/effects.hpp"
 #include "host_tools/identify/identify.hpp"
 
 namespace fxdyn {
 
 /// Structures that others are compared with: friction that everybody has, the paper's reference (LuGre), and Dahl's
 /// presliding beside Stribeck's curve.
-inline const std::vector<std::string> coulomb_and_viscous{"viscous", "coulomb", "offset", "rotor_inertia"};
-inline const std::vector<std::string> lugre_friction{"viscous", "coulomb", "offset", "rotor_inertia", "lugre"};
-inline const std::vector<std::string> dahl_stribeck_friction{"viscous",       "coulomb",  "offset",
-                                                             "rotor_inertia", "stribeck", "presliding"};
+inline const std::vector<std::string> coulomb_and_viscous = nominal_effects();
+inline const std::vector<std::string> lugre_friction = nominal_effects_and({"lugre"});
+inline const std::vector<std::string> dahl_stribeck_friction = nominal_effects_and({"stribeck", "presliding"});
 
 /// The project with these effects and nothing else: no choice of effects, no physical or essential parameters.
 Project with_structure(Project project, const std::vector<std::string>& effects, const std::string& method);

@@ -24,7 +24,7 @@ void find_torque_lead(Fitter& fitter, double cutoff_hz, const StructureOptions& 
     return logarithms(fitter.held_out());
   };
   const Eigen::VectorXd none = judge(0);
-  const double grid = std::min(0.2 / cutoff_hz, 0.010) / half;
+  const double grid = std::min(options.longest_lead / cutoff_hz, options.longest_lead_s) / half;
   Eigen::VectorXd best = none, own = none, own_lead = Eigen::VectorXd::Zero(none.size());
   double best_lead = 0;
   const auto attempt = [&](double lead) {

@@ -64,7 +64,7 @@ class Pipeline {
   /// DIR/model.json, if it is current and one of these stages made it.
   std::optional<IdentifiedModel> written(std::initializer_list<std::string_view> stages);
   void check_motion();
-  /// Index (from 1) and name of a joint of which diagnosis could tell nothing.
+  /// Index (from 1) and name of a joint about which diagnosis could say nothing.
   std::optional<std::pair<int, std::string>> not_excited() const;
   /// @throws DataError: there is one
   void check_excited() const;

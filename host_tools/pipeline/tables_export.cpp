@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/export/proof.hpp"
 #include "host_tools/support/error.hpp"
@@ -12,7 +12,6 @@
 namespace fxdyn {
 namespace {
 
-using nlohmann::json;
 namespace fs = std::filesystem;
 
 /// |fixed - double| on the logs beyond which tables are refused, of rated torque.
@@ -122,42 +121,6 @@ ExportResult export_tables(IdentifiedModel& model, const Formats& formats, const
   progress.step();
   progress.done();
   return out;
-}
-
-json to_json(const ExportResult& result) {
-  json drives = json::array(), joints = json::array();
-  for (const ExportResult::Drive& drive : result.drives)
-    drives.push_back(
-        {{"index", drive.joint + 1}, {"tables_crc", drive.tables_crc}, {"table_bytes", drive.table_bytes}});
-  for (std::size_t j = 0; j < result.joints.size(); ++j) {
-    const ExportResult::Joint& joint = result.joints[j];
-    joints.push_back({{"joint", joint.name},
-                      {"index", j + 1},
-                      {"unit", joint.unit},
-                      {"rated_torque", joint.rated_torque},
-                      {"formats", formats_json(result.formats)},
-                      {"proven_bound", joint.proven_error},
-                      {"proven_bound_of_rated", joint.proven_error / joint.rated_torque},
-                      {"observed_max", joint.largest_error},
-                      {"observed_max_of_rated", joint.largest_error / joint.rated_torque},
-                      {"quantisation_rms", joint.rms_error},
-                      {"torque_range",
-                       {{"proven", joint.proven_torque},
-                        {"proven_structural", joint.proven_structural},
-                        {"attained", joint.attained_torque},
-                        {"attained_structural", joint.attained_structural}}}});
-  }
-  return {{"schema", "fxdyn.export/1"},
-          {"tick_s", result.tick_s},
-          {"board", result.board},
-          {"tables_crc", result.tables_crc},
-          {"origin", result.lineage.origin},
-          {"sequence", result.lineage.sequence},
-          {"formats", formats_json(result.formats)},
-          {"joints", joints},
-          {"drives", drives},
-          {"saturations_on_logs", result.saturations_on_logs},
-          {"table_bytes", result.table_bytes}};
 }
 
 }  // namespace fxdyn

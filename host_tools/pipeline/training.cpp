@@ -104,7 +104,7 @@ void Trainer::keep_diagnosed_if_better(Training& training) {
   training.model = std::move(before);
   training.model.drop_tables();  // they are another model's now
   training.trained = std::move(unchanged);
-  // What the train logs tell holds around what this model has from a baseline too.
+  // The information of the train logs holds around what this model has from a baseline too.
   fitter_.set_designs(kept_.design());
   follow(training.model);
   training.stored = stored_information(fitter_);

@@ -17,7 +17,7 @@ constexpr auto ten = static_cast<Index>(parameters_per_link);
 /// Weight of the prior at the end, of one row of the data: with it the prior's standard deviations are about as large
 /// as its values (see DataShare). Far less would let bodies that the data hardly sees grow to any mass.
 constexpr double final_weight = 1;
-/// Distance that a body keeps from the impossible, of the prior: far below what any data tells, far above rounding.
+/// Distance that a body keeps from the impossible, of the prior: far below what any data resolves, far above rounding.
 constexpr double margin = 1e-11;
 constexpr double unbounded_theta = 1e29;
 /// The prior's bodies are as good as unlimited in size until the end: a path from a small prior to a large body would

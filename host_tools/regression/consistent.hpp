@@ -27,8 +27,8 @@ struct ConsistentFit {
 /// Interior-point Newton whose barrier is the prior: the divergence between pseudo-inertias
 ///   D(P || P0) = tr(P0^-1 P) - log det(P0^-1 P) - 4
 /// (Lee, Wensing, Park, "Geometric robot dynamic identification", T-RO 2020), which no choice of units or frames
-/// changes. Its weight falls to a hundredth of what one independent row tells. Where some possible bodies make the
-/// least squares solution, that is the result and the prior only chooses among those.
+/// changes. Its weight falls to a hundredth of the information of one independent row. Where some possible bodies make
+/// the least squares solution, that is the result and the prior only chooses among those.
 ConsistentFit fit_consistent(const ConsistentProblem& problem);
 
 }  // namespace fxdyn

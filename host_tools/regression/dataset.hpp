@@ -10,13 +10,9 @@
 #include "host_tools/effects/filter_fit.hpp"
 #include "host_tools/effects/forward.hpp"
 #include "host_tools/signals/log.hpp"
+#include "host_tools/signals/motion.hpp"
 
 namespace fxdyn {
-
-/// Joint motion over some samples: samples x joints.
-struct MotionRows {
-  Eigen::MatrixXd q, dq, ddq;
-};
 
 /// A log ready for fitting and judging. Held is what can't be made again: the filtered position and the raw torque;
 /// velocity and acceleration are differentiated when they are asked for, rows of regressors made in blocks. So a log

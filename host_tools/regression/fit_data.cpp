@@ -135,7 +135,7 @@ FitData make_fit_data(const Robot& robot, const std::vector<ProcessedLog>& logs,
   fill_rows(data, rows);
   mark_usable(data, rows);
   data.blocks = make_blocks(log_rows);
-  data.split = make_split(log_rows, data.blocks);
+  data.split = make_split(log_rows);
   return data;
 }
 

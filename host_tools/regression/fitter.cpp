@@ -165,8 +165,8 @@ void Fitter::make_base_moments(std::size_t joint) {
   }
 }
 
-Fitter::OwnByBlock Fitter::own_moments(std::size_t joint, const Eigen::MatrixXd& own) const {
-  OwnByBlock out;
+Fitter::MomentsByBlock Fitter::own_moments(std::size_t joint, const Eigen::MatrixXd& own) const {
+  MomentsByBlock out;
   for (const LogBlock& block : data_->blocks) {
     const Eigen::Index count = block.to - block.from;
     out.push_back(weighted_products(data_->base_rows[joint].middleRows(block.from, count),
@@ -190,7 +190,7 @@ std::vector<Fitter::Dependent> Fitter::dependent_effects() const {
     const Eigen::Index own = own_count(design_[j]), acting = nb - data_->first_base[j];
     Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(nb + own, nb + own);
     for (const std::size_t b : train_blocks()) {
-      const OwnMoments& m = own_moments_[j][b];
+      const JointMoments& m = own_moments_[j][b];
       gram.block(nb - acting, nb, acting, own) += m.cross;
       gram.bottomRightCorner(own, own) += m.gram;
     }
@@ -242,7 +242,7 @@ Eigen::VectorXd Fitter::ridge_of(const JointFit& design, double ridge, Eigen::In
   return out;
 }
 
-double Fitter::square_error(std::size_t joint, std::size_t block, const OwnMoments& own,
+double Fitter::square_error(std::size_t joint, std::size_t block, const JointMoments& own,
                             const Solution& solution) const {
   const BaseMoments& m = base_moments_[joint][block];
   const Eigen::VectorXd beta = solution.beta.tail(m.projection.size());
@@ -251,7 +251,7 @@ double Fitter::square_error(std::size_t joint, std::size_t block, const OwnMomen
                            2 * beta.dot(own.cross * theta) + theta.dot(own.gram * theta));
 }
 
-NormalEquations Fitter::assemble(const std::vector<std::size_t>& blocks, const std::vector<const OwnByBlock*>& all,
+NormalEquations Fitter::assemble(const std::vector<std::size_t>& blocks, const std::vector<const MomentsByBlock*>& all,
                                  const std::vector<const JointFit*>& design) const {
   const auto nb = static_cast<Eigen::Index>(base().columns.size());
   NormalEquations out;
@@ -267,7 +267,7 @@ NormalEquations Fitter::assemble(const std::vector<std::size_t>& blocks, const s
     double rows = 0;
     for (const std::size_t b : blocks) {
       const BaseMoments& m = base_moments_[j][b];
-      const OwnMoments& o = (*all[j])[b];
+      const JointMoments& o = (*all[j])[b];
       out.information.block(first, first, acting, acting) += w * m.gram;
       out.information.block(first, at, acting, own) += w * o.cross;
       out.information.block(at, at, own, own) += w * o.gram;
@@ -318,9 +318,9 @@ Eigen::VectorXd Fitter::residual(std::size_t joint, const Solution& solution) co
   return torque_rows_[joint] - x * solution.beta.tail(x.cols()) - own_rows_[joint] * solution.theta[joint];
 }
 
-std::vector<const Fitter::OwnByBlock*> Fitter::current() const {
-  std::vector<const OwnByBlock*> all;
-  for (const OwnByBlock& own : own_moments_) all.push_back(&own);
+std::vector<const Fitter::MomentsByBlock*> Fitter::current() const {
+  std::vector<const MomentsByBlock*> all;
+  for (const MomentsByBlock& own : own_moments_) all.push_back(&own);
   return all;
 }
 

@@ -75,7 +75,7 @@ class Fitter {
   Eigen::Index rows() const { return data_->load_rows.front().size(); }
 
   /// Effects whose columns are, on the train rows, sums of base columns and of the effects before them (relative 1e-5):
-  /// these logs can't tell them apart.
+  /// these logs can't separate them.
   struct Dependent {
     std::size_t joint, effect;
   };
@@ -123,8 +123,8 @@ class Fitter {
   Solution estimate() const { return solve(normal_equations()); }
   /// The same without standard deviations by recursive least squares (square-root information form) over the train rows
   /// in their order. What was known a second ago counts `forgetting` (1: nothing is forgotten, and the last estimate is
-  /// fit()'s). `start`: what other logs told, with the same unknowns; empty: nothing is known. `trace`: x at `points`
-  /// moments.
+  /// fit()'s). `start`: the information of other logs, with the same unknowns; empty: nothing is known. `trace`: x at
+  /// `points` moments.
   struct Recursion {
     Solution solution;
     Eigen::VectorXd t;      ///< seconds of training data taken in
@@ -133,8 +133,8 @@ class Fitter {
   };
   Recursion recursive(double forgetting, Eigen::Index points,
                       const SquareRootInformation& start = SquareRootInformation()) const;
-  /// What the train rows and the prior tell with the current weights, a BLS's ridge included: what a recursion over
-  /// later logs starts from.
+  /// Information of the train rows and the prior with the current weights, a BLS's ridge included: what a recursion
+  /// over later logs starts from.
   SquareRootInformation information() const;
   /// x as beta and theta.
   Solution split(const Eigen::VectorXd& x) const { return split(offsets(), x); }
@@ -152,14 +152,14 @@ class Fitter {
   std::vector<Eigen::Index> saturated_rows() const;
 
  private:
-  using OwnByBlock = std::vector<OwnMoments>;  ///< by block
+  using MomentsByBlock = std::vector<JointMoments>;  ///< by block
 
   JointSeries joint_series(std::size_t joint, std::size_t log) const;
   Eigen::MatrixXd own_rows(std::size_t joint, const std::vector<JointFit>& designs) const;
   /// But for what the torque enters.
   void make_base_moments(std::size_t joint);
   void project_torque(std::size_t joint);
-  OwnByBlock own_moments(std::size_t joint, const Eigen::MatrixXd& own) const;
+  MomentsByBlock own_moments(std::size_t joint, const Eigen::MatrixXd& own) const;
   Eigen::VectorXd residual(std::size_t joint, const Solution& solution) const;
   /// Where x has its parts: NormalEquations::offset.
   std::vector<Eigen::Index> offsets() const;
@@ -169,8 +169,8 @@ class Fitter {
   void take_in(Eigen::Index from, Eigen::Index count, const std::vector<Eigen::VectorXd>& row_weights,
                SquareRootInformation& information) const;
   static Eigen::VectorXd ridge_of(const JointFit& design, double ridge, Eigen::Index count);
-  double square_error(std::size_t joint, std::size_t block, const OwnMoments& own, const Solution& solution) const;
-  NormalEquations assemble(const std::vector<std::size_t>& blocks, const std::vector<const OwnByBlock*>& own,
+  double square_error(std::size_t joint, std::size_t block, const JointMoments& own, const Solution& solution) const;
+  NormalEquations assemble(const std::vector<std::size_t>& blocks, const std::vector<const MomentsByBlock*>& own,
                            const std::vector<const JointFit*>& design) const;
   Solution solve(const NormalEquations& equations) const;
   Solution split(const std::vector<Eigen::Index>& offset, const Eigen::VectorXd& x) const;
@@ -190,15 +190,15 @@ class Fitter {
 
     explicit Tally(std::size_t joints) : judgements(joints), square(joints, 0), count(joints, 0) {}
     /// One more fold of joint number `i` of these.
-    void add(std::size_t i, const Fitter& fitter, std::size_t joint, std::size_t fold, const OwnByBlock& own,
+    void add(std::size_t i, const Fitter& fitter, std::size_t joint, std::size_t fold, const MomentsByBlock& own,
              const JointFit& design, const Solution& solution);
     std::vector<Judgement> done(bool one_log);
   };
   /// Joints `first` .. `last` - 1.
-  std::vector<Judgement> judged(std::size_t first, std::size_t last, const std::vector<const OwnByBlock*>& own,
+  std::vector<Judgement> judged(std::size_t first, std::size_t last, const std::vector<const MomentsByBlock*>& own,
                                 const std::vector<const JointFit*>& design) const;
   std::vector<std::size_t> train_blocks() const;
-  std::vector<const OwnByBlock*> current() const;
+  std::vector<const MomentsByBlock*> current() const;
   std::vector<const JointFit*> designs() const;
 
   std::shared_ptr<const FitData> data_;
@@ -210,7 +210,7 @@ class Fitter {
   std::vector<Eigen::VectorXd> row_weights_;            ///< per joint and row
   std::vector<std::vector<BaseMoments>> base_moments_;  ///< [joint][block]
   std::vector<Eigen::MatrixXd> own_rows_;               ///< per joint: rows x own columns
-  std::vector<OwnByBlock> own_moments_;                 ///< [joint][block]
+  std::vector<MomentsByBlock> own_moments_;             ///< [joint][block]
   Eigen::VectorXd weights_;
   BasePrior prior_;  ///< empty: none
 };

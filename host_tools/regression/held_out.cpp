@@ -8,8 +8,8 @@
 
 namespace fxdyn {
 
-void Fitter::Tally::add(std::size_t i, const Fitter& fitter, std::size_t joint, std::size_t fold, const OwnByBlock& own,
-                        const JointFit& design, const Solution& solution) {
+void Fitter::Tally::add(std::size_t i, const Fitter& fitter, std::size_t joint, std::size_t fold,
+                        const MomentsByBlock& own, const JointFit& design, const Solution& solution) {
   Judgement& judgement = judgements[i];
   for (const std::size_t b : fitter.data_->split.judge[fold]) {
     const double error = fitter.square_error(joint, b, own[b], solution), rows = fitter.base_moments_[joint][b].count;
@@ -32,7 +32,8 @@ std::vector<Judgement> Fitter::Tally::done(bool one_log) {
   return std::move(judgements);
 }
 
-std::vector<Judgement> Fitter::judged(std::size_t first, std::size_t last, const std::vector<const OwnByBlock*>& all,
+std::vector<Judgement> Fitter::judged(std::size_t first, std::size_t last,
+                                      const std::vector<const MomentsByBlock*>& all,
                                       const std::vector<const JointFit*>& design) const {
   Tally tally(last - first);
   for (std::size_t fold = 0; fold < data_->split.fit.size(); ++fold) {
@@ -48,9 +49,9 @@ std::vector<Judgement> Fitter::held_out_with(std::size_t joint, const JointFit& 
                                              const std::vector<double>& ridges) const {
   std::vector<JointFit> designs_with = design_;
   designs_with[joint] = candidate;
-  const OwnByBlock own = own_moments(joint, own_rows(joint, designs_with));
+  const MomentsByBlock own = own_moments(joint, own_rows(joint, designs_with));
   JointFit design = candidate;
-  std::vector<const OwnByBlock*> all = current();
+  std::vector<const MomentsByBlock*> all = current();
   std::vector<const JointFit*> used = designs();
   all[joint] = &own;
   used[joint] = &design;
@@ -67,10 +68,10 @@ std::vector<std::vector<Judgement>> Fitter::held_out_with(std::size_t joint, con
                                                           const std::vector<double>& ridges) const {
   std::vector<JointFit> designs_with = design_;
   designs_with[joint] = candidate;
-  const OwnByBlock own = own_moments(joint, own_rows(joint, designs_with));
+  const MomentsByBlock own = own_moments(joint, own_rows(joint, designs_with));
   JointFit whole = candidate;
   whole.bls->ridge = 0;  // comes last
-  std::vector<const OwnByBlock*> all = current();
+  std::vector<const MomentsByBlock*> all = current();
   std::vector<const JointFit*> used = designs();
   all[joint] = &own;
   used[joint] = &whole;
@@ -79,12 +80,12 @@ std::vector<std::vector<Judgement>> Fitter::held_out_with(std::size_t joint, con
 
   // Of each size: its design, and the leading part of the moments.
   std::vector<JointFit> design(sizes.size(), candidate);
-  std::vector<OwnByBlock> part(sizes.size(), own);
+  std::vector<MomentsByBlock> part(sizes.size(), own);
   std::vector<std::vector<Tally>> tallies(sizes.size(), std::vector<Tally>(ridges.size(), Tally(1)));
   for (std::size_t s = 0; s < sizes.size(); ++s) {
     design[s].bls->weights = candidate.bls->weights.topRows(sizes[s]);
     const Eigen::Index count = effects + inputs + sizes[s];
-    for (OwnMoments& m : part[s]) {
+    for (JointMoments& m : part[s]) {
       m.cross = m.cross.leftCols(count).eval();
       m.gram = m.gram.topLeftCorner(count, count).eval();
       m.projection = m.projection.head(count).eval();

@@ -10,7 +10,7 @@
 namespace fxdyn {
 
 /// The columns that an identification fits, base parameters first: base parameters of the rigid body, then joint by
-/// joint viscous and Coulomb friction, offset, and rotor inertia where it can be told from the links'.
+/// joint viscous and Coulomb friction, offset, and rotor inertia where it is not part of the links'.
 class ParameterColumns {
  public:
   /// sign_width: of the Coulomb column tanh(dq / width), one a joint [rad/s | m/s].
@@ -46,7 +46,7 @@ double scaled_condition(const Eigen::MatrixXd& information);
 /// log det M; minus infinity where M has no full rank.
 double log_determinant(const Eigen::MatrixXd& information);
 
-/// A parameter that the data tell too little of.
+/// A parameter that the data determine poorly.
 struct WeakParameter {
   std::string name;
   double error = 0;          ///< standard deviation as a share of `size`; infinite where it cannot be identified at all

@@ -5,14 +5,15 @@
 
 namespace fxdyn {
 
-bool Judgement::beats(const Judgement& other, double worth) const {
-  if (!(rmse < (1 - (blocks_of_one_log ? 4 : 1) * worth) * other.rmse) || !physical) return false;
+bool Judgement::beats(const Judgement& other, double worth, const JudgementOptions& options) const {
+  if (!(rmse < (1 - (blocks_of_one_log ? options.of_one_log : 1) * worth) * other.rmse) || !physical) return false;
   std::size_t better = 0;
   for (std::size_t b = 0; b < blocks.size(); ++b) better += blocks[b] < other.blocks[b];
-  return blocks_of_one_log ? better == blocks.size() : 4 * better >= 3 * blocks.size();
+  const double least = (blocks_of_one_log ? 1 : options.better_blocks) * static_cast<double>(blocks.size());
+  return static_cast<double>(better) >= least;
 }
 
-bool last_is_physical(const JointFit& design, const Eigen::VectorXd& theta) {
+bool last_is_physical(const JointFit& design, const Eigen::VectorXd& theta, const JudgementOptions& options) {
   if (design.effects.empty() || design.bls) return true;
   const auto& parameters = find_effect(design.effects.back().effect)->linear;
   Eigen::Index at = theta.size();
@@ -23,7 +24,8 @@ bool last_is_physical(const JointFit& design, const Eigen::VectorXd& theta) {
   // It takes the place of another one (presliding that of Coulomb's sign): much less of it is something else.
   const std::string_view replaced = find_effect(design.effects.back().effect)->replaces;
   for (std::size_t i = 0; i < design.effects.size(); ++i) {
-    if (design.effects[i].effect == replaced) return theta[at] > 0.5 * theta[static_cast<Eigen::Index>(i)];
+    if (design.effects[i].effect == replaced)
+      return theta[at] > options.least_of_replaced * theta[static_cast<Eigen::Index>(i)];
   }
   return true;
 }

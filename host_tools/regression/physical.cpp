@@ -109,9 +109,9 @@ void add_shares(const PhysicalProblem& problem, const Reduced& data, const std::
     before.block(at, at, ten, ten) = barrier_hessian(prior[i].inverse()).inverse();
   }
   // information = root^T root, S = root G: covariance after = before - (S before)^T (1 + S before S^T)^-1 (S before)
-  MatrixXd told = data.information / problem.variance;
-  if (problem.known.size() > 0) told -= problem.known;
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(told);
+  MatrixXd from_logs = data.information / problem.variance;
+  if (problem.known.size() > 0) from_logs -= problem.known;
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(from_logs);
   const MatrixXd seen = solver.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() * solver.eigenvectors().transpose() *
                         problem.base.grouping;
   const MatrixXd seen_before = seen * before;

@@ -23,7 +23,7 @@ struct PhysicalProblem {
   Eigen::VectorXd projection;    ///< X^T W tau
   Eigen::VectorXd lower, upper;  ///< of theta (all joints' coefficients); +-1e30: unbounded
   double variance = 1;           ///< of a row's weighted residual: 1 where W is one over the residual's variance
-  Eigen::MatrixXd known{};       ///< base^2: part of information / variance that no log told (BasePrior); empty: none
+  Eigen::MatrixXd known{};  ///< base^2: part of information / variance that comes from no log (BasePrior); empty: none
 };
 
 /// How much of a parameter the data decided: 1 - variance after / variance before, before being the prior with a

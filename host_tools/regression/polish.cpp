@@ -97,8 +97,8 @@ NormalEquations Fitter::with_shapes(const Solution& solution, std::vector<Matrix
 
 VectorXd Fitter::shape_step(const Solution& solution, double square, std::vector<Index>& offset) const {
   constexpr double longest = 0.4;  // in the logarithm of a shape
-  // A shape that the rows tell worse than to a decade stays where it is (Levenberg 1944): the width of a sign whose
-  // amplitude is zero would walk at random.
+  // A shape that the rows determine worse than to a decade stays where it is (Levenberg 1944): the width of a sign
+  // whose amplitude is zero would walk at random.
   const double decade = std::log(10.0);
   std::vector<MatrixXd> rows;
   NormalEquations all = with_shapes(solution, rows);

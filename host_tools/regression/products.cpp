@@ -68,8 +68,8 @@ class Panels {
 
 }  // namespace
 
-OwnMoments weighted_products(const Eigen::Ref<const MatrixXd>& base, const Eigen::Ref<const MatrixXd>& own,
-                             const Eigen::Ref<const VectorXd>& weights, const Eigen::Ref<const VectorXd>& torque) {
+JointMoments weighted_products(const Eigen::Ref<const MatrixXd>& base, const Eigen::Ref<const MatrixXd>& own,
+                               const Eigen::Ref<const VectorXd>& weights, const Eigen::Ref<const VectorXd>& torque) {
   // [base, own]^T W [own, torque]
   const Index nb = base.cols(), n = own.cols();
   Panels<tall> left(nb + n);
@@ -98,7 +98,7 @@ OwnMoments weighted_products(const Eigen::Ref<const MatrixXd>& base, const Eigen
   const auto sum = [&](Index i, Index j) {
     return sums((i % tall) * wide + j % wide, i / tall + j / wide * left.count());
   };
-  OwnMoments out{MatrixXd(nb, n), MatrixXd(n, n), VectorXd(n)};
+  JointMoments out{MatrixXd(nb, n), MatrixXd(n, n), VectorXd(n)};
   for (Index j = 0; j < n; ++j) {
     for (Index i = 0; i < nb; ++i) out.cross(i, j) = sum(i, j);
     for (Index i = j; i < n; ++i) out.gram(i, j) = out.gram(j, i) = sum(nb + i, j);

@@ -4,9 +4,40 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/regression/row_ranges.hpp"
 #include "host_tools/signals/log.hpp"
 
 namespace fxdyn {
+
+/// What the rows of a log are for.
+struct LogUse {
+  Eigen::Index rows = 0;
+  bool fits = true;    ///< else it judges what the others fit
+  bool judges = true;  ///< where every log fits: its blocks judge fits of all others (not so a healthy session's)
+};
+
+/// Some rows of one log, which fit or judge together.
+struct LogPart {
+  std::size_t log = 0;
+  RowRange rows;  ///< of all logs, stacked
+};
+
+/// Parts of parts_of(), by their place.
+struct Fold {
+  std::vector<std::size_t> fit, judge;
+};
+
+/// What is left out at a time where all logs fit.
+enum class LeaveOut {
+  log,          ///< a whole log; blocks_of_one_log of the only one that could judge
+  part_of_each  ///< one of blocks_of_one_log of every log that judges: each fit has seen some of every motion
+};
+
+/// One part a log, but for the logs that are cut where all logs fit.
+std::vector<LogPart> parts_of(const std::vector<LogUse>& logs, LeaveOut leave_out = LeaveOut::log);
+/// Where some logs do not fit: one fold, which they judge. Else what is left out is judged by a fit of the others.
+std::vector<Fold> folds_of(const std::vector<LogUse>& logs, const std::vector<LogPart>& parts,
+                           LeaveOut leave_out = LeaveOut::log);
 
 /// Consecutive rows [from, to) of one log that are fitted or judged together.
 struct LogBlock {
@@ -30,7 +61,7 @@ struct LogRows {
 };
 /// One a log; five of a log that is alone and does not validate.
 std::vector<LogBlock> make_blocks(const std::vector<LogRows>& logs);
-/// `blocks`: make_blocks() of these logs.
-Split make_split(const std::vector<LogRows>& logs, const std::vector<LogBlock>& blocks);
+/// Of the blocks that make_blocks() makes of these logs.
+Split make_split(const std::vector<LogRows>& logs);
 
 }  // namespace fxdyn

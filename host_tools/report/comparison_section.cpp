@@ -4,8 +4,9 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "host_tools/page/comparison_plots.hpp"
 #include "host_tools/page/page.hpp"
-#include "host_tools/report/comparison_plots.hpp"
+#include "host_tools/report/comparison_result.hpp"
 #include "host_tools/report/section.hpp"
 #include "host_tools/support/files.hpp"
 
@@ -25,7 +26,7 @@ constexpr Published table_2[] = {{"rls", "RLS", 0.11723, 0.60058, 0.0001024},
                                  {"bls_pso", "BLS-PSO on the rigid body", 0.10893, 0.55865, 0.0003557},
                                  {"bls_pso_friction", "BLS-PSO on Eq. 8", 0.10893, 0.55865, 0.0003557}};
 
-std::string paper_table(const json& methods) {
+std::string paper_table(const std::vector<MethodResult>& methods) {
   Table table({{"method"},
                {"RMSE", "n"},
                {"paper", "n"},
@@ -34,15 +35,15 @@ std::string paper_table(const json& methods) {
                {"time of a prediction [s]", "n"},
                {"paper", "n"}});
   for (const Published& row : table_2) {
-    for (const json& method : methods) {
-      if (method.at("name") != row.name) continue;
-      const auto rmse = method.at("rmse").get<std::vector<double>>();
+    for (const MethodResult& method : methods) {
+      if (method.name != row.name) continue;
+      const std::vector<double>& rmse = method.rmse;
       table.add({{row.method},
                  number(std::accumulate(rmse.begin(), rmse.end(), 0.0) / static_cast<double>(rmse.size())),
                  number(row.rmse, 5),
-                 number(method.at("smoothness"), 3),
+                 number(method.smoothness, 3),
                  number(row.smoothness, 5),
-                 number(1e-6 * method.at("predict_us").get<double>(), 2),
+                 number(1e-6 * method.predict_us, 2),
                  number(row.time_s, 4)});
     }
   }
@@ -58,29 +59,26 @@ std::string paper_table(const json& methods) {
 
 }  // namespace
 
-std::string comparison_section(const ReportInput& input, const json& comparison) {
-  const json& methods = comparison.at("methods");
+std::string comparison_section(const ReportInput& input, const json& result) {
+  const ComparisonResult comparison = comparison_of(result);
+  const std::vector<MethodResult>& methods = comparison.methods;
   std::string out = section("Methods compared");
-  out += paragraph("Every method had the same train and validate logs; errors on the test logs, against the " +
-                   comparison.at("against").get<std::string>() + ".");
+  out += paragraph(
+      fmt::format("Every method had the same train and validate logs; errors on the test logs, against the {}.",
+                  comparison.against_truth ? "truth" : "measurement"));
   std::vector<Cell> head{{"method"}, {"mean of rated", "n"}};
-  for (std::size_t j = 0; j < methods.at(0).at("rmse").size(); ++j)
-    head.push_back({fmt::format("joint {}", j + 1), "n"});
+  for (std::size_t j = 0; j < methods.at(0).rmse.size(); ++j) head.push_back({fmt::format("joint {}", j + 1), "n"});
   for (const char* name : {"smoothness", "multiplications a tick", "training [s]", "us a prediction", "fixed - double"})
     head.push_back({name, "n"});
   Table table(head);
-  for (const json& method : methods) {
-    std::vector<Cell> row{{method.at("name").get<std::string>()},
-                          {fmt::format("{:.3f} %", method.at("mean_percent_rated").get<double>()), "n"}};
-    for (const json& share : method.at("percent_rated"))
-      row.push_back({fmt::format("{:.3g} %", share.get<double>()), "n"});
-    row.push_back(number(method.at("smoothness"), 3));
-    row.push_back({fmt::format("{:.0f}", method.at("macs_per_tick").get<double>()), "n"});
-    const json& train_s = method.at("train_s");
-    row.push_back(train_s.is_null() ? Cell{"-", "n"} : number(train_s, 3));
-    row.push_back(number(method.at("predict_us"), 2));
-    const json& fixed = method.at("fixed_error");
-    row.push_back(fixed.is_null() ? Cell{"-", "n"} : Cell{fmt::format("{:.1e}", fixed.get<double>()), "n"});
+  for (const MethodResult& method : methods) {
+    std::vector<Cell> row{{method.name}, {fmt::format("{:.3f} %", method.mean_percent_rated), "n"}};
+    for (const double share : method.percent_rated) row.push_back({fmt::format("{:.3g} %", share), "n"});
+    row.push_back(number(method.smoothness, 3));
+    row.push_back({fmt::format("{:.0f}", method.macs_per_tick), "n"});
+    row.push_back(method.train_s ? number(*method.train_s, 3) : Cell{"-", "n"});
+    row.push_back(number(method.predict_us, 2));
+    row.push_back(method.fixed_error ? Cell{fmt::format("{:.1e}", *method.fixed_error), "n"} : Cell{"-", "n"});
     table.add(row);
   }
   out += table.html();
@@ -89,18 +87,17 @@ std::string comparison_section(const ReportInput& input, const json& comparison)
       "sample "
       "(RMS) beside the reference; 1 is as smooth. Fixed - double: the largest difference, of rated torque.");
   std::vector<Cell> joints_head{{"RMSE, peak [N*m | N]"}};
-  for (std::size_t j = 0; j < methods.at(0).at("rmse").size(); ++j)
+  for (std::size_t j = 0; j < methods.at(0).rmse.size(); ++j)
     joints_head.push_back({fmt::format("joint {}", j + 1), "n"});
   Table absolute(joints_head);
-  for (const json& method : methods) {
-    std::vector<Cell> row{{method.at("name").get<std::string>()}};
-    for (std::size_t j = 0; j < method.at("rmse").size(); ++j)
-      row.push_back(
-          {fmt::format("{:.3g}, {:.3g}", method["rmse"][j].get<double>(), method["peak"][j].get<double>()), "n"});
+  for (const MethodResult& method : methods) {
+    std::vector<Cell> row{{method.name}};
+    for (std::size_t j = 0; j < method.rmse.size(); ++j)
+      row.push_back({fmt::format("{:.3g}, {:.3g}", method.rmse[j], method.peak[j]), "n"});
     absolute.add(row);
   }
   out += absolute.html();
-  if (comparison.value("paper", false)) out += paper_table(methods);
+  if (comparison.paper) out += paper_table(methods);
   for (const ComparisonPlot& plot : comparison_plots) {
     const std::filesystem::path file = input.directory / "plots" / plot.file;
     if (std::filesystem::exists(file)) out += subsection(plot.title) + read_file(file);

@@ -1,4 +1,4 @@
-#include "host_tools/report/diagnosis_plot.hpp"
+#include "host_tools/page/diagnosis_plot.hpp"
 
 #include <fmt/format.h>
 
@@ -210,10 +210,6 @@ std::string diagnosis_section(const ReportInput& input, const json& diagnosis) {
     if (note.is_string()) out += paragraph("Note: " + note.get<std::string>() + ".");
   }
   return out + pictures(joints, input.directory);
-}
-
-fs::path diagnosis_plot(const fs::path& directory, std::size_t joint) {
-  return directory / "plots" / fmt::format("diagnosis_joint_{}.svg", joint + 1);
 }
 
 }  // namespace fxdyn

@@ -4,6 +4,7 @@
 
 #include "host_tools/page/page.hpp"
 #include "host_tools/page/plot.hpp"
+#include "host_tools/report/efficiency_result.hpp"
 #include "host_tools/report/section.hpp"
 
 namespace fxdyn {
@@ -11,17 +12,19 @@ namespace fxdyn {
 using namespace page;
 using nlohmann::json;
 
-std::string efficiency_section(const ReportInput&, const json& efficiency) {
+std::string efficiency_section(const ReportInput&, const json& file) {
+  const EfficiencyResult efficiency = efficiency_of(file);
   std::string out = section("Error against seconds of data");
-  const auto draw_curves = [&](const char* key, const char* x_of, const std::string& x_label) {
+  const auto draw_curves = [&](const std::vector<EfficiencyPoint>& points_of_all, double EfficiencyPoint::*x_of,
+                               bool name_seconds, const std::string& x_label) {
     std::map<std::string, std::pair<std::vector<double>, std::vector<double>>> curves;
-    for (const json& point : efficiency.at(key)) {
-      for (const auto& [name, error] : point.at("percent_rated").items()) {
-        if (error.is_null()) continue;
+    for (const EfficiencyPoint& point : points_of_all) {
+      for (const auto& [name, error] : point.percent_rated) {
+        if (!error) continue;
         std::string title = name;
-        if (std::string(key) == "mix") title += fmt::format(", {:g} s", point.at("seconds").get<double>());
-        curves[title].first.push_back(point.at(x_of).get<double>());
-        curves[title].second.push_back(error.get<double>());
+        if (name_seconds) title += fmt::format(", {:g} s", point.seconds);
+        curves[title].first.push_back(point.*x_of);
+        curves[title].second.push_back(*error);
       }
     }
     static constexpr const char* colours[] = {"#2e6fb7", "#e4572e", "#2a9d4a", "#8e5ea2", "#b8860b", "#444444"};
@@ -36,9 +39,9 @@ std::string efficiency_section(const ReportInput&, const json& efficiency) {
     return draw({chart}, 1);
   };
   out += paragraph("Half of the seconds fast motion, half slow.");
-  out += draw_curves("curve", "seconds", "seconds of train data");
+  out += draw_curves(efficiency.curve, &EfficiencyPoint::seconds, false, "seconds of train data");
   out += subsection("Which mix of fast and slow motion");
-  out += draw_curves("mix", "slow_share", "share of slow motion");
+  out += draw_curves(efficiency.mix, &EfficiencyPoint::slow_share, true, "share of slow motion");
   return out;
 }
 

@@ -2,7 +2,9 @@
 
 #include <cmath>
 
+#include "host_tools/effects/formats_json.hpp"
 #include "host_tools/page/page.hpp"
+#include "host_tools/report/export_result.hpp"
 #include "host_tools/report/section.hpp"
 
 namespace fxdyn {
@@ -36,9 +38,10 @@ std::string limits(const json& model) {
 
 }  // namespace
 
-std::string fixed_point_section(const ReportInput& input, const json& result) {
+std::string fixed_point_section(const ReportInput& input, const json& file) {
   std::string out = section("Fixed point");
-  if (result.is_null()) return out + paragraph("Not exported from this model: run fxdyn export.");
+  if (file.is_null()) return out + paragraph("Not exported from this model: run fxdyn export.");
+  const ExportResult result = export_of(file);
   Table errors({{"joint"},
                 {"unit"},
                 {"observed |fixed - double|", "n"},
@@ -48,16 +51,16 @@ std::string fixed_point_section(const ReportInput& input, const json& result) {
                 {"of rated", "n"},
                 {"torque attained", "n"},
                 {"proven at most", "n"}});
-  for (const json& joint : result.at("joints")) {
-    errors.add({{text(joint.at("joint"))},
-                {text(joint.at("unit"))},
-                number(joint.at("observed_max"), 3),
-                {fmt::format("{:.2g}", joint.at("observed_max_of_rated").get<double>()), "n"},
-                number(joint.at("quantisation_rms"), 3),
-                number(joint.at("proven_bound"), 3),
-                {fmt::format("{:.2g}", joint.at("proven_bound_of_rated").get<double>()), "n"},
-                number(joint.at("torque_range").at("attained"), 4),
-                number(joint.at("torque_range").at("proven"), 4)});
+  for (const ExportResult::Joint& joint : result.joints) {
+    errors.add({{joint.name},
+                {joint.unit},
+                number(joint.largest_error, 3),
+                {fmt::format("{:.2g}", joint.largest_error / joint.rated_torque), "n"},
+                number(joint.rms_error, 3),
+                number(joint.proven_error, 3),
+                {fmt::format("{:.2g}", joint.proven_error / joint.rated_torque), "n"},
+                number(joint.attained_torque, 4),
+                number(joint.proven_torque, 4)});
   }
   out += errors.html();
   out += paragraph(
@@ -65,11 +68,11 @@ std::string fixed_point_section(const ReportInput& input, const json& result) {
       "random "
       "states within them and while creeping. Proven for every motion within the limits. The last two columns: the "
       "largest torque of the model that a search within the limits finds, and what it can't exceed.");
-  out += paragraph(fmt::format("Tables: {} bytes. Saturated numbers on the undisturbed logs: {}.",
-                               result.at("table_bytes").get<std::int64_t>(),
-                               result.at("saturations_on_logs").get<std::int64_t>()));
+  out += paragraph(fmt::format("Tables: {} bytes. Saturated numbers on the undisturbed logs: {}.", result.table_bytes,
+                               result.saturations_on_logs));
+  const json bits_by_name = formats_json(result.formats);
   Table formats({{"quantity"}, {"fractional bits", "n"}, {"bits", "n"}, {"step", "n"}, {"range", "n"}});
-  for (const auto& [name, value] : result.at("formats").items()) {
+  for (const auto& [name, value] : bits_by_name.items()) {
     const int bits = value, width = name.ends_with("_sum") ? 64 : 32;
     formats.add({{name},
                  {fmt::format("{}", bits), "n"},

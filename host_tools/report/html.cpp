@@ -1,6 +1,6 @@
 #include <fmt/format.h>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/page/page.hpp"
 #include "host_tools/report/report.hpp"
 #include "host_tools/report/results.hpp"
@@ -47,7 +47,7 @@ void write_report(const IdentifiedModel& fitted, const std::vector<ProcessedLog>
   std::string page = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n<title>{} - "
       "fxdyn</title>\n<style>{}</style></head><body>\n",
-      escape(fitted.robot.name), style);
+      escape(robot_of(fitted).name), style);
   const ReportInput input{fitted, to_json(fitted), logs, results, directory};
   page += header(input.model, results["metrics"]);
   page += draw_sections(input, report_sections());

@@ -1,6 +1,9 @@
 #include <fmt/format.h>
 
+#include <optional>
+
 #include "host_tools/report/diagnosis_table.hpp"
+#include "host_tools/report/export_result.hpp"
 #include "host_tools/report/report.hpp"
 #include "host_tools/report/results.hpp"
 
@@ -37,10 +40,11 @@ std::string replay_line(const json& replayed) {
 
 std::string summary_table(const fs::path& directory) {
   const Results results = read_results(directory);
-  const json &metrics = results["metrics"], &exported = results["export"], &replayed = results["replay"],
-             &diagnosis = results["diagnosis"];
+  const json &metrics = results["metrics"], &replayed = results["replay"], &diagnosis = results["diagnosis"];
+  const json& tables = results["export"];
   const std::string diagnosed = diagnosis.is_null() ? "" : diagnosis_table(diagnosis);
   if (metrics.is_null()) return diagnosed;
+  const auto exported = tables.is_null() ? std::nullopt : std::optional(export_of(tables));
   const std::vector<StageErrors> stages = stages_of(metrics);
   const Role role = role_of(results.role);
   const json& joints = metrics.at("logs").at(0).at("joints");
@@ -51,7 +55,7 @@ std::string summary_table(const fs::path& directory) {
                                 results.role, "joint", width, "unit");
   for (const StageErrors& stage : stages) out += fmt::format("{:>20}", stage_title(stage));
   if (metrics.contains("training")) out += fmt::format("{:>10}", "by BLS");
-  if (!exported.is_null()) out += fmt::format("{:>22}", "|fixed - double| max");
+  if (exported) out += fmt::format("{:>22}", "|fixed - double| max");
   out += "\n";
   for (std::size_t j = 0; j < joints.size(); ++j) {
     out += fmt::format("{:<{}}{:<6}", joints.at(j).at("joint").get<std::string>(), width,
@@ -61,8 +65,9 @@ std::string summary_table(const fs::path& directory) {
       out += fmt::format("{:>10.4g} ({:6.2f}%)", error.rmse, 100 * error.relative());
     }
     if (metrics.contains("training")) out += fmt::format("{:>10}", bls_verdict(metrics, stages, role, j));
-    if (!exported.is_null()) {
-      out += fmt::format("{:>13.1e} of rated", exported.at("joints").at(j).at("observed_max_of_rated").get<double>());
+    if (exported) {
+      const ExportResult::Joint& joint = exported->joints.at(j);
+      out += fmt::format("{:>13.1e} of rated", joint.largest_error / joint.rated_torque);
     }
     out += "\n";
   }

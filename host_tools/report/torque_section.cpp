@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "host_tools/effects/evaluator.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/page/page.hpp"
 #include "host_tools/page/plot.hpp"
 #include "host_tools/report/section.hpp"
@@ -20,9 +20,9 @@ std::string torque_section(const ReportInput& input, const json&) {
     const Eigen::MatrixXd predicted = log.filter_columns(predict(input.fitted, log));
     const Eigen::MatrixXd measured = log.filter_columns(log.tau);
     const Eigen::Index count = log.last - log.first;
-    for (std::size_t j = 0; j < input.fitted.robot.size(); ++j) {
+    for (std::size_t j = 0; j < robot_of(input.fitted).size(); ++j) {
       const auto k = static_cast<Eigen::Index>(j);
-      const Joint& joint = input.fitted.robot.joints[j];
+      const Joint& joint = robot_of(input.fitted).joints[j];
       TorquePlot plot{log.t.segment(log.first, count), measured.col(k).segment(log.first, count),
                       predicted.col(k).segment(log.first, count), joint.torque_unit()};
       const double rmse = (plot.measured - plot.predicted).norm() / std::sqrt(static_cast<double>(count));

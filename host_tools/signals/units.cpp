@@ -26,7 +26,7 @@ void check_velocity(const Log& log, Index joint, bool revolute, const std::strin
   const Eigen::VectorXd slope = (log.q.col(joint).tail(n) - log.q.col(joint).head(n)).cwiseQuotient(span);
   const Eigen::VectorXd dq = log.dq.col(joint).segment(half, n);
   const double power = dq.squaredNorm();
-  if (power == 0 || slope.dot(dq) < 0.7 * slope.norm() * dq.norm()) return;  // too noisy or at rest: can't tell
+  if (power == 0 || slope.dot(dq) < 0.7 * slope.norm() * dq.norm()) return;  // too noisy or at rest: not decidable
   const double ratio = slope.dot(dq) / power;
   const auto near = [ratio](double value) { return std::abs(ratio / value - 1) < 0.15; };
   if (revolute && near(degrees)) {

@@ -182,7 +182,7 @@ void SeenMotion::look(const VectorXd& q, const VectorXd& dq) {
 ClosedLoopRun run_closed_loop(const IdentifiedModel& plant, const Reference& reference,
                               const ClosedLoopSettings& settings) {
   const Index samples = reference.q.rows(), n = reference.q.cols();
-  ClosedLoopRun run{MatrixXd(samples, n), MatrixXd(samples, n), MatrixXd(samples, n), MatrixXd(samples, n)};
+  ClosedLoopRun run{{MatrixXd(samples, n), MatrixXd(samples, n), MatrixXd(samples, n)}, MatrixXd(samples, n)};
   if (samples == 0) return run;
   Plant robot(plant, reference.q.row(0), reference.dq.row(0), reference.ddq.row(0),
               reference.step_s / settings.substeps, settings.age_s);

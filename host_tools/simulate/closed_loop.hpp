@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "host_tools/effects/forward.hpp"
+#include "host_tools/signals/motion.hpp"
 #include "host_tools/support/error.hpp"
 
 namespace fxdyn {
@@ -13,11 +14,17 @@ struct RunsAway : DataError {
   RunsAway() : DataError("the closed loop runs away") {}
 };
 
-/// Where the robot is asked to go: samples x joints, `step_s` apart [rad | m, and per s, s^2].
-struct Reference {
+/// Where the robot is asked to go: samples `step_s` apart.
+struct Reference : MotionRows {
   double step_s = 0;
-  Eigen::MatrixXd q, dq, ddq;
   Eigen::MatrixXd feedforward;  ///< torque added to the controller's [N*m | N]; empty: none
+
+  Reference() = default;
+  Reference(double step, Eigen::MatrixXd position, Eigen::MatrixXd velocity, Eigen::MatrixXd acceleration,
+            Eigen::MatrixXd torque)
+      : MotionRows{std::move(position), std::move(velocity), std::move(acceleration)},
+        step_s(step),
+        feedforward(std::move(torque)) {}
 };
 
 /// Joint by joint tau = kp (q_r - q) + kd (dq_r - dq) + feedforward with kp = M w^2 and kd = 2 damping M w,
@@ -52,8 +59,8 @@ class SeenMotion {
 
 /// At the reference's samples. dq and ddq are derivatives of q; ddq jumps with the controller's torque, and shows the
 /// mean of both sides there. tau: the torque that the controller applies from the sample on [N*m | N].
-struct ClosedLoopRun {
-  Eigen::MatrixXd q, dq, ddq, tau;
+struct ClosedLoopRun : MotionRows {
+  Eigen::MatrixXd tau;
 };
 
 /// The model as a plant, M(q) ddq + h(q, dq) + effects(q, dq) = tau: without the effects that need the running total

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 
 namespace fxdyn {
 
@@ -46,14 +46,14 @@ double LuGreBristles::advance(double v0, double v1, double seconds) {
 }
 
 bool has_lugre(const IdentifiedModel& plant) {
-  return std::any_of(plant.joints.begin(), plant.joints.end(),
+  return std::any_of(joints_of(plant).begin(), joints_of(plant).end(),
                      [](const JointFit& joint) { return joint.find("lugre") != nullptr; });
 }
 
 MatrixXd lugre_torque(const IdentifiedModel& plant, const MatrixXd& dq, double step_s) {
   MatrixXd tau = MatrixXd::Zero(dq.rows(), dq.cols());
   for (Index j = 0; j < dq.cols(); ++j) {
-    const JointFit& joint = plant.joints[static_cast<std::size_t>(j)];
+    const JointFit& joint = joints_of(plant)[static_cast<std::size_t>(j)];
     const EffectFit* fit = joint.find("lugre");
     if (fit == nullptr) continue;
     LuGreBristles bristles(*fit);

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <string_view>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/simulate/mujoco_model.hpp"
 #include "host_tools/support/error.hpp"
 
@@ -45,7 +45,7 @@ double force(const EffectFit& fit, const JointFit& joint, Index j, const DriveSt
   if (name == "friction_drift") return (1 - std::exp(-now.time_s / fit.shape[0])) * (p[0] * sign + p[1] * v);
   if (name == "joint_coupling") {
     const double other = now.dq[peer()];
-    return p[0] * soft_sign(other, plant.joints[static_cast<std::size_t>(peer())].sign_width) + p[1] * other;
+    return p[0] * soft_sign(other, joints_of(plant)[static_cast<std::size_t>(peer())].sign_width) + p[1] * other;
   }
   if (name == "motor_coupling") {
     const double ratio = fit.shape[1], geared = ratio * now.dq[peer()];
@@ -80,8 +80,8 @@ VectorXd relaxed(const Eigen::Ref<const VectorXd>& torque, double r, double step
 }  // namespace
 
 DriveForces::DriveForces(const IdentifiedModel& plant)
-    : plant_(plant), bristle_(plant.joints.size(), 0.0), bristle_q_(plant.joints.size(), 0.0) {
-  for (const JointFit& joint : plant.joints) {
+    : plant_(plant), bristle_(joints_of(plant).size(), 0.0), bristle_q_(joints_of(plant).size(), 0.0) {
+  for (const JointFit& joint : joints_of(plant)) {
     const EffectFit* fit = joint.find("lugre");
     lugre_.push_back(fit != nullptr ? std::optional<LuGreBristles>(*fit) : std::nullopt);
   }
@@ -91,7 +91,7 @@ VectorXd DriveForces::operator()(const DriveState& now) {
   VectorXd sum = VectorXd::Zero(now.q.size());
   for (Index j = 0; j < sum.size(); ++j) {
     const auto i = static_cast<std::size_t>(j);
-    const JointFit& joint = plant_.joints[i];
+    const JointFit& joint = joints_of(plant_)[i];
     sum[j] += coulomb_share(joint).applied * soft_sign(now.dq[j], joint.sign_width);
     if (lugre_[i]) {
       const double v0 = started_ ? last_dq_[j] : now.dq[j], seconds = started_ ? now.time_s - last_s_ : 0;
@@ -118,7 +118,7 @@ VectorXd DriveForces::operator()(const DriveState& now) {
 
 void measure_torque(const IdentifiedModel& plant, double step_s, Eigen::MatrixXd& tau) {
   for (Index j = 0; j < tau.cols(); ++j) {
-    for (const EffectFit& fit : plant.joints[static_cast<std::size_t>(j)].effects) {
+    for (const EffectFit& fit : joints_of(plant)[static_cast<std::size_t>(j)].effects) {
       const VectorXd before = tau.col(j);
       if (fit.effect == "torque_gain") tau.col(j) *= 1 + fit.linear[0];
       if (fit.effect == "saturation") {
@@ -138,7 +138,7 @@ void measure_torque(const IdentifiedModel& plant, double step_s, Eigen::MatrixXd
 Eigen::MatrixXd gear_deflections(const IdentifiedModel& plant, double step_s, const Eigen::MatrixXd& load) {
   Eigen::MatrixXd delta = Eigen::MatrixXd::Zero(load.rows(), load.cols());
   for (Index j = 0; j < load.cols(); ++j) {
-    const JointFit& joint = plant.joints[static_cast<std::size_t>(j)];
+    const JointFit& joint = joints_of(plant)[static_cast<std::size_t>(j)];
     for (const EffectFit& fit : joint.effects) {
       if (fit.effect == "elasticity") delta.col(j) += fit.linear[0] * relaxed(load.col(j), fit.shape[0], step_s);
       if (fit.effect == "backlash")

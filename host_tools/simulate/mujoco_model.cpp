@@ -6,7 +6,7 @@
 #include <array>
 #include <cstring>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/support/error.hpp"
 
 namespace fxdyn {
@@ -55,8 +55,8 @@ std::string gear(const JointFit& joint) {
 }
 
 Eigen::Vector3d gravity(const IdentifiedModel& plant) {
-  Eigen::Vector3d g = plant.robot.gravity;
-  for (const EffectFit& fit : plant.body) {
+  Eigen::Vector3d g = robot_of(plant).gravity;
+  for (const EffectFit& fit : body_of(plant)) {
     if (fit.effect != "gravity_tilt") continue;
     g = Eigen::AngleAxisd(fit.linear[1], Eigen::Vector3d::UnitY()) *
         (Eigen::AngleAxisd(fit.linear[0], Eigen::Vector3d::UnitX()) * g);
@@ -120,20 +120,20 @@ CoulombShare coulomb_share(const JointFit& joint) {
 }
 
 MujocoModel::MujocoModel(const IdentifiedModel& plant, const Options& options) {
-  const std::size_t n = plant.robot.size();
+  const std::size_t n = robot_of(plant).size();
   std::string xml = fmt::format(
       "<mujoco><compiler angle=\"radian\"/><option timestep=\"{:.17g}\" gravity=\"{}\" integrator=\"implicit\"/>\n"
       "<worldbody>\n",
       options.step_s, xyz(gravity(plant)));
   int at = 0;
   for (std::size_t i = 0; i < n; ++i) {
-    const Joint& joint = plant.robot.joints[i];
+    const Joint& joint = robot_of(plant).joints[i];
     const Eigen::Quaterniond turn(joint.origin.linear());
     xml += fmt::format("<body pos=\"{}\" quat=\"{:.17g} {:.17g} {:.17g} {:.17g}\">\n", xyz(joint.origin.translation()),
                        turn.w(), turn.x(), turn.y(), turn.z());
     // a body of its own would need a mass between motor and gear: both joints move the link's
     xml += "<inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/>\n";
-    const JointFit& fit = plant.joints[i];
+    const JointFit& fit = joints_of(plant)[i];
     motor.push_back(at++);
     xml += joint_tag(joint, options.bare ? std::string() : drive(fit, options.step_s));
     const bool two = !options.bare && gear_moves(fit);
@@ -144,8 +144,8 @@ MujocoModel::MujocoModel(const IdentifiedModel& plant, const Options& options) {
   xml += "</worldbody></mujoco>\n";
   model.reset(load(xml));
   for (std::size_t i = 0; i < n; ++i) {
-    Inertial body = plant.robot.joints[i].inertial.value_or(Inertial{});
-    if (i + 1 == n) body = loaded(body, plant.body);
+    Inertial body = robot_of(plant).joints[i].inertial.value_or(Inertial{});
+    if (i + 1 == n) body = loaded(body, body_of(plant));
     set_body(*model, static_cast<int>(i) + 1, body);
   }
   data.reset(mj_makeData(model.get()));

@@ -1,14 +1,14 @@
 #pragma once
 
 #include "host_tools/signals/log.hpp"
+#include "host_tools/signals/motion.hpp"
 #include "host_tools/simulate/scenario.hpp"
 
 namespace fxdyn {
 
 /// The exact run of a plant on a uniform grid that starts with the log, samples x joints: what there is to measure.
-struct PlantRun {
+struct PlantRun : MotionRows {  ///< of the motors
   double step_s = 0;
-  Eigen::MatrixXd q, dq, ddq;   ///< of the motors [rad | m]
   Eigen::MatrixXd tau;          ///< [N*m | N]
   Eigen::MatrixXd deflections;  ///< motor minus link [rad | m]
 };

@@ -79,7 +79,7 @@ PlantRun closed_loop(const Scenario& scenario, Reference reference, double age_s
     const ZeroPhaseFilter filter(4 * scenario.control.bandwidth_hz, reference.step_s);
     for (Eigen::MatrixXd* signal : {&run.q, &run.dq, &run.ddq}) *signal = filter.apply(*signal);
   }
-  return {reference.step_s, std::move(run.q), std::move(run.dq), std::move(run.ddq), {}, {}};
+  return {{std::move(run.q), std::move(run.dq), std::move(run.ddq)}, reference.step_s, {}, {}};
 }
 
 /// The torque of the very motion that the log shows, however the plant came to it. LuGre friction has code of its own.
@@ -103,7 +103,7 @@ PlantRun run_plant(const Scenario& scenario, const ScenarioLog& log, double leng
   if (controlled) {
     run = closed_loop(scenario, std::move(motion), log.start_s, hold);
   } else {
-    run = {step_s, std::move(motion.q), std::move(motion.dq), std::move(motion.ddq), {}, {}};
+    run = {{std::move(motion.q), std::move(motion.dq), std::move(motion.ddq)}, step_s, {}, {}};
   }
   if (mujoco) return run;
   add_torque(scenario, log.start_s, run);

@@ -17,7 +17,7 @@ void write_file(const std::filesystem::path& file, std::string_view content);
 /// @throws InputError with what to do
 void check_writable(const std::filesystem::path& directory);
 
-/// FNV-1a, 64 bits, as 16 hex digits: tells whether a file is still the one a model was made from.
+/// FNV-1a, 64 bits, as 16 hex digits: shows whether a file is still the one a model was made from.
 std::string hash_of(std::string_view content);
 /// Of a file, read piece by piece.
 std::string hash_of_file(const std::filesystem::path& file);

@@ -8,7 +8,7 @@ namespace fxdyn {
 /// A progress bar on stderr, one per stage of work. On a terminal it is redrawn; elsewhere each stage prints one line.
 class Progress {
  public:
-  /// What went wrong in a stage is told on a line of its own.
+  /// What went wrong in a stage is printed on a line of its own.
   ~Progress() { done(); }
   /// Starts a stage of `total` steps; ends the one before.
   void stage(const std::string& name, std::size_t total);

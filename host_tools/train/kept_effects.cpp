@@ -134,8 +134,7 @@ std::vector<MatrixXd> KeptEffects::torque(const IdentifiedModel& model, const st
   return out;
 }
 
-void KeptEffects::mark_hidden(std::vector<ProcessedLog>& logs) const {
-  constexpr double near = 0.98;  // of the limit: noise and the filter's overshoot
+void KeptEffects::mark_hidden(std::vector<ProcessedLog>& logs, const KeptOptions& options) const {
   for (std::size_t j = 0; j < diagnosed_.joints.size(); ++j) {
     const auto& effects = diagnosed_.joints[j].effects;
     const auto fit = std::find_if(effects.begin(), effects.end(), [](const EffectFit& one) {
@@ -143,7 +142,9 @@ void KeptEffects::mark_hidden(std::vector<ProcessedLog>& logs) const {
     });
     if (fit == effects.end()) continue;
     for (ProcessedLog& log : logs) {
-      const auto beyond = [&](Index k) { return std::fabs(log.tau(k, static_cast<Index>(j))) > near * fit->shape[0]; };
+      const auto beyond = [&](Index k) {
+        return std::fabs(log.tau(k, static_cast<Index>(j))) > options.at_limit * fit->shape[0];
+      };
       for (Index k = 0; k < log.samples();) {
         Index end = k;
         while (end < log.samples() && beyond(end)) ++end;

@@ -2,11 +2,12 @@
 
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/dataset.hpp"
+#include "host_tools/train/options.hpp"
 
 namespace fxdyn {
 
 /// What diagnosis found and the Fitter has no columns for: effects on position or body, those that need the structural
-/// or the total torque, a rotor that only the load's friction tells from the link, drift in a session that was warm
+/// or the total torque, a rotor that only the load's friction separates from the link, drift in a session that was warm
 /// when a log began, and what a healthy session had of an effect that grew. They stay as they are while everything else
 /// is fitted again.
 class KeptEffects {
@@ -25,7 +26,7 @@ class KeptEffects {
   /// model's rigid body: exact where the fit ends at `model`, else off by the kept effects' share of the difference.
   std::vector<Eigen::MatrixXd> torque(const IdentifiedModel& model, const std::vector<ProcessedLog>& logs) const;
   /// Marks the samples as saturated at which a named saturation hides what the total was: before the Fitter is made.
-  void mark_hidden(std::vector<ProcessedLog>& logs) const;
+  void mark_hidden(std::vector<ProcessedLog>& logs, const KeptOptions& options = {}) const;
 
  private:
   bool is_kept(std::size_t joint, const EffectFit& fit) const;

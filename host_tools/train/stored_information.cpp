@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
@@ -13,7 +14,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr const char* schema = "fxdyn.information/1";
+constexpr const char* schema = "fxdyn.information/2";
 
 /// Of all that the model says but its tables, which an export makes anew without touching a coefficient.
 std::string hash_without_tables(const IdentifiedModel& model) {
@@ -22,11 +23,24 @@ std::string hash_without_tables(const IdentifiedModel& model) {
   return hash_of(to_json(bare).dump());
 }
 
+bool fits_drift(const Fitter& fitter) {
+  for (std::size_t j = 0; j < fitter.joints(); ++j) {
+    for (const EffectFit& fit : fitter.design(j).effects) {
+      if (drifts(fit.effect)) return true;
+    }
+  }
+  return false;
+}
+
 }  // namespace
 
 StoredInformation stored_information(const Fitter& fitter) {
   const ProcessedLog& log = fitter.logs().front();
-  return {fitter.unknowns(), fitter.weights(), log.step_s * static_cast<double>(log.decimation), fitter.information()};
+  return {.unknowns = fitter.unknowns(),
+          .weights = fitter.weights(),
+          .row_interval_s = log.step_s * static_cast<double>(log.decimation),
+          .fits_drift = fits_drift(fitter),
+          .information = fitter.information()};
 }
 
 Eigen::VectorXd coefficients_of(const IdentifiedModel& model, const std::vector<JointFit>& design) {
@@ -52,6 +66,7 @@ void write_information(const StoredInformation& stored, const IdentifiedModel& m
                          {"unknowns", stored.unknowns},
                          {"weights", std::vector<double>(stored.weights.begin(), stored.weights.end())},
                          {"row_interval_s", stored.row_interval_s},
+                         {"fits_drift", stored.fits_drift},
                          {"rows", stored.information.rows()},
                          {"triangle", upper}};
   const std::vector<std::uint8_t> bytes = json::to_cbor(document);
@@ -73,6 +88,7 @@ StoredInformation read_information(const IdentifiedModel& model, const std::file
     const auto weights = document.at("weights").get<std::vector<double>>();
     out.weights = Eigen::Map<const Eigen::VectorXd>(weights.data(), static_cast<Eigen::Index>(weights.size()));
     out.row_interval_s = document.at("row_interval_s");
+    out.fits_drift = document.at("fits_drift");
     const auto upper = document.at("triangle").get<std::vector<double>>();
     const auto size = static_cast<Eigen::Index>(out.unknowns.size()) + 1;
     if (static_cast<Eigen::Index>(upper.size()) != size * (size + 1) / 2 || weights.size() != model.joints.size())

@@ -7,12 +7,13 @@
 
 namespace fxdyn {
 
-/// What the logs that a model was trained on told of its coefficients: where `fxdyn update` goes on. In
+/// Information of the logs that a model was trained on about its coefficients: where `fxdyn update` goes on. In
 /// DIR/information.cbor.
 struct StoredInformation {
   std::vector<std::string> unknowns;  ///< Fitter::unknowns(): which coefficients, in which order
   Eigen::VectorXd weights;            ///< of a row of each joint: one over the variance of what the model leaves over
   double row_interval_s = 0;          ///< between the rows of one log
+  bool fits_drift = false;            ///< drift is among the unknowns: every log began cold
   SquareRootInformation information;
 };
 

@@ -27,8 +27,9 @@ struct SwarmSettings {
 };
 
 /// Particle swarm optimisation in a box, generation by generation: the caller evaluates positions() in any order and on
-/// as many threads as it likes, and tells the values. Random numbers belong to (seed, generation, particle), so that
-/// nothing else has a say in the outcome; a state that was written and read again goes on as if nothing had happened.
+/// as many threads as it likes, and hands back the values with tell(). Random numbers belong to (seed, generation,
+/// particle), so that nothing else has a say in the outcome; a state that was written and read again goes on as if
+/// nothing had happened.
 ///
 ///   v <- chi [w v + c_1 r_1 (p - x) + c_2 r_2 (g - x)],  x <- x + v,  cut to the box (paper Eqs. 34, 32, 36)
 ///
@@ -45,7 +46,7 @@ class Swarm {
   void tell(const Eigen::VectorXd& values);
   /// All generations done, or stalled.
   bool finished() const;
-  /// Generations that were told.
+  /// Generations whose values are known.
   int generation() const { return generation_; }
   const Eigen::VectorXd& best() const { return best_; }
   double best_value() const { return best_value_; }

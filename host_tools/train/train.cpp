@@ -11,9 +11,6 @@
 namespace fxdyn {
 namespace {
 
-constexpr double worth_keeping = 0.05;
-constexpr double nearly = 1.05;
-
 struct Choice {
   JointFit design;  ///< no BLS: none that was tried is quiet
   Judgement judgement;
@@ -42,7 +39,8 @@ std::vector<Eigen::Index> grid_sizes(const TrainSettings& settings) {
 }
 
 /// Of one joint. Its design has no BLS where none is quiet enough.
-Choice by_grid(const Fitter& fitter, std::size_t j, const TrainSettings& settings, Progress& progress) {
+Choice by_grid(const Fitter& fitter, std::size_t j, const TrainSettings& settings, Progress& progress,
+               double nearly_as_good) {
   std::vector<double> ridges{1e-5, 1e-4, 1e-3, 1e-2};
   if (settings.ridge) ridges = {*settings.ridge};
   const std::vector<Eigen::Index> sizes = grid_sizes(settings);
@@ -87,7 +85,7 @@ Choice by_grid(const Fitter& fitter, std::size_t j, const TrainSettings& setting
   // Of those that are nearly as good, the one with the smallest coefficients: it leans least on its training data.
   const int evaluations = out.evaluations;
   for (const Choice& choice : tried) {
-    if (choice.judgement.rmse > nearly * tried[*best].judgement.rmse) continue;
+    if (choice.judgement.rmse > nearly_as_good * tried[*best].judgement.rmse) continue;
     if (!out.design.bls || choice.judgement.coefficient_sum < out.judgement.coefficient_sum) out = choice;
   }
   out.evaluations = evaluations;
@@ -148,7 +146,7 @@ nlohmann::json choice_json(const TrainOutcome& outcome) {
 }
 
 std::vector<TrainOutcome> train(Fitter& fitter, const TrainSettings& settings, Progress& progress,
-                                const std::optional<ResumeFile>& resume) {
+                                const std::optional<ResumeFile>& resume, const TrainOptions& options) {
   const std::size_t n = fitter.joints();
   const std::size_t grid_steps = grid_distances(settings).size() + grid_velocities(settings).size() +
                                  grid_scales.size() * grid_sizes(settings).size();
@@ -159,12 +157,12 @@ std::vector<TrainOutcome> train(Fitter& fitter, const TrainSettings& settings, P
   if (settings.pso) {
     chosen = by_swarm(fitter, settings, progress, resume);
   } else {
-    parallel_for(n, [&](std::size_t j) { chosen[j] = by_grid(fitter, j, settings, progress); });
+    parallel_for(n, [&](std::size_t j) { chosen[j] = by_grid(fitter, j, settings, progress, options.nearly_as_good); });
   }
   std::vector<TrainOutcome> outcomes(n);
   for (std::size_t j = 0; j < n; ++j) {
     const Choice& choice = chosen[j];
-    const bool kept = choice.design.bls && choice.quiet && choice.judgement.beats(without[j], worth_keeping);
+    const bool kept = choice.design.bls && choice.quiet && choice.judgement.beats(without[j], options.worth_keeping);
     outcomes[j] = {.error_without = without[j].rmse,
                    .error_with = choice.judgement.rmse,
                    .kept = kept,

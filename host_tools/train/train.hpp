@@ -7,6 +7,7 @@
 
 #include "host_tools/regression/fitter.hpp"
 #include "host_tools/support/progress.hpp"
+#include "host_tools/train/options.hpp"
 #include "host_tools/train/search.hpp"
 #include "host_tools/train/tuning.hpp"
 
@@ -38,6 +39,7 @@ nlohmann::json choice_json(const TrainOutcome& outcome);
 /// The held-out RMS is over all judging trajectories, whole ones: none that was trained on.
 /// @throws DataError: the resume file is not of this search
 std::vector<TrainOutcome> train(Fitter& fitter, const TrainSettings& settings, Progress& progress,
-                                const std::optional<ResumeFile>& resume = std::nullopt);
+                                const std::optional<ResumeFile>& resume = std::nullopt,
+                                const TrainOptions& options = {});
 
 }  // namespace fxdyn

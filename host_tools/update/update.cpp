@@ -6,7 +6,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/identify/gate_data.hpp"
@@ -20,6 +19,7 @@
 #include "host_tools/support/files.hpp"
 #include "host_tools/train/kept_effects.hpp"
 #include "host_tools/train/stored_information.hpp"
+#include "host_tools/update/update_result.hpp"
 
 namespace fxdyn {
 namespace {
@@ -29,11 +29,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using nlohmann::json;
 namespace fs = std::filesystem;
-
-/// Of the new log, in time: what refits; the rest judges.
-constexpr double refit_share = 2.0 / 3;
-/// Shorter ones show too little of the motion to say anything of it.
-constexpr double shortest_s = 6;
 
 /// The new log in two parts, and the logs that the fit never saw.
 struct NewSession {
@@ -45,7 +40,7 @@ struct NewSession {
 };
 
 NewSession read_session(const Pipeline& pipeline, const IdentifiedModel& model, double row_interval_s,
-                        const fs::path& file) {
+                        const fs::path& file, const UpdateOptions& options) {
   const Project& project = pipeline.project();
   NewSession out;
   out.reference = {file.filename().string(), "update", hash_of_file(file), 0, 0};
@@ -66,13 +61,13 @@ NewSession read_session(const Pipeline& pipeline, const IdentifiedModel& model, 
   {
     const Log whole = read_log_for(model, file, {}, {});
     const double from = whole.t[0], to = whole.t[whole.samples() - 1];
-    if (to - from < shortest_s)
+    if (to - from < options.shortest_s)
       throw DataError(
           fmt::format("{}: {:.1f} s are too short to refit from two thirds and judge by the rest; record {:g} s "
                       "at least",
-                      file.string(), to - from, shortest_s));
+                      file.string(), to - from, options.shortest_s));
     check_torque(whole, model.robot);
-    cut_s = from + refit_share * (to - from);
+    cut_s = from + options.refit_share * (to - from);
     out.refit_s = cut_s - from;
     out.held_out_s = to - cut_s;
     out.reference.from_s = from;
@@ -129,14 +124,7 @@ struct Refit {
 
 Refit refit(const Project& project, const IdentifiedModel& old, const StoredInformation& stored,
             std::vector<ProcessedLog>& logs, double forgetting) {
-  const auto is_drift = [](const std::string& name) {
-    const auto& infos = effect_infos();
-    return std::any_of(infos.begin(), infos.end(), [&](const EffectInfo& info) {
-      return info.drifts() && name.find(fmt::format(": {},", info.name)) != std::string::npos;
-    });
-  };
-  const bool fits_drift = std::any_of(stored.unknowns.begin(), stored.unknowns.end(), is_drift);
-  const KeptEffects kept(old, logs, !fits_drift);
+  const KeptEffects kept(old, logs, !stored.fits_drift);
   std::vector<JointFit> design = kept.design();
   kept.mark_hidden(logs);
   Fitter fitter(project.robot, logs, design);
@@ -238,31 +226,26 @@ std::string table_of(const IdentifiedModel& model, const NewSession& session, co
   return out;
 }
 
-json update_json(const IdentifiedModel& before, const NewSession& session, const Judged& held_out,
-                 const std::optional<Judged>& test, double forgetting) {
-  json joints = json::array();
+UpdateResult result_of(const IdentifiedModel& before, const NewSession& session, const Judged& held_out,
+                       const std::optional<Judged>& test, double forgetting) {
+  UpdateResult out;
+  out.log = session.reference.file;
+  out.hash = session.reference.hash;
+  out.refit_s = session.refit_s;
+  out.held_out_s = session.held_out_s;
+  out.forgetting = forgetting;
   const auto change = [](const Judged& judged, std::size_t j) {
-    return json{{"old", judged.before.rmse[j]}, {"new", judged.after.rmse[j]}};
+    return UpdateResult::Change{judged.before.rmse[j], judged.after.rmse[j]};
   };
   for (std::size_t j = 0; j < before.joints.size(); ++j) {
-    joints.push_back(
-        {{"joint", before.robot.joints[j].name},
-         {"index", j + 1},
-         {"unit", before.robot.joints[j].torque_unit()},
-         {"rated_torque", before.joints[j].rated_torque},
-         {"rmse", {{"held_out", change(held_out, j)}, {"test", test ? change(*test, j) : json(nullptr)}}}});
+    const Joint& joint = before.robot.joints[j];
+    out.joints.push_back({joint.name, joint.torque_unit(), before.joints[j].rated_torque, change(held_out, j),
+                          test ? std::optional(change(*test, j)) : std::nullopt});
   }
-  return {{"schema", "fxdyn.update/1"},
-          {"log", session.reference.file},
-          {"hash", session.reference.hash},
-          {"refit_seconds", session.refit_s},
-          {"held_out_seconds", session.held_out_s},
-          {"forgetting", forgetting},
-          {"joints", joints},
-          {"mean_log_ratio", mean_log_ratio(held_out)},
-          {"tables_crc", {{"old", before.tables_crc}, {"new", nullptr}}},
-          {"sequence", {{"old", before.lineage.sequence}, {"new", nullptr}}},
-          {"accepted", false}};
+  out.mean_log_ratio = mean_log_ratio(held_out);
+  out.tables_crc.before = before.tables_crc;
+  out.sequence.before = before.lineage.sequence;
+  return out;
 }
 
 /// A folder for files that replace those of `directory` together; gone with the object.
@@ -305,7 +288,7 @@ class Staging {
 
 }  // namespace
 
-Update update(Pipeline& pipeline, const UpdateSettings& settings) {
+Update update(Pipeline& pipeline, const UpdateSettings& settings, const UpdateOptions& options) {
   const Project& project = pipeline.project();
   const fs::path& directory = pipeline.directory();
   const double forgetting = settings.forgetting.value_or(project.identify.forgetting);
@@ -316,7 +299,7 @@ Update update(Pipeline& pipeline, const UpdateSettings& settings) {
 
   Progress progress;
   progress.stage("refitting, judging", 3);
-  NewSession session = read_session(pipeline, old, stored.row_interval_s, settings.log);
+  NewSession session = read_session(pipeline, old, stored.row_interval_s, settings.log, options);
   progress.step();
   auto [updated, known] = refit(project, old, stored, session.refit, forgetting);
   progress.step();
@@ -329,10 +312,10 @@ Update update(Pipeline& pipeline, const UpdateSettings& settings) {
   }
   progress.step();
   progress.done();
-  Update out{mean_log_ratio(held_out) < 0, table_of(old, session, held_out, test, forgetting)};
-  json report = update_json(old, session, held_out, test, forgetting);
+  UpdateResult result = result_of(old, session, held_out, test, forgetting);
+  Update out{result.mean_log_ratio < 0, table_of(old, session, held_out, test, forgetting)};
   if (!out.accepted) {
-    write_file(directory / "update.json", report.dump(1) + "\n");
+    write_file(directory / "update.json", to_json(result).dump(1) + "\n");
     return out;
   }
 
@@ -365,10 +348,10 @@ Update update(Pipeline& pipeline, const UpdateSettings& settings) {
     metrics["notes"].push_back(updated.notes.back());
     write_file(staging.path() / "metrics.json", metrics.dump(1) + "\n");
   }
-  report["accepted"] = true;
-  report["tables_crc"]["new"] = updated.tables_crc;
-  report["sequence"]["new"] = updated.lineage.sequence;
-  write_file(staging.path() / "update.json", report.dump(1) + "\n");
+  result.accepted = true;
+  result.tables_crc.after = updated.tables_crc;
+  result.sequence.after = updated.lineage.sequence;
+  write_file(staging.path() / "update.json", to_json(result).dump(1) + "\n");
   staging.replace("model.json");
   return out;
 }

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "host_tools/pipeline/pipeline.hpp"
+#include "host_tools/update/options.hpp"
 
 namespace fxdyn {
 
@@ -27,6 +28,6 @@ struct Update {
 /// stays as tables.previous.bin. DIR/update.json says what happened.
 /// @throws InputError: no trained and exported model in DIR, the log is used already or can't be read.
 /// @throws DataError: a joint does not move, the log contradicts itself, the tables' formats do not hold the result.
-Update update(Pipeline& pipeline, const UpdateSettings& settings);
+Update update(Pipeline& pipeline, const UpdateSettings& settings, const UpdateOptions& options = {});
 
 }  // namespace fxdyn

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/support/random.hpp"
 
 namespace fxdyn {
@@ -97,8 +97,8 @@ Move slower(const Move& move, Index ticks) {
 
 std::vector<Move> make_moves(const IdentifiedModel& robot, double tick_s, std::uint64_t seed, int repeats) {
   Random random(seed);
-  const auto n = static_cast<Index>(robot.joints.size());
-  const auto joint = [&](Index j) -> const JointFit& { return robot.joints[static_cast<std::size_t>(j)]; };
+  const auto n = static_cast<Index>(joints_of(robot).size());
+  const auto joint = [&](Index j) -> const JointFit& { return joints_of(robot)[static_cast<std::size_t>(j)]; };
   const auto pose = [&] {
     VectorXd q(n);
     for (Index j = 0; j < n; ++j) {
@@ -117,7 +117,7 @@ std::vector<Move> make_moves(const IdentifiedModel& robot, double tick_s, std::u
   const auto nudge = [&](double revolute, double prismatic) {
     VectorXd way(n);
     for (Index j = 0; j < n; ++j) {
-      const bool turns = robot.robot.joints[static_cast<std::size_t>(j)].type == JointType::revolute;
+      const bool turns = robot_of(robot).joints[static_cast<std::size_t>(j)].type == JointType::revolute;
       way[j] = (random.uniform() < 0.5 ? -1 : 1) * (turns ? revolute : prismatic);
     }
     return way;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 
 namespace fxdyn {
 namespace {
@@ -24,7 +24,7 @@ double roughness(const MatrixXd& tau, const IdentifiedModel& plant) {
   for (Index j = 0; j < tau.cols(); ++j) {
     const VectorXd change = tau.col(j).tail(changes) - tau.col(j).head(changes);
     sum += std::sqrt(change.squaredNorm() / static_cast<double>(changes)) /
-           plant.joints[static_cast<std::size_t>(j)].rated_torque;
+           joints_of(plant)[static_cast<std::size_t>(j)].rated_torque;
   }
   return sum / static_cast<double>(tau.cols());
 }

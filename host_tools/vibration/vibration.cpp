@@ -34,11 +34,7 @@ using Eigen::VectorXd;
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-constexpr std::array<double, 8> bandwidths{4, 8, 16, 24, 32, 48, 64, 96};  // Hz
-/// Less than 0.3 is a loop that rings by itself (about 30 degrees of phase margin): nobody tunes a drive like that.
-constexpr std::array<double, 5> dampings{0.3, 0.5, 0.7, 1, 1.4};
 constexpr double encoder_step = 2 * std::numbers::pi / (1 << 22);
-constexpr double still = 0.25;  ///< of the residual of the PD alone
 /// Feedforward "model" at the model's motor_reference(), and the same of a path that is shaped.
 constexpr const char* elastic = "model_elastic";
 constexpr const char* elastic_shaped = "model_elastic_shaped";
@@ -66,8 +62,8 @@ struct Plan {
 
 class Experiment {
  public:
-  Experiment(const fs::path& project, const fs::path& directory)
-      : pipeline_(project, directory), model_(with_tables()), plant_(scenario_plant()) {}
+  Experiment(const fs::path& project, const fs::path& directory, const VibrationOptions& options)
+      : pipeline_(project, directory), options_(options), model_(with_tables()), plant_(scenario_plant()) {}
 
   /// @param known of the host alone, whose controller it takes
   VibrationResult with_drive(const VibrationResult& known, const Feedforward& drive) {
@@ -193,14 +189,8 @@ class Experiment {
   }
 
   VibrationControl control() const {
-    return {settings_.bandwidth_hz,
-            settings_.damping,
-            model_.tick_s,
-            encoder_step,
-            instants_.band,
-            instants_.late_s,
-            {bandwidths.begin(), bandwidths.end()},
-            {dampings.begin(), dampings.end()}};
+    return {settings_.bandwidth_hz, settings_.damping, model_.tick_s,          encoder_step,
+            instants_.band,         instants_.late_s,  options_.bandwidths_hz, options_.dampings};
   }
 
   static ClosedLoopSettings loop(double bandwidth_hz, double damping) {
@@ -219,7 +209,7 @@ class Experiment {
       residual[i] = play(plan({}, moves[i]), {}, settings_).residual;
       for (const Method& method : rows) delay[i] = std::max(delay[i], plan(method, moves[i]).delay_s);
     });
-    instants_ = {still * *std::max_element(residual.begin(), residual.end()),
+    instants_ = {options_.still * *std::max_element(residual.begin(), residual.end()),
                  *std::max_element(delay.begin(), delay.end())};
   }
 
@@ -275,6 +265,7 @@ class Experiment {
   }
 
   void tune() {
+    const std::vector<double>&bandwidths = options_.bandwidths_hz, &dampings = options_.dampings;
     const std::vector<Move> moves = make_moves(model_, model_.tick_s, tuning_moves, 1);
     progress_.stage("vibration: tuning the PD", bandwidths.size() * dampings.size());
     std::vector<double> cost(bandwidths.size() * dampings.size());
@@ -364,6 +355,7 @@ class Experiment {
   }
 
   Pipeline pipeline_;
+  VibrationOptions options_;
   IdentifiedModel model_, plant_;
   ClosedLoopSettings settings_;
   Instants instants_;
@@ -372,18 +364,19 @@ class Experiment {
 
 }  // namespace
 
-VibrationResult vibration(const fs::path& project, const fs::path& directory) {
-  VibrationResult result = Experiment(project, directory).run();
+VibrationResult vibration(const fs::path& project, const fs::path& directory, const VibrationOptions& options) {
+  VibrationResult result = Experiment(project, directory, options).run();
   write_file(directory / "vibration.json", to_json(result).dump(1) + "\n");
   return result;
 }
 
-VibrationResult vibration_with(const fs::path& project, const fs::path& directory, const Feedforward& drive) {
+VibrationResult vibration_with(const fs::path& project, const fs::path& directory, const Feedforward& drive,
+                               const VibrationOptions& options) {
   const fs::path file = directory / "vibration.json";
   const json known = fs::exists(file) ? json::parse(read_file(file)) : json();
   const bool current = !known.is_null() && is_unchanged(known.value("made_from", json()), directory);
-  const VibrationResult host = current ? vibration_of(known) : vibration(project, directory);
-  return Experiment(project, directory).with_drive(host, drive);
+  const VibrationResult host = current ? vibration_of(known) : vibration(project, directory, options);
+  return Experiment(project, directory, options).with_drive(host, drive);
 }
 
 }  // namespace fxdyn

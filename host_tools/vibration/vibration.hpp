@@ -6,6 +6,7 @@
 
 #include "host_tools/report/vibration_result.hpp"
 #include "host_tools/simulate/closed_loop.hpp"
+#include "host_tools/vibration/options.hpp"
 
 namespace fxdyn {
 
@@ -42,7 +43,8 @@ namespace fxdyn {
 ///   roughness  RMS of the torque's change from tick to tick, of rated, mean over the joints
 /// "ratios": the same over all moves, of none's and of rigid's.
 /// @throws InputError: no train log comes from a scenario
-VibrationResult vibration(const std::filesystem::path& project, const std::filesystem::path& directory);
+VibrationResult vibration(const std::filesystem::path& project, const std::filesystem::path& directory,
+                          const VibrationOptions& options = {});
 
 /// A drive that is asked for its torque tick by tick.
 struct Feedforward {
@@ -53,6 +55,6 @@ struct Feedforward {
 /// The same moves with this drive in the loop, beside what DIR/vibration.json says of none and the model on the host,
 /// under its controller. It is made first where it is missing or of something else.
 VibrationResult vibration_with(const std::filesystem::path& project, const std::filesystem::path& directory,
-                               const Feedforward& drive);
+                               const Feedforward& drive, const VibrationOptions& options = {});
 
 }  // namespace fxdyn

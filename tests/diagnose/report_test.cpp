@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/diagnose/plots.hpp"
+#include "host_tools/page/diagnosis_plot.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
-#include "host_tools/report/diagnosis_plot.hpp"
 #include "host_tools/support/files.hpp"
 #include "tests/diagnose/arm.hpp"
 #include "tests/diagnose/example.hpp"

@@ -519,19 +519,5 @@ TEST(NominalModel, StandsInWhereTheUrdfHasNoInertias) {
   EXPECT_THROW(nominal_from_urdf(puma(), rated, {1, 1, 1, 0, 1, 1}), InputError);
 }
 
-TEST(Cure, IsAnExperimentThatBothEffectsName) {
-  EXPECT_EQ(cure("viscous", "saturation"),
-            "poses in which the joint carries load, moved slowly with and against gravity");
-  EXPECT_EQ(cure("viscous_cubic", "saturation"), "constant speeds from slow to the limit");
-  EXPECT_EQ(cure("ripple", "offset"), "a wider range of positions");
-  EXPECT_EQ(cure("ripple", "base parameters"), "a wider range of positions, or a baseline");
-  EXPECT_EQ(cure("rotor_inertia", "base parameters"),
-            "nothing: base parameters hold the rotor, and the torque is the same");
-  EXPECT_EQ(cure("payload", "base parameters"),
-            "the same motions recorded without it (role = \"baseline\"), or inertias known beforehand");
-  EXPECT_EQ(cure("joint_coupling", "coulomb"), "joints moved one at a time");
-  EXPECT_EQ(cure("delay", "viscous"), "other positions, speeds and loads in other combinations");
-}
-
 }  // namespace
 }  // namespace fxdyn

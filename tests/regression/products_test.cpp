@@ -27,7 +27,7 @@ struct Rows {
     torque = VectorXd::NullaryExpr(rows, draw);
     weights = VectorXd::NullaryExpr(rows, [&] { return random.uniform() < 0.2 ? 0 : random.uniform(0.5, 2); });
   }
-  OwnMoments products() const { return weighted_products(base, own, weights, torque); }
+  JointMoments products() const { return weighted_products(base, own, weights, torque); }
 };
 
 TEST(Products, AreTheSumsOfASmallExample) {
@@ -35,7 +35,7 @@ TEST(Products, AreTheSumsOfASmallExample) {
   base << 1, 2, 3;
   own << 1, 0, 2, 1, 0, 4;
   const VectorXd weights{{1, 0.5, 2}}, torque{{10, 20, 30}};
-  const OwnMoments sums = weighted_products(base, own, weights, torque);
+  const JointMoments sums = weighted_products(base, own, weights, torque);
   EXPECT_EQ(sums.cross, (MatrixXd(1, 2) << 1 + 2, 1 + 24).finished());
   EXPECT_EQ(sums.gram, (MatrixXd(2, 2) << 3, 1, 1, 32.5).finished());
   EXPECT_EQ(sums.projection, (VectorXd{{30, 250}}));
@@ -47,7 +47,7 @@ class ProductsOf : public testing::TestWithParam<std::array<Index, 3>> {};
 TEST_P(ProductsOf, AreThoseOfTheMatrices) {
   const auto [count, base, own] = GetParam();
   const Rows rows(count, base, own);
-  const OwnMoments sums = rows.products();
+  const JointMoments sums = rows.products();
   const MatrixXd weighted = rows.weights.asDiagonal() * rows.own;
   const double tolerance = 1e-13 * static_cast<double>(count);
   ASSERT_EQ(sums.cross.rows(), base);
@@ -61,11 +61,11 @@ TEST_P(ProductsOf, AreThoseOfTheMatrices) {
 TEST_P(ProductsOf, HaveTheSameBitsWhateverTheProcessor) {
   const auto [count, base, own] = GetParam();
   const Rows rows(count, base, own);
-  const OwnMoments wide = rows.products();
+  const JointMoments wide = rows.products();
   const int widest = at_once;
   for (const int width : {4, 2}) {
     at_once = std::min(widest, width);
-    const OwnMoments narrow = rows.products();
+    const JointMoments narrow = rows.products();
     at_once = widest;
     EXPECT_EQ(narrow.cross, wide.cross) << width;
     EXPECT_EQ(narrow.gram, wide.gram) << width;

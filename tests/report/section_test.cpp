@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "host_tools/report/comparison_plots.hpp"
+#include "host_tools/page/comparison_plots.hpp"
 #include "host_tools/support/files.hpp"
 #include "tests/diagnose/small_log.hpp"
 #include "tests/support/files.hpp"

@@ -1,4 +1,4 @@
-#include "host_tools/compare/comparison_result.hpp"
+#include "host_tools/report/comparison_result.hpp"
 
 #include <fmt/format.h>
 
@@ -10,6 +10,24 @@ namespace {
 using nlohmann::json;
 
 json or_null(const std::optional<double>& value) { return value ? json(*value) : json(nullptr); }
+std::optional<double> or_none(const json& value) {
+  return value.is_null() ? std::nullopt : std::optional(value.get<double>());
+}
+
+MethodResult method_of(const json& file) {
+  MethodResult out;
+  out.name = file.at("name");
+  out.rmse = file.at("rmse").get<std::vector<double>>();
+  out.percent_rated = file.at("percent_rated").get<std::vector<double>>();
+  out.peak = file.at("peak").get<std::vector<double>>();
+  out.mean_percent_rated = file.at("mean_percent_rated");
+  out.smoothness = file.at("smoothness");
+  out.macs_per_tick = file.at("macs_per_tick");
+  out.train_s = or_none(file.at("train_s"));
+  out.predict_us = file.at("predict_us");
+  out.fixed_error = or_none(file.at("fixed_error"));
+  return out;
+}
 
 }  // namespace
 
@@ -33,6 +51,16 @@ json to_json(const ComparisonResult& result) {
           {"made_from", result.made_from},
           {"paper", result.paper},
           {"methods", methods}};
+}
+
+ComparisonResult comparison_of(const json& file) {
+  ComparisonResult out;
+  out.against_truth = file.at("against") == "truth";
+  out.project_hash = file.value("project_hash", "");
+  out.made_from = file.value("made_from", json());
+  out.paper = file.value("paper", false);
+  for (const json& method : file.at("methods")) out.methods.push_back(method_of(method));
+  return out;
 }
 
 std::string compare_table(const ComparisonResult& result) {

@@ -26,6 +26,7 @@ struct ComparisonResult {
   std::vector<MethodResult> methods;
 };
 nlohmann::json to_json(const ComparisonResult& result);
+ComparisonResult comparison_of(const nlohmann::json& file);
 
 /// For the terminal.
 std::string compare_table(const ComparisonResult& result);

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <vector>
+
+#include "host_tools/effects/forward.hpp"
+#include "host_tools/effects/joint_fit.hpp"
+#include "host_tools/robot/robot.hpp"
+
+// Parts of a model for those who need no more of it: another field of IdentifiedModel does not compile them again.
+
+namespace fxdyn {
+
+const Robot& robot_of(const IdentifiedModel& model);
+const std::vector<JointFit>& joints_of(const IdentifiedModel& model);
+const std::vector<EffectFit>& body_of(const IdentifiedModel& model);
+double tick_of(const IdentifiedModel& model);  ///< [s]
+
+/// The content of model.json.
+nlohmann::json to_json(const IdentifiedModel& model);
+
+}  // namespace fxdyn

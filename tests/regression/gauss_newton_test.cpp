@@ -1,0 +1,86 @@
+// Separable least squares on small data: what is nonlinear is found by damped Gauss-Newton.
+
+#include "host_tools/regression/gauss_newton.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace fxdyn {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// y = amplitude exp(-rate t)
+struct Decay {
+  VectorXd t = VectorXd::LinSpaced(50, 0, 2), y = 3 * (-1.7 * t.array()).exp();
+  double amplitude = 0;
+
+  VectorXd column(double rate) const { return (-rate * t.array()).exp(); }
+  double square(double rate) {
+    const VectorXd x = column(rate);
+    amplitude = x.dot(y) / x.squaredNorm();
+    return (y - amplitude * x).squaredNorm();
+  }
+  VectorXd step(double rate) {
+    square(rate);
+    MatrixXd x(t.size(), 2);
+    x << column(rate), -amplitude * t.cwiseProduct(column(rate));
+    return x.householderQr().solve(y - amplitude * column(rate)).tail(1);
+  }
+};
+
+TEST(GaussNewton, FindsTheShapeAndTheCoefficient) {
+  Decay decay;
+  double best = decay.square(0.5);
+  int rounds = 0;
+  const VectorXd rate = gauss_newton(
+      VectorXd::Constant(1, 0.5), {.most_rounds = 50, .tolerance = 1e-10},
+      [&](const VectorXd& x, int) { return ++rounds, std::optional(decay.step(x[0])); },
+      [&](const VectorXd& x, int) {
+        const double now = decay.square(x[0]);
+        return now <= best ? (best = now, true) : false;
+      });
+  EXPECT_NEAR(rate[0], 1.7, 1e-8);
+  decay.square(rate[0]);
+  EXPECT_NEAR(decay.amplitude, 3, 1e-8);
+  EXPECT_LT(rounds, 15);
+}
+
+TEST(GaussNewton, ShortensAStepThatLeadsAway) {
+  // From 3 the full steps to the root of atan diverge.
+  double now = std::atan(3.0);
+  const VectorXd x = gauss_newton(
+      VectorXd::Constant(1, 3), {.most_rounds = 50, .tolerance = 1e-12},
+      [](const VectorXd& at, int) {
+        return std::optional(VectorXd::Constant(1, -std::atan(at[0]) * (1 + at[0] * at[0])));
+      },
+      [&](const VectorXd& at, int) {
+        const double there = std::fabs(std::atan(at[0]));
+        return there <= now ? (now = there, true) : false;
+      });
+  EXPECT_NEAR(x[0], 0, 1e-12);
+}
+
+TEST(GaussNewton, EndsWhereNoShareOfTheStepIsBetter) {
+  int tried = 0;
+  const VectorXd x = gauss_newton(
+      VectorXd::Zero(2), {.shrink = 0.5, .shortest = 0.2},
+      [](const VectorXd&, int) { return std::optional(VectorXd::Ones(2)); },
+      [&](const VectorXd&, int) { return ++tried < 0; });
+  EXPECT_EQ(tried, 3);  // 1, 1/2, 1/4
+  EXPECT_EQ(x, VectorXd::Zero(2));
+}
+
+TEST(GaussNewton, KeepsTheBounds) {
+  const GaussNewton rules{.lower = VectorXd::Constant(1, -1), .upper = VectorXd::Constant(1, 2)};
+  const auto up = [](const VectorXd&, int round) {
+    return round < 3 ? std::optional(VectorXd::Constant(1, 5)) : std::nullopt;
+  };
+  EXPECT_EQ(gauss_newton(VectorXd::Zero(1), rules, up, [](const VectorXd&, int) { return true; })[0], 2);
+}
+
+}  // namespace
+}  // namespace fxdyn
