@@ -6,6 +6,7 @@
 #include "host_tools/excite/excite.hpp"
 #include "host_tools/pipeline/forward_log.hpp"
 #include "host_tools/pipeline/one_log.hpp"
+#include "host_tools/pipeline/refine_model.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/support/error.hpp"
 
@@ -75,6 +76,24 @@ Action add_forward(CLI::App& verb) {
       ->capture_default_str();
   verb.add_option("--out", options->out, "directory for the simulated motion")->required();
   return [options] { fmt::print("{}", forward_log(options->model, options->log, options->given, options->out)); };
+}
+
+Action add_refine(CLI::App& verb) {
+  struct Options {
+    std::string model;
+    int given = 20;
+  };
+  const auto project = add_project(verb);
+  const auto options = std::make_shared<Options>();
+  verb.add_option("--model", options->model, "the model to start from (default: model.json in --out)");
+  verb.add_option("--given", options->given, "first samples of a log that are known: where the motion starts")
+      ->capture_default_str();
+  return [project, options] {
+    const std::filesystem::path out = project->out;
+    const std::filesystem::path model =
+        options->model.empty() ? out / "model.json" : std::filesystem::path(options->model);
+    fmt::print("{}", refine_model(project->project, model, options->given, out));
+  };
 }
 
 Action add_payload(CLI::App& verb) {

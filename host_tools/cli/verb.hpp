@@ -39,6 +39,7 @@ Action add_excite(CLI::App& verb);
 Action add_simulate(CLI::App& verb);
 Action add_predict(CLI::App& verb);
 Action add_forward(CLI::App& verb);
+Action add_refine(CLI::App& verb);
 Action add_payload(CLI::App& verb);
 Action add_effects(CLI::App& verb);
 

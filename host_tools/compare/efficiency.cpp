@@ -21,8 +21,9 @@ namespace fs = std::filesystem;
 const std::vector<double> seconds{5, 10, 20, 40, 60, 120};
 const std::vector<double> mixed_seconds{10, 60};
 const std::vector<double> slow_shares{0, 0.25, 0.5, 0.75, 1};
-const std::vector<std::string> methods{"rigid_ls", "friction_ls", "rls", "mlp", "bls_default", "bls_physical", "lugre"};
-const std::vector<std::string> mixed_methods{"friction_ls", "lugre"};
+const std::vector<std::string> methods{"rigid_ls", "friction_ls",    "rls",  "mlp", "bls_default", "bls_physical",
+                                       "lugre",    "lugre_physical", "named"};
+const std::vector<std::string> mixed_methods{"friction_ls", "lugre", "lugre_physical"};
 
 struct Source {
   LogEntry entry;
@@ -126,11 +127,11 @@ EfficiencyResult efficiency(const fs::path& project, const fs::path& directory) 
 std::string efficiency_table(const EfficiencyResult& result) {
   const auto cell = [](const EfficiencyPoint& point, const std::string& name) {
     const auto found = point.percent_rated.find(name);
-    if (found == point.percent_rated.end() || !found->second) return fmt::format("{:>13}", "-");
-    return fmt::format("{:>13.3g}", *found->second);
+    if (found == point.percent_rated.end() || !found->second) return fmt::format("{:>15}", "-");
+    return fmt::format("{:>15.3g}", *found->second);
   };
   std::string out = "test error, % of rated, mean of the joints\n   seconds  slow";
-  for (const std::string& name : methods) out += fmt::format("{:>13}", name);
+  for (const std::string& name : methods) out += fmt::format("{:>15}", name);
   for (const auto* part : {&result.curve, &result.mix}) {
     out += "\n";
     for (const EfficiencyPoint& point : *part) {

@@ -14,8 +14,10 @@ namespace {
 std::optional<std::string> out_of_range(const EffectFit& fit, const EffectInfo& info) {
   const auto check = [](const ParameterInfo& parameter, double value) -> std::optional<std::string> {
     if (value >= parameter.lower && value <= parameter.upper) return std::nullopt;
-    return fmt::format("lugre: {} {:g} is not within {:g} .. {:g} {}", parameter.name, value, parameter.lower,
-                       parameter.upper, parameter.unit);
+    const bool stiff = parameter.name == "distance" && value < parameter.lower;
+    return fmt::format("lugre: {} {:g} is not within {:g} .. {:g} {}: {}", parameter.name, value, parameter.lower,
+                       parameter.upper, parameter.unit,
+                       stiff ? "bristles that do not bend are `coulomb` and `stribeck`, take those" : "correct it");
   };
   for (std::size_t i = 0; i < fit.shape.size(); ++i) {
     if (auto why = check(info.shape[i], fit.shape[i])) return why;

@@ -70,32 +70,27 @@ struct Start {
   VectorXd q, dq, ddq;
 };
 
-Start start_of(const Log& raw, Index given) {
+Start start_of(const Eigen::Ref<const MatrixXd>& q, double step_s) {
+  const Index given = q.rows();
   MatrixXd powers(given, 3);
   for (Index k = 0; k < given; ++k) {
-    const double t = static_cast<double>(k - given + 1) * raw.step_s;
+    const double t = static_cast<double>(k - given + 1) * step_s;
     powers.row(k) << 1, t, 0.5 * t * t;
   }
-  const MatrixXd fit = powers.householderQr().solve(raw.q.topRows(given));
+  const MatrixXd fit = powers.householderQr().solve(q);
   return {fit.row(0), fit.row(1), fit.row(2)};
 }
 
-ForwardRun judged(const Log& raw, Index given, const MatrixXd& q_from_start) {
+ForwardRun attempt(const IdentifiedModel& model, const Log& raw, const ProcessedLog& log, Index given, Loop loop) {
   ForwardRun run;
-  run.q = raw.q;
-  const Index judged = raw.samples() - given;
-  run.q.bottomRows(judged) = q_from_start.bottomRows(judged);
-  run.rmse = (run.q - raw.q).bottomRows(judged).colwise().norm().transpose() / std::sqrt(static_cast<double>(judged));
-  return run;
-}
-
-template <class Simulate>
-ForwardRun attempt(const Log& raw, Index given, Simulate&& simulate) {
   try {
-    return judged(raw, given, simulate());
+    run.q = simulated_positions(model, raw, log, 0, raw.samples(), given, loop);
   } catch (const DataError& error) {  // not every model is a plant, and not every motion ends
     return {{}, {}, error.what()};
   }
+  const Index judged = raw.samples() - given;
+  run.rmse = (run.q - raw.q).bottomRows(judged).colwise().norm().transpose() / std::sqrt(static_cast<double>(judged));
+  return run;
 }
 
 }  // namespace
@@ -109,31 +104,37 @@ MatrixXd driving_torque(const IdentifiedModel& model, const ProcessedLog& log) {
   return lead == 0 ? torque : at_other_times(torque, -lead);
 }
 
+MatrixXd simulated_positions(const IdentifiedModel& model, const Log& raw, const ProcessedLog& log, Index from,
+                             Index to, Index given, Loop loop) {
+  const IdentifiedModel plant = with_load_of(log, model);
+  const Index start = from + given - 1, count = to - start;
+  const MatrixXd torque = driving_torque(model, log);
+  ClosedLoopSettings settings;
+  settings.age_s = age_of(model, log) + static_cast<double>(start) * log.step_s;
+  MatrixXd q = raw.q.middleRows(from, to - from);
+  if (loop == Loop::open) {
+    const Start known = start_of(q.topRows(given), raw.step_s);
+    const OpenLoopStart state{known.q, known.dq, known.ddq};
+    q.bottomRows(count - 1) =
+        run_open_loop(plant, state, log.step_s, torque.middleRows(start, count), settings.substeps, settings.age_s)
+            .bottomRows(count - 1);
+  } else {
+    const MotionRows motion = log.motion(start, count);
+    const Reference reference{log.step_s, motion.q, motion.dq, motion.ddq,
+                              log.filter_columns(torque).middleRows(start, count)};
+    q.bottomRows(count - 1) = run_closed_loop(plant, reference, settings).q.bottomRows(count - 1);
+  }
+  return q;
+}
+
 Forward simulate_forward(const IdentifiedModel& model, const Log& raw, const ProcessedLog& log, Index given,
                          const ForwardOptions& options) {
   check_length(raw, given);
   check_torque(model, raw, options.stuck_share);
   check_robot(model, log);
-  const IdentifiedModel plant = with_load_of(log, model);
-  const Index from = given - 1, count = raw.samples() - from;
-  const MatrixXd torque = driving_torque(model, log);
-  const Start start = start_of(raw, given);
-  ClosedLoopSettings settings;
-  settings.age_s = age_of(model, log) + static_cast<double>(from) * log.step_s;
   Forward out;
   parallel_for(2, [&](std::size_t i) {
-    if (i == 0) {
-      out.open = attempt(raw, given, [&] {
-        const OpenLoopStart state{start.q, start.dq, start.ddq};
-        return run_open_loop(plant, state, log.step_s, torque.bottomRows(count), settings.substeps, settings.age_s);
-      });
-    } else {
-      out.closed = attempt(raw, given, [&] {
-        const MotionRows motion = log.motion(from, count);
-        Reference reference{log.step_s, motion.q, motion.dq, motion.ddq, log.filter_columns(torque).bottomRows(count)};
-        return run_closed_loop(plant, reference, settings).q;
-      });
-    }
+    (i == 0 ? out.open : out.closed) = attempt(model, raw, log, given, i == 0 ? Loop::open : Loop::closed);
   });
   return out;
 }

@@ -25,6 +25,16 @@ struct Forward {
   ForwardRun closed;  ///< with a PD that follows the recorded motion (ClosedLoopSettings)
 };
 
+enum class Loop { open, closed };
+
+/// A stretch of a log, [from, to), played through the model.
+/// @param raw the log as it was read, with torque
+/// @param log the same log, processed with the model's filter
+/// @return positions at the samples of the stretch; of its first `given`, at least 3, the measured ones [rad | m]
+/// @throws DataError: the model is no plant, or the motion runs away
+Eigen::MatrixXd simulated_positions(const IdentifiedModel& model, const Log& raw, const ProcessedLog& log,
+                                    Eigen::Index from, Eigen::Index to, Eigen::Index given, Loop loop);
+
 /// Both runs start in the state that a parabola through the measured positions of the given samples has at the last of
 /// them: q, dq, ddq by least squares. Nothing later is used in open loop.
 /// @param raw the log as it was read, with torque

@@ -52,6 +52,55 @@ TEST(StateBls, FeaturesAndNodesAreTheActivationOfAffineMaps) {
   }
 }
 
+/// argmin_w |A w - y|^2 / (2 rows) + lambda sum |w|, one coordinate after the other until none moves.
+VectorXd lasso_by_coordinates(const MatrixXd& a, const VectorXd& y, double lambda) {
+  const auto rows = static_cast<double>(a.rows());
+  VectorXd w = VectorXd::Zero(a.cols()), left = y;
+  for (double moved = 1; moved > 1e-13;) {
+    moved = 0;
+    for (Index k = 0; k < a.cols(); ++k) {
+      const double size = a.col(k).squaredNorm() / rows, slope = a.col(k).dot(left) / rows + size * w[k];
+      const double next = std::copysign(std::max(std::fabs(slope) - lambda, 0.0), slope) / size;
+      left -= (next - w[k]) * a.col(k);
+      moved = std::max(moved, std::fabs(next - w[k]));
+      w[k] = next;
+    }
+  }
+  return w;
+}
+
+TEST(StateBls, ItsFeaturesAreThoseOfTheSparseAutoencoder) {
+  // Chen, Liu 2018, which the paper's Eqs. 22-27 stand on: random features A_i of [u, 1], the L1 fit W of [u, 1] by
+  // A_i, and the window's features are phi([u, 1] W^T). The random numbers are drawn as the program draws them, all
+  // else is written anew.
+  const MatrixXd x = states(300, 1);
+  const StateBlsShape shape = shape_of("tanh");
+  const Eigen::RowVectorXd mean = x.colwise().mean();
+  MatrixXd u(x.rows(), 4);
+  u << x.rowwise() - mean, VectorXd::Ones(x.rows());
+  for (Index c = 0; c < 3; ++c) u.col(c) /= u.col(c).cwiseAbs().maxCoeff();
+  Random random(3);
+  MatrixXd argument(x.rows(), 6);
+  for (Index window = 0; window < shape.windows; ++window) {
+    MatrixXd start(4, shape.nodes);
+    for (Index i = 0; i < shape.nodes; ++i) {
+      for (Index k = 0; k < 4; ++k) start(k, i) = random.uniform(-1, 1);
+    }
+    MatrixXd a = u * start;
+    for (Index i = 0; i < shape.nodes; ++i) a.col(i) /= a.col(i).cwiseAbs().maxCoeff();
+    MatrixXd w(shape.nodes, 4);
+    for (Index k = 0; k < 4; ++k) w.col(k) = lasso_by_coordinates(a, u.col(k), 1e-3);
+    argument.middleCols(window * shape.nodes, shape.nodes) = u * w.transpose();
+  }
+  const MatrixXd columns = StateBls(shape, x, 3).columns(x);
+  EXPECT_LT((columns.leftCols(6) - MatrixXd(argument.array().tanh())).cwiseAbs().maxCoeff(), 1e-6);
+  // Eq. 26: the enhancement nodes are the activation of an affine map of all features.
+  MatrixXd z(x.rows(), 7);
+  z << columns.leftCols(6), VectorXd::Ones(x.rows());
+  const MatrixXd h = columns.rightCols(7).array().max(-1 + 1e-9).min(1 - 1e-9).atanh();
+  EXPECT_LT((z * z.colPivHouseholderQr().solve(h) - h).norm(), 1e-5 * h.norm());
+}
+
 TEST(StateBls, LearnsAFunctionOfTheStateAndNotOneOfThePast) {
   const MatrixXd train = states(2000, 4), test = states(500, 5);
   StateBlsShape shape;

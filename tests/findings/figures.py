@@ -261,12 +261,15 @@ def chosen(projects, figures, options):
 
 
 def missing_data(project):
-    """Why a project of measured logs can't run; a folder that was named and lacks them is an error."""
+    """Why a project of measured logs can't run. A folder that was named, or has other sets in it, and lacks them is an
+    error, as in tests/support/data.hpp."""
     name = project.get('data')
     if not name or (data_folder() / name).is_dir():
         return ''
     if 'FXDYN_DATA' in os.environ:
         raise Wrong(f'FXDYN_DATA is set, but has no folder {name}')
+    if data_folder().is_dir():
+        raise Wrong(f'{data_folder()} has no folder {name}')
     return f'no measured data: set FXDYN_DATA to the folder that holds {name}'
 
 

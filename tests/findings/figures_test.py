@@ -200,6 +200,9 @@ class Figures(unittest.TestCase):
             toy = self.toy(more_project='data = "robot"')
             self.assertEqual(toy.run(), 0)
             self.assertIn('skipped', toy.out.getvalue())
+            # other sets are there: this one must not be missing unseen
+            figures.data_folder().mkdir(parents=True)
+            self.assertEqual(self.toy(more_project='data = "robot"').run(), 1)
 
     def test_a_wrong_list_is_said(self):
         for place, why in (('row = "x"', 'row and column, or after'), (CELL + '\ncolour = 1', 'unknown key')):

@@ -103,6 +103,7 @@ done
 echo '{"schema": "fxdyn.model/1"}' >"$work/model.json"
 expect 2 "model.json" predict --model "$work/model.json" --log "$work/good.csv" --out "$work/out"
 expect 1 "the mass of the load cannot be identified from this motion: no joint of this robot lifts" payload --model "$work/good/model.json" --log "$work/good.csv" --out "$work/out"
+unwritten() { [ ! -e "$work/out" ] || { echo "FAILED: $1 left files behind"; failures=$((failures + 1)); }; }
 forward() { expect 2 "$1" forward --model "$work/good/model.json" --log "$work/$2" --out "$work/out" "${@:3}"; }
 forward "at least 3 samples" good.csv --given 2
 forward "nothing is left to simulate" good.csv --given 5000
@@ -115,15 +116,24 @@ awk -F, 'BEGIN { OFS = "," } NR == 700 { $5 = "nan" } { print }' "$work/good.csv
 forward "gap.csv:700" gap.csv
 sed '2,12s/^[^,]*,[^,]*/,/' "$work/good.csv" >"$work/first.csv"
 forward "first.csv:2" first.csv
-# A model of a robot with other joints, and of the same joints with other masses.
+# Another robot of two joints: its links hang in a vertical plane, so that gravity is nearly all of its torque; then one with a joint less.
+awk 'BEGIN { print "t,q1,q2,tau1,tau2"; for (k = 0; k < 5000; k++) { t = k * 0.002; q1 = 0.8 * sin(2 * t); q2 = 0.6 * sin(3 * t + 1);
+  tau2 = 6 * cos(q1 + q2) - 0.3 * sin(3 * t + 1); printf "%.4f,%.9f,%.9f,%.6f,%.6f\n", t, q1, q2, 15 * cos(q1) - 0.4 * sin(2 * t) + tau2, tau2 } }' >"$work/hanging.csv"
+forward "is it this robot's" hanging.csv
 awk -F, 'BEGIN { OFS = "," } { print $1, $2, $4 }' "$work/good.csv" >"$work/one.csv"
 forward "q2" one.csv
-[ ! -e "$work/out" ] || { echo "FAILED: forward left files behind"; failures=$((failures + 1)); }
+unwritten forward
 "$fxdyn" forward --model "$work/good/model.json" --log "$work/good.csv" --out "$work/forward" >/dev/null 2>&1 ||
   { echo "FAILED: forward of a good log"; failures=$((failures + 1)); }
 for file in forward.json closed.csv forward.svg; do
   [ -s "$work/forward/$file" ] || { echo "FAILED: forward: no $file"; failures=$((failures + 1)); }
 done
+# Parameters for simulation: of a model of this project only, and not without one.
+expect 2 "is no model of" refine "$work/still.toml" --model "$work/good/model.json" --out "$work/out"
+expect 2 "model.json" refine "$work/good.toml" --out "$work/out"
+expect 2 "at least 3 samples" refine "$work/good.toml" --model "$work/good/model.json" --given 2 --out "$work/out"
+expect 2 "too few beside the 2000 that are given" refine "$work/good.toml" --model "$work/good/model.json" --given 2000 --out "$work/out"
+unwritten refine
 # LuGre friction that would drive the joint, and bristles that can't bend: every verb that reads the model says so.
 lugre() {  # lugre FILE DISTANCE DAMPING
   python3 - "$work/good/model.json" "$work/$1" "$2" "$3" <<'PYTHON'
@@ -142,7 +152,10 @@ lugre stiff.json 0 2
 lugre brakes.json 0.01 20
 for verb in predict forward payload; do
   expect 2 "joint 2 (second): lugre: with a damping of 1000 it would drive the joint" $verb --model "$work/drives.json" --log "$work/good.csv" --out "$work/out"
+  unwritten "$verb with friction that drives"
   expect 2 "joint 2 (second): lugre: distance 0 is not within" $verb --model "$work/stiff.json" --log "$work/good.csv" --out "$work/out"
+  expect 2 'bristles that do not bend are `coulomb` and `stribeck`, take those' $verb --model "$work/stiff.json" --log "$work/good.csv" --out "$work/out"
+  unwritten "$verb with bristles that can't bend"
 done
 "$fxdyn" predict --model "$work/brakes.json" --log "$work/good.csv" --out "$work/brakes" >/dev/null 2>&1 ||
   { echo "FAILED: predict with LuGre friction"; failures=$((failures + 1)); }

@@ -292,10 +292,7 @@ TEST(Demo, TheBlsLearnsTheFrictionThatTheModelLeavesOut) {
 
 TEST(Target, FirmwareGivesTheHostsBitsOnARealLog) {
   for (const char* set : {"ur10_unisa", "emps"}) {  // six revolute joints; one prismatic
-    if (!test::data_is_there(set)) {
-      ASSERT_EQ(std::getenv("FXDYN_DATA"), nullptr) << "FXDYN_DATA is set, but has no folder " << set;
-      GTEST_SKIP() << "no measured data: set FXDYN_DATA";
-    }
+    FXDYN_NEEDS_DATA(set);
     const fs::path project = fs::path(FXDYN_SOURCE_DIR) / "tests" / "real" / (std::string(set) + ".toml");
     expect_exact(replay_on_target(project, test::folder() / set), 1000);
   }

@@ -96,6 +96,7 @@ assert curve[20]["friction_ls"] < 0.7 * curve[5]["friction_ls"]
 assert curve[20]["mlp"] < 0.7 * curve[5]["mlp"]
 # LuGre is past that: what is left of it, 0.132, 0.101, 0.131 %, are the gears, which this method does not know.
 for seconds in curve:
+    assert {"lugre", "lugre_physical", "named"} <= set(curve[seconds]), curve[seconds]
     assert curve[seconds]["lugre"] < 0.15, seconds
     assert curve[seconds]["lugre"] < 0.1 * curve[seconds]["friction_ls"], seconds
 PYTHON
