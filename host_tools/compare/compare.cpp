@@ -11,8 +11,8 @@
 
 #include "host_tools/compare/figures.hpp"
 #include "host_tools/compare/mlp.hpp"
+#include "host_tools/compare/named_model.hpp"
 #include "host_tools/compare/state_bls.hpp"
-#include "host_tools/diagnose/diagnose.hpp"
 #include "host_tools/effects/broad_learning_types.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
@@ -20,7 +20,6 @@
 #include "host_tools/identify/estimate.hpp"
 #include "host_tools/identify/structure.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
-#include "host_tools/pipeline/training.hpp"
 #include "host_tools/project/provenance.hpp"
 #include "host_tools/signals/truth.hpp"
 #include "host_tools/simulate/recordings.hpp"
@@ -120,8 +119,8 @@ class Comparison {
     if (wanted("bls_pso_physical")) physical_bls("bls_pso_physical", true);
     if (wanted("dahl_stribeck")) structural("dahl_stribeck", dahl_stribeck_friction, "wls");
     if (wanted("lugre")) structural("lugre", lugre_friction, "wls");
-    if (wanted("lugre_physical")) lugre_physical();
-    if (wanted("named")) named();
+    if (wanted("lugre_physical")) of_efficiency("lugre_physical", lugre_of_possible_bodies);
+    if (wanted("named")) of_efficiency("named", named_model);
     if (wanted("named_bls")) named_bls();
     if (against_truth_ && wanted("oracle")) oracle();
     if (against_truth_ && wanted("noise_floor")) noise_floor();
@@ -424,35 +423,12 @@ class Comparison {
     add_model(name, spent);
   }
 
-  void lugre_physical() {
+  void of_efficiency(const std::string& name, IdentifiedModel (*make)(const Project&, GateData, Progress&)) {
     const auto start = std::chrono::steady_clock::now();
-    Project project = with_structure(project_, lugre_friction, "wls");
-    project.identify.physical = true;
-    GateData data = data_;
-    const auto fitter = identify(project, data, progress_);
-    last_ = finish_model(*fitter, project, data).model;
+    last_ = make(project_, data_, progress_);
     const double spent = seconds_since(start);
-    stage("lugre_physical");
-    add_model("lugre_physical", spent);
-  }
-
-  void named() {
-    const auto start = std::chrono::steady_clock::now();
-    GateData data = data_;
-    const IdentifiedModel diagnosed = diagnose(project_, data, {}, {}, progress_).model;
-    // Diagnosis searches without a prior; the fit after it, that of `train`, has one.
-    Project plain = project_;
-    plain.train.enabled = false;
-    const auto errors = [&](const IdentifiedModel& model, const std::string& name) {
-      StageErrors out{name, {}};
-      for (const ProcessedLog& log : data.logs) out.logs.push_back(errors_of(log, model.robot, predict(model, log)));
-      return out;
-    };
-    ResumeFile nothing;
-    last_ = Trainer(plain, data, diagnosed, errors, progress_).run(nothing).model;
-    const double spent = seconds_since(start);
-    stage("named");
-    add_model("named", spent);
+    stage(name);
+    add_model(name, spent);
   }
 
   void named_bls() {

@@ -1,0 +1,33 @@
+#include "host_tools/compare/named_model.hpp"
+
+#include "host_tools/diagnose/diagnose.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/identify/estimate.hpp"
+#include "host_tools/identify/identify.hpp"
+#include "host_tools/identify/structure.hpp"
+#include "host_tools/pipeline/training.hpp"
+
+namespace fxdyn {
+
+IdentifiedModel named_model(const Project& project, GateData data, Progress& progress) {
+  const IdentifiedModel diagnosed = diagnose(project, data, {}, {}, progress).model;
+  // Diagnosis searches without a prior; the fit after it, that of `train`, has one.
+  Project plain = project;
+  plain.train.enabled = false;
+  const auto errors = [&](const IdentifiedModel& model, const std::string& name) {
+    StageErrors out{name, {}};
+    for (const ProcessedLog& log : data.logs) out.logs.push_back(errors_of(log, model.robot, predict(model, log)));
+    return out;
+  };
+  ResumeFile nothing;
+  return Trainer(plain, data, diagnosed, errors, progress).run(nothing).model;
+}
+
+IdentifiedModel lugre_of_possible_bodies(const Project& project, GateData data, Progress& progress) {
+  Project bodies = with_structure(project, lugre_friction, "wls");
+  bodies.identify.physical = true;
+  const auto fitter = identify(bodies, data, progress);
+  return finish_model(*fitter, bodies, data).model;
+}
+
+}  // namespace fxdyn
