@@ -89,12 +89,17 @@ TEST_P(SyncTest, ALateSyncIsOneStaleTickAtMost) {
 TEST_P(SyncTest, SetpointsOfTwoTicksAreNotMixedAfterALostSync) {
   run();
   const bool after = GetParam() == Order::after;
-  period(false, 0, after ? 3 : 0);
-  period(true, 0, after ? 0 : 3);
-  EXPECT_EQ(new_stale(), 2U);
-  EXPECT_EQ(bench.counted(Counter::missing_setpoints), after ? 7U : 1U);
-  for (int n = 0; n < 10; ++n) period();
-  EXPECT_EQ(new_stale(), 2U);
+  std::uint32_t stale_before = 0, missing_before = after ? 6 : 0;
+  for (const std::size_t joint : {3U, 1U, 6U}) {
+    period(false, 0, after ? joint : 0);
+    period(true, 0, after ? 0 : joint);
+    EXPECT_EQ(new_stale() - stale_before, 2U) << joint;
+    EXPECT_EQ(bench.counted(Counter::missing_setpoints) - missing_before, 1U) << joint;
+    for (int n = 0; n < 10; ++n) period();
+    EXPECT_EQ(new_stale() - stale_before, 2U) << joint;
+    stale_before = new_stale();
+    missing_before = bench.counted(Counter::missing_setpoints);
+  }
 }
 
 // Setpoints that waited for a SYNC of long ago are never used.
@@ -184,6 +189,9 @@ TEST_P(SyncTest, TwoMastersAreNoticed) {
       told_after = syncs;
       EXPECT_EQ(frame.size, 8);
       EXPECT_NE(frame.data[2] & 0x10, 0) << "error register: communication";
+      const auto period_us = canopen::load<2>(&frame.data[3]);  // of the periods since the rate was last right
+      EXPECT_GT(period_us, 900U);
+      EXPECT_LT(period_us, 2000U);
     }
     answered += torques == test::robot_joints ? 1 : 0;
     for (std::size_t j = 0; j < ramp.size() && emergencies > 0; ++j) {
