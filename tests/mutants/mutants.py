@@ -40,7 +40,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 PROJECT = HERE.parents[1]
 GOLDEN = {'': 'tests/golden', '_remembers': 'tests/golden/remembers'}
 FOLDERS = ('model', 'firmware', 'hal')
-FIRST_VERDICT = 6  # times --seconds: a survivor has to pass every program that sees it
+FIRST_VERDICT = 1.5  # times --seconds, where nothing has a verdict yet: a run without one says nothing
 SPARE = 1.15       # of what is drawn, some are no valid programs
 NOT_ASKED = 'slow programs were not asked'
 
