@@ -87,7 +87,7 @@ inline ValueList others_in_order(Scales s) {
 }
 inline ValueList others_before_first(Scales s) {
   ValueList others;
-  for (unsigned k = s.joint; k-- > 0;) others.add(k + 1);
+  for (unsigned k = s.joint; k > 0; --k) others.add(k);
   for (unsigned k = s.joint + 1; k < s.joints; ++k) others.add(k + 1);
   return others;
 }

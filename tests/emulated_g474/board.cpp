@@ -61,17 +61,27 @@ std::vector<std::uint8_t> Board::flash(Address begin, std::size_t bytes) const {
 
 void Board::tear(Address address) {
   torn_.insert(address & ~7U);
-  watch_torn();
+  watch();
 }
 
-void Board::watch_torn() {
-  if (torn_.empty())
-    core.watch_flash(0, 0);
-  else
-    core.watch_flash(*torn_.begin(), *torn_.rbegin() + 8);
+void Board::note_first_read(Address begin, Address end) {
+  noted_begin_ = begin, noted_end_ = end;
+  first_read_.reset();
+  watch();
+}
+
+void Board::watch() {
+  Address begin = noted_begin_, end = noted_end_;
+  if (!torn_.empty()) {
+    begin = begin == end ? *torn_.begin() : std::min(begin, *torn_.begin());
+    end = std::max(end, *torn_.rbegin() + 8);
+  }
+  core.watch_flash(begin, end);
 }
 
 void Board::reads_flash(Address address) {
+  if (!first_read_ && address >= noted_begin_ && address < noted_end_)
+    first_read_ = FirstRead{now(), watchdog.runs(), watchdog.expires()};
   const Address both = ecc.dual_bank ? address : address & ~0xfU;  // a read takes 64 or 128 bits
   for (Address at = both; at < both + (ecc.dual_bank ? 8 : 16); at += 8)
     if (torn_.count(at) != 0) ecc.detects(at - flash_base);

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -45,7 +46,15 @@ class Board : private Surroundings {
   std::vector<std::uint8_t> flash(Address begin, std::size_t bytes) const;
   /// The double word at `address` was half programmed when the power went: what is read from it cannot be corrected.
   void tear(Address address);
-  void mend() { torn_.clear(), watch_torn(); }
+  void mend() { torn_.clear(), watch(); }
+  /// From here on the first time that data of [begin, end) is read is noted.
+  void note_first_read(Address begin, Address end);
+  struct FirstRead {
+    Time at = 0;
+    bool watchdog_runs = false;
+    Time watchdog_expires = never;
+  };
+  const std::optional<FirstRead>& first_read() const { return first_read_; }
 
   // --- RAM as a debugger sees it ---
   std::uint32_t word(Address address) const;
@@ -85,10 +94,12 @@ class Board : private Surroundings {
   void reset(std::uint32_t flags);
   void follow_clocks();
   void follow_lines();
-  void watch_torn();
+  void watch();
   bool pins_on_fdcan() const;
 
   std::set<Address> torn_;
+  Address noted_begin_ = 0, noted_end_ = 0;
+  std::optional<FirstRead> first_read_;
   std::uint32_t watchdog_resets_ = 0, resets_ = 0;
 };
 

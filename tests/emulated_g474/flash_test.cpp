@@ -130,6 +130,25 @@ TEST_F(Slot, AnEraseThatWasCutOffIsSurvivedInBothBankModes) {
   bench_.expect_clean();
 }
 
+// Whatever becomes of reading a page, the watchdog ends it: it runs by then, and long enough for both pages.
+TEST_F(Slot, TheWatchdogRunsBeforeAPageIsRead) {
+  const Address own = node_image().symbol("fxdyn_tables_begin");
+  for (const auto& [begin, end] : {std::pair{slot(), slot() + 64}, {own, own + 64}}) {
+    write_prefix(double_words());
+    bench_.board.note_first_read(begin, end);
+    power_on(8);
+    ASSERT_TRUE(bench_.boot());
+    const auto& read = bench_.board.first_read();
+    ASSERT_TRUE(read) << std::hex << begin << " is never read";
+    EXPECT_TRUE(read->watchdog_runs) << std::hex << begin;
+    EXPECT_GT(read->watchdog_expires, read->at + 400 * millisecond);
+    EXPECT_LT(read->watchdog_expires, read->at + 1000 * millisecond);
+    bench_.board.note_first_read(0, 0);
+  }
+  EXPECT_EQ(bench_.board.watchdog_resets(), 0u);
+  bench_.expect_clean();
+}
+
 TEST_F(Slot, WithoutReadableTablesItStaysPreOperationalAndSaysSo) {
   write_prefix(0);
   bench_.board.tear(node_image().symbol("fxdyn_tables_begin") + 1024);

@@ -4,8 +4,14 @@
 
 #include <array>
 #include <cstdint>
+#include <iterator>
 #include <limits>
+#include <utility>
 
+#include "firmware/drive_node.hpp"
+#include "firmware/emergency.hpp"
+#include "firmware/protocol/canopen.hpp"
+#include "firmware/protocol/object_dictionary.hpp"
 #include "firmware/protocol/serial_protocol.hpp"
 #include "firmware/protocol/setpoint_codec.hpp"
 #include "firmware/slow_division.hpp"
@@ -25,6 +31,97 @@ TEST(CodecLimits, AShareIsOfTheLargerEndAndOfOneAtLeast) {
   EXPECT_EQ(whole_share(-most, 0), most);
   EXPECT_EQ(whole_share(least, 0), most) << "its negative has no place";
   EXPECT_EQ(whole_share(least + 2, 0), most - 1);
+}
+
+// What stands in a standard or in somebody else's program: tests that use the names would follow a change.
+TEST(NumbersOnTheWire, AreThoseOfCia301) {
+  using canopen::Abort;
+  using canopen::NmtCommand;
+  using canopen::NmtState;
+  const auto command = [](NmtCommand c) { return static_cast<unsigned>(c); };
+  EXPECT_EQ(command(NmtCommand::start), 1U);
+  EXPECT_EQ(command(NmtCommand::stop), 2U);
+  EXPECT_EQ(command(NmtCommand::enter_pre_operational), 128U);
+  EXPECT_EQ(command(NmtCommand::reset_node), 129U);
+  EXPECT_EQ(command(NmtCommand::reset_communication), 130U);
+  const auto state = [](NmtState s) { return static_cast<unsigned>(s); };
+  EXPECT_EQ(state(NmtState::initialising), 0U);
+  EXPECT_EQ(state(NmtState::stopped), 4U);
+  EXPECT_EQ(state(NmtState::operational), 5U);
+  EXPECT_EQ(state(NmtState::pre_operational), 127U);
+  const std::pair<Abort, std::uint32_t> aborts[] = {{Abort::toggle_bit, 0x0503'0000},
+                                                    {Abort::timed_out, 0x0504'0000},
+                                                    {Abort::unknown_command, 0x0504'0001},
+                                                    {Abort::write_only, 0x0601'0001},
+                                                    {Abort::read_only, 0x0601'0002},
+                                                    {Abort::no_object, 0x0602'0000},
+                                                    {Abort::wrong_length, 0x0607'0010},
+                                                    {Abort::too_long, 0x0607'0012},
+                                                    {Abort::too_short, 0x0607'0013},
+                                                    {Abort::no_sub_index, 0x0609'0011},
+                                                    {Abort::invalid_value, 0x0609'0030},
+                                                    {Abort::too_high, 0x0609'0031},
+                                                    {Abort::too_low, 0x0609'0032},
+                                                    {Abort::incompatible, 0x0604'0043},
+                                                    {Abort::device_state, 0x0800'0022},
+                                                    {Abort::no_data, 0x0800'0024},
+                                                    {Abort::none, 0}};
+  for (const auto& [abort, number] : aborts) EXPECT_EQ(static_cast<std::uint32_t>(abort), number) << std::hex << number;
+}
+
+TEST(NumbersOnTheWire, EmergenciesHaveTheirCodesAndBits) {
+  struct Expected {
+    Error error;
+    std::uint16_t code;
+    std::uint8_t bits;
+    bool event;
+  };
+  const Expected expected[] = {{Error::hardware, 0x5000, 0x01, false},
+                               {Error::tables, 0x6320, 0x01, false},
+                               {Error::update_refused, 0x6320, 0x01, true},
+                               {Error::watchdog_reset, 0x6010, 0x01, true},
+                               {Error::id_collision, 0x8150, 0x11, true},
+                               {Error::heartbeat_lost, 0x8130, 0x11, false},
+                               {Error::recovered_from_bus_off, 0x8140, 0x11, true},
+                               {Error::error_passive, 0x8120, 0x11, false},
+                               {Error::overrun, 0x8110, 0x11, true},
+                               {Error::pdo_length, 0x8210, 0x11, true},
+                               {Error::sync_length, 0x8240, 0x11, true},
+                               {Error::setpoints_stale, 0x8250, 0x11, false},
+                               {Error::sync_rate, 0x8700, 0x11, false}};
+  ASSERT_EQ(std::size(expected), error_kinds.size());
+  for (const Expected& e : expected) {
+    const ErrorKind& kind = error_kinds[static_cast<std::size_t>(e.error)];
+    EXPECT_EQ(kind.code, e.code);
+    EXPECT_EQ(kind.register_, e.bits) << std::hex << e.code;
+    EXPECT_EQ(kind.event, e.event) << std::hex << e.code;
+  }
+  EXPECT_EQ(ErrorLog::history_size, 8U) << "of object 0x1003";
+}
+
+TEST(NumbersOnTheWire, AreThoseOfTheSerialProtocol) {
+  EXPECT_EQ(serial::sync, (std::array<std::uint8_t, 2>{0xA5, 0x5F}));
+  const auto type = [](serial::Type t) { return static_cast<unsigned>(t); };
+  EXPECT_EQ(type(serial::Type::hello), 1U);
+  EXPECT_EQ(type(serial::Type::tick), 2U);
+  EXPECT_EQ(type(serial::Type::reset), 3U);
+  EXPECT_EQ(type(serial::Type::identity), 0x81U);
+  EXPECT_EQ(type(serial::Type::torque), 0x82U);
+  EXPECT_EQ(type(serial::Type::reset_done), 0x83U);
+  EXPECT_EQ(type(serial::Type::refused), 0x84U);
+}
+
+TEST(NumbersOnTheWire, FailedPartsAreBitsOfTheGuide) {
+  EXPECT_EQ(hardware_part::can, 1);
+  EXPECT_EQ(hardware_part::wake_up_timer, 2);
+  EXPECT_EQ(hardware_part::watchdog, 4);
+  EXPECT_EQ(hardware_part::crystal, 8);
+}
+
+TEST(CodecLimits, ThePeriodMayBeAHundredthOfTheTickOff) {
+  EXPECT_EQ(dictionary::longest_period_us(10'000), 10'100U);
+  EXPECT_EQ(dictionary::longest_period_us(2000), 2020U);
+  EXPECT_EQ(dictionary::shortest_period_us(10'000), 9900U);
 }
 
 TEST(CodecLimits, SharesRoundHalfUpAndSaturate) {

@@ -79,6 +79,30 @@ TEST_F(DriveNodeObjects, ConsumersAreCheckedAsCia301Says) {
   EXPECT_EQ(bench.write(0x1016, 1, 0x0100'0000U | 5U << 16 | 100, 4), Abort::invalid_value);
 }
 
+// The second of two places: a loss there ends when the place is given away, and the first place's does not.
+TEST_F(DriveNodeObjects, ALossEndsWithItsOwnPlace) {
+  bench.poll();
+  ASSERT_EQ(bench.write(0x1016, 1, 0x7FU << 16 | 60'000, 4), Abort::none);
+  ASSERT_EQ(bench.write(0x1016, 2, 0x7EU << 16 | 50, 4), Abort::none);
+  bench.send(0x77F, {0x05});
+  bench.send(0x77E, {0x05});
+  bench.pass(60'000);
+  ASSERT_TRUE(bench.node.errors().is_present(Error::heartbeat_lost));
+  EXPECT_EQ(bench.write(0x1016, 1, 0x7FU << 16 | 50'000, 4), Abort::none);
+  EXPECT_TRUE(bench.node.errors().is_present(Error::heartbeat_lost)) << "of the other place";
+  EXPECT_EQ(bench.write(0x1016, 2, 0, 4), Abort::none);
+  EXPECT_FALSE(bench.node.errors().is_present(Error::heartbeat_lost));
+}
+
+// Nothing was asked for yet: an abort names no object.
+TEST_F(DriveNodeObjects, ASegmentBeforeAnyRequestNamesNoObject) {
+  bench.poll();
+  const test::Bytes answer = bench.request({0x60, 0, 0, 0, 0, 0, 0, 0});
+  ASSERT_EQ(answer.size(), 8U);
+  EXPECT_EQ(answer[0], 0x80);
+  EXPECT_EQ(test::Bytes(answer.begin() + 1, answer.begin() + 4), (test::Bytes{0, 0, 0}));
+}
+
 TEST_F(DriveNodeObjects, ANodeAbove127IsNotWatched) {
   bench.poll();
   ASSERT_EQ(bench.write(0x1016, 1, 0x85U << 16 | 50, 4), Abort::none);

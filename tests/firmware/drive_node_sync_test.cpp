@@ -89,12 +89,17 @@ TEST_P(SyncTest, ALateSyncIsOneStaleTickAtMost) {
 TEST_P(SyncTest, SetpointsOfTwoTicksAreNotMixedAfterALostSync) {
   run();
   const bool after = GetParam() == Order::after;
-  period(false, 0, after ? 3 : 0);
-  period(true, 0, after ? 0 : 3);
-  EXPECT_EQ(new_stale(), 2U);
-  EXPECT_EQ(bench.counted(Counter::missing_setpoints), after ? 7U : 1U);
-  for (int n = 0; n < 10; ++n) period();
-  EXPECT_EQ(new_stale(), 2U);
+  std::uint32_t stale_before = 0, missing_before = after ? 6 : 0;
+  for (const std::size_t joint : {3U, 1U, 6U}) {
+    period(false, 0, after ? joint : 0);
+    period(true, 0, after ? 0 : joint);
+    EXPECT_EQ(new_stale() - stale_before, 2U) << joint;
+    EXPECT_EQ(bench.counted(Counter::missing_setpoints) - missing_before, 1U) << joint;
+    for (int n = 0; n < 10; ++n) period();
+    EXPECT_EQ(new_stale() - stale_before, 2U) << joint;
+    stale_before = new_stale();
+    missing_before = bench.counted(Counter::missing_setpoints);
+  }
 }
 
 // Setpoints that waited for a SYNC of long ago are never used.
@@ -157,17 +162,60 @@ TEST_P(SyncTest, AGoodRateWithJitterIsNoError) {
   }
 }
 
+// Both masters' ticks are answered for as long as nobody knows; then the bus is told, and every torque goes by the
+// ramp.
 TEST_P(SyncTest, TwoMastersAreNoticed) {
   run();
-  for (int i = 0; i < 20; ++i) {
-    bench.pass(700);
-    bench.sync();  // the other one's
-    bench.pass(300);
-    setpoints();
+  std::array<std::int32_t, test::robot_joints> before{}, ramp{};
+  for (std::size_t j = 0; j < ramp.size(); ++j) {
+    before[j] = bench.node.torque(j);
+    ramp[j] = (tables::page.parameters.constants[j].limits.tau_upper.raw + 49) / 50;
+  }
+  const auto ticks = bench.counted(Counter::ticks);
+  std::uint32_t syncs = 0, answered = 0, told_after = 0;
+  std::size_t emergencies = 0;
+  bench.heard();
+  const auto one_sync = [&](std::uint32_t pass_us) {
     bench.sync();
-    bench.pass(1000);
+    ++syncs;
+    bench.pass(pass_us);
+    std::size_t torques = 0;
+    for (const auto& frame : bench.heard()) {
+      if (frame.id > canopen::torque_id && frame.id <= canopen::torque_id + test::robot_joints) ++torques;
+      if (frame.id != canopen::emergency_id + bench.node.id()) continue;
+      const auto code = canopen::load<2>(frame.data.data());
+      EXPECT_EQ(code, 0x8700);
+      ++emergencies;
+      told_after = syncs;
+      EXPECT_EQ(frame.size, 8);
+      EXPECT_NE(frame.data[2] & 0x10, 0) << "error register: communication";
+      const auto period_us = canopen::load<2>(&frame.data[3]);  // of the periods since the rate was last right
+      EXPECT_GT(period_us, 900U);
+      EXPECT_LT(period_us, 2000U);
+    }
+    answered += torques == test::robot_joints ? 1 : 0;
+    for (std::size_t j = 0; j < ramp.size() && emergencies > 0; ++j) {
+      EXPECT_LE(std::abs(bench.node.torque(j) - before[j]), ramp[j]) << "joint " << j << ", SYNC " << syncs;
+      EXPECT_LE(std::abs(bench.node.torque(j)), std::abs(before[j])) << "joint " << j << ", SYNC " << syncs;
+    }
+    for (std::size_t j = 0; j < ramp.size(); ++j) before[j] = bench.node.torque(j);
+  };
+  for (int i = 0; i < 60; ++i) {
+    bench.pass(700);
+    one_sync(300);  // the other one's
+    setpoints();
+    one_sync(1000);
   }
   EXPECT_TRUE(bench.node.errors().is_present(Error::sync_rate));
+  EXPECT_TRUE(bench.on_wire.fault.level);
+  EXPECT_EQ(emergencies, 1U);
+  EXPECT_LE(told_after, 20U);
+  for (std::size_t j = 0; j < ramp.size(); ++j) EXPECT_EQ(bench.node.torque(j), 0) << j;
+  // Nothing is lost: every SYNC is answered with all torques, and is a tick with the setpoints that came or a stale
+  // one.
+  EXPECT_EQ(answered, syncs);
+  EXPECT_EQ(bench.counted(Counter::ticks) - ticks + new_stale(), syncs);
+  EXPECT_EQ(new_stale(), GetParam() == Order::after ? 59U : 60U);
 }
 
 TEST_P(SyncTest, ThePeriodIsTheTablesTick) {

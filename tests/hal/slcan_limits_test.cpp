@@ -80,6 +80,14 @@ TEST(SlcanText, TheLargestIdentifiersAndLengths) {
   EXPECT_EQ(line_of(longest).size(), slcan::longest_line);
 }
 
+TEST_F(SlcanLimits, AfterNoiseWithoutAnEndFramesComeAgain) {
+  feed(std::string(10'000, 'x'));
+  EXPECT_EQ(received(), 0);
+  feed("\rt1230\r");
+  EXPECT_EQ(received(), 1);
+  EXPECT_EQ(bus.errors().lost, 1U);
+}
+
 TEST_F(SlcanLimits, TheLongestLineIsAFrameAndOneByteMoreIsLost) {
   const std::string longest = "T1FFFFFFF80011223344556677";
   for (int i = 0; i < 20; ++i) {  // at every place of the buffer

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <map>
+#include <string_view>
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/joint_fit.hpp"
@@ -77,6 +80,93 @@ TEST(Cure, IsAnExperimentThatBothEffectsName) {
   EXPECT_EQ(cure("delay", "viscous"), "other positions, speeds and loads in other combinations");
 }
 
+/// What model.json, scenarios and `fxdyn effects --json` promise of parameters.
+struct Promise {
+  std::string_view effect, parameter, unit;
+  double lower, upper;
+};
+constexpr std::array promises = std::to_array<Promise>({
+    {"viscous", "coefficient", "N*m*s/rad", 0, unbounded},
+    {"coulomb", "amplitude", "N*m", 0, unbounded},
+    {"offset", "torque", "N*m", -unbounded, unbounded},
+    {"rotor_inertia", "inertia", "kg*m^2", 0, unbounded},
+    {"stribeck", "velocity", "rad/s", 1e-05, 1000},
+    {"stribeck", "amplitude", "N*m", 0, unbounded},
+    {"presliding", "distance", "rad", 1e-07, 0.03},
+    {"presliding", "amplitude", "N*m", 0, unbounded},
+    {"asymmetric_friction", "coulomb", "N*m", -unbounded, unbounded},
+    {"asymmetric_friction", "viscous", "N*m*s/rad", -unbounded, unbounded},
+    {"viscous_quadratic", "coefficient", "N*m*s^2/rad^2", -unbounded, unbounded},
+    {"viscous_cubic", "coefficient", "N*m*s^3/rad^3", -unbounded, unbounded},
+    {"load_friction", "coefficient", "-", 0, 1},
+    {"torque_gain", "gain", "-", -0.9, 10},
+    {"ripple", "wavenumber", "rad^-1", 0.5, 100000},
+    {"ripple", "cos", "N*m", -unbounded, unbounded},
+    {"ripple", "sin", "N*m", -unbounded, unbounded},
+    {"spring", "stiffness", "N*m/rad", -unbounded, unbounded},
+    {"spring", "offset", "N*m", -unbounded, unbounded},
+    {"gravity_compensator", "cos", "N*m", -unbounded, unbounded},
+    {"gravity_compensator", "sin", "N*m", -unbounded, unbounded},
+    {"friction_drift", "time_constant", "s", 0.1, 10000},
+    {"friction_drift", "coulomb", "N*m", -unbounded, unbounded},
+    {"friction_drift", "viscous", "N*m*s/rad", -unbounded, unbounded},
+    {"saturation", "limit", "N*m", 0, unbounded},
+    {"saturation", "share", "-", 0, 2},
+    {"joint_coupling", "joint", "-", 1, 32},
+    {"joint_coupling", "coulomb", "N*m", -unbounded, unbounded},
+    {"joint_coupling", "viscous", "N*m*s/rad", -unbounded, unbounded},
+    {"delay", "time", "s", 0, 0.03},
+    {"delay", "share", "-", 0, 2},
+    {"elasticity", "relaxation", "s", 0, 1},
+    {"elasticity", "compliance", "rad/(N*m)", 0, unbounded},
+    {"backlash", "torque_scale", "N*m", 0.001, 100000},
+    {"backlash", "half_gap", "rad", 0, 0.1},
+    {"eccentricity", "sin", "rad", -0.1, 0.1},
+    {"eccentricity", "cos", "rad", -0.1, 0.1},
+    {"motor_coupling", "joint", "-", 1, 32},
+    {"motor_coupling", "ratio", "-", -100, 100},
+    {"motor_coupling", "width", "rad/s", 1e-05, 1000},
+    {"motor_coupling", "coulomb", "N*m", 0, unbounded},
+    {"motor_coupling", "viscous", "N*m*s/rad", 0, unbounded},
+    {"motor_coupling", "inertia", "kg*m^2", 0, unbounded},
+    {"lugre", "distance", "rad", 1e-07, 0.03},
+    {"lugre", "velocity", "rad/s", 1e-05, 1000},
+    {"lugre", "share", "1", 0.25, 0.99},
+    {"lugre", "static", "N*m", 0, unbounded},
+    {"lugre", "damping", "N*m*s/rad", 0, unbounded},
+    {"payload", "mass", "kg", 0, unbounded},
+    {"payload", "com_x", "m", -10, 10},
+    {"payload", "com_y", "m", -10, 10},
+    {"payload", "com_z", "m", -10, 10},
+    {"gravity_tilt", "tilt_x", "rad", -0.5, 0.5},
+    {"gravity_tilt", "tilt_y", "rad", -0.5, 0.5},
+});
+
+TEST(EffectDeclarations, UnitsAndBoundsOfParametersAreAsPromised) {
+  for (const Promise& promise : promises) {
+    const EffectInfo* effect = find_effect(promise.effect);
+    ASSERT_NE(effect, nullptr) << promise.effect;
+    const ParameterInfo* found = nullptr;
+    for (const auto& parameters : {effect->shape, effect->linear})
+      for (const ParameterInfo& parameter : parameters)
+        if (parameter.name == promise.parameter) found = &parameter;
+    ASSERT_NE(found, nullptr) << promise.effect << " " << promise.parameter;
+    EXPECT_EQ(found->unit, promise.unit) << promise.effect << " " << promise.parameter;
+    EXPECT_EQ(found->lower, promise.lower) << promise.effect << " " << promise.parameter;
+    EXPECT_EQ(found->upper, promise.upper) << promise.effect << " " << promise.parameter;
+  }
+}
+
+TEST(EffectDeclarations, NoTwoExperimentsHaveTheSameNumber) {
+  std::map<int, std::string_view> texts;
+  for (const EffectInfo& info : effect_infos())
+    for (const auto& experiment : info.experiments) {
+      if (experiment.text.empty()) continue;
+      const auto [at, is_new] = texts.emplace(static_cast<int>(experiment.order), experiment.text);
+      EXPECT_TRUE(is_new || at->second == experiment.text) << at->second << "; " << experiment.text;
+    }
+}
+
 TEST(EffectDeclarations, ARotorIsTheEffectThatBaseParametersMayHold) {
   JointFit joint;
   joint.effects.resize(1);
@@ -117,8 +207,15 @@ TEST(Shapes, OtherJointsAndMates) {
   EXPECT_EQ(list(shapes::other_joint.judged(s)), (std::vector<double>{1, 3, 4}));
   EXPECT_EQ(list(shapes::neighbour.tried(s)), (std::vector<double>{1})) << "of the same type only";
   EXPECT_EQ(list(shapes::neighbour.judged(s)), (std::vector<double>{1, 3}));
+  s.like_previous = false;
+  s.like_next = true;
+  EXPECT_EQ(list(shapes::neighbour.tried(s)), (std::vector<double>{3}));
   s.joint = 2;
   EXPECT_EQ(list(shapes::other_joint.judged(s)), (std::vector<double>{2, 1, 4})) << "the one before first";
+  s.joint = 3;
+  EXPECT_EQ(list(shapes::neighbour.judged(s)), (std::vector<double>{3})) << "the last one";
+  s.joint = 0;
+  EXPECT_EQ(list(shapes::neighbour.judged(s)), (std::vector<double>{2})) << "the first one";
 }
 
 TEST(Shapes, PathsAndWavenumbersDependOnTheJointsType) {
@@ -128,6 +225,53 @@ TEST(Shapes, PathsAndWavenumbersDependOnTheJointsType) {
   s.turns = false;
   EXPECT_DOUBLE_EQ(shapes::distance.tried(s)[0], 1e-5);
   EXPECT_EQ(list(shapes::wavenumber.judged(s)), (std::vector<double>{600, 120, 3000}));
+}
+
+TEST(Shapes, UsualValues) {
+  MotionScales s;
+  EXPECT_EQ(list(shapes::distance.judged(s)), (std::vector<double>{3e-3, 1e-3, 9e-3}));
+  EXPECT_DOUBLE_EQ(list(shapes::distance.tried(s)).back(), 2e-2);
+  EXPECT_EQ(list(shapes::distance.tried(s)).size(), 10U);
+  s.turns = false;
+  EXPECT_EQ(list(shapes::distance.judged(s)), (std::vector<double>{1e-4, 3e-5, 3e-4}));
+  EXPECT_DOUBLE_EQ(list(shapes::distance.tried(s)).back(), 1e-3);
+  EXPECT_EQ(list(shapes::delay.judged(s)), (std::vector<double>{2e-3, 1e-3, 4e-3}));
+  EXPECT_EQ(list(shapes::relaxation.tried(s)), (std::vector<double>{1e-3, 8e-3}));
+  EXPECT_EQ(list(shapes::relaxation.judged(s)), (std::vector<double>{1e-3, 5e-3}));
+  EXPECT_EQ(list(shapes::relaxation.of_link(s)), (std::vector<double>{1e-3, 0, 1e-3, 3e-3, 8e-3, 2e-2}));
+  EXPECT_EQ(list(shapes::friction_share.tried(s)), (std::vector<double>{0.7, 0.5, 0.85}));
+  EXPECT_EQ(list(shapes::direction.tried(s)), (std::vector<double>{1, -1}));
+}
+
+TEST(Shapes, UsualValuesGoWithTheMotion) {
+  MotionScales s;
+  s.speed = 10, s.range = 100, s.torque = 100, s.structural = 1000, s.seconds = 20, s.sign_width = 0.1, s.upper = 0.03;
+  const auto near = [](const ValueList& values, std::vector<double> expected) {
+    ASSERT_EQ(values.size(), expected.size());
+    for (std::size_t i = 0; i < expected.size(); ++i)
+      EXPECT_NEAR(list(values)[i], expected[i], 1e-9 * expected[i]) << i;
+  };
+  const auto ends = [](const ValueList& values, std::size_t count, double first, double last) {
+    ASSERT_EQ(values.size(), count);
+    EXPECT_NEAR(list(values).front(), first, 1e-9 * first);
+    EXPECT_NEAR(list(values).back(), last, 1e-9 * last);
+  };
+  near(shapes::velocity.judged(s), {0.25, 0.1, 0.5});
+  near(shapes::time_constant.judged(s), {20, 6, 60});
+  near(shapes::torque_limit.judged(s), {85, 70, 95});
+  near(shapes::torque_limit.tried(s), {45, 55, 63, 70, 76, 82, 87, 91, 95});
+  near(shapes::small_load.judged(s), {50, 20, 100});
+  near(shapes::small_load.of_link(s), {30, 10, 25, 60, 150});
+  ends(shapes::time_constant.tried(s), 5, 2, 80);
+  ends(shapes::delay.tried(s), 5, 5e-4, 0.03);
+  ends(shapes::small_load.tried(s), 4, 15, 250);
+  const auto range = [](ShapeRange found, double from, double to) {
+    EXPECT_DOUBLE_EQ(found.from, from);
+    EXPECT_DOUBLE_EQ(found.to, to);
+  };
+  range(shapes::velocity.fitted(s), 0.03, 1.5);
+  range(shapes::distance.fitted(s), 1e-4, 10);
+  range(shapes::friction_share.fitted(s), 0.3, 1);
 }
 
 TEST(Shapes, CombinationsChangeTheFirstParameterFastest) {

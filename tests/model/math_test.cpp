@@ -106,6 +106,10 @@ TEST(Math, ReciprocalKeepsTheStatedError) {
     ASSERT_NEAR(value(raw::reciprocal(x), ratio_bits), 1 / value(x, 30), 6e-8) << x;
   }
   EXPECT_EQ(raw::reciprocal(1 << 30), 1 << ratio_bits);
+  double bias = 0, count = 0;
+  for (std::int32_t x = 1 << 28; x <= 1 << 30; x += 9973, ++count)
+    bias += raw::reciprocal(x) - std::ldexp(1 / value(x, 30), ratio_bits);
+  EXPECT_NEAR(bias / count, 0, 0.1) << "of the last digit: rounded, not cut off";
   for (const std::int32_t x : samples()) static_cast<void>(raw::reciprocal(x));  // total
   EXPECT_EQ(reciprocal_of(0.1), 4);
   EXPECT_EQ(reciprocal_of(3.0), 1);

@@ -2,7 +2,9 @@
 """Random mutants of model/, firmware/ and hal/: which of them do the tests notice?
 
   mutants.py --count 300 --seed 20          so many mutants of all files; a report with every survivor
-  mutants.py --changed [REF] --count 10     only of files that differ from REF (HEAD~1); none or no history: of all
+  mutants.py --count 300 --seed 22 --together   the same, as many as can be in one build, switched on at run time
+  mutants.py --changed [REF] --count 10     what was changed since the last commit that REF has as well (HEAD~20, or
+                                            FXDYN_LANDED_ON): lines first, then their files; none or no history: of all
   mutants.py --known                        the list in known.toml: every one has to be killed
   mutants.py --again RESULTS                the survivors of an earlier run once more
   mutants.py --check                        known.toml and reasons.toml still fit the sources
@@ -17,8 +19,10 @@ import dataclasses
 import fcntl
 import fnmatch
 import hashlib
+import itertools
 import json
 import multiprocessing
+import os
 import pathlib
 import random
 import re
@@ -30,12 +34,15 @@ import tomllib
 sys.dont_write_bytecode = True  # nothing is written into the sources
 import mutate
 import programs
+import together
 
 HERE = pathlib.Path(__file__).resolve().parent
 PROJECT = HERE.parents[1]
 GOLDEN = {'': 'tests/golden', '_remembers': 'tests/golden/remembers'}
 FOLDERS = ('model', 'firmware', 'hal')
-FIRST_VERDICT = 6  # times --seconds: a survivor has to pass every program that sees it
+FIRST_VERDICT = 1.5  # times --seconds, where nothing has a verdict yet: a run without one says nothing
+SPARE = 1.15       # of what is drawn, some are no valid programs
+NOT_ASKED = 'slow programs were not asked'
 
 
 @dataclasses.dataclass
@@ -114,7 +121,7 @@ class Judge:
             key = (file, program.name)
             near = any(s.startswith(f'tests/{folder_of(file)}/') for s in program.sources)
             prior = 0.9 if near else 0.3  # of the chance that it kills
-            return (self.kills[key] + prior) / (self.tries[key] + 1) / self.cost.get(program.name, 5)
+            return (self.kills[key] + prior) / (self.tries[key] + 1) / self.cost.get(program.name, program.seconds)
         return sorted(seeing, key=worth, reverse=True)
 
     def judge(self, mutant, deadline=float('inf')):
@@ -143,8 +150,9 @@ class Judge:
                     self.kills[mutant.file, program.name] += 1
                     return {'result': 'killed', 'by': program.name + (' (sanitizers)' if sanitize else ''),
                             'why': outcome.why, 'seconds': spent}
-        result = 'unseen' if not seeing else 'undecided' if self.quick and any(p.slow for p in seeing) else 'survived'
-        return {'result': result, 'by': '', 'why': '', 'seconds': spent}
+        slow = self.quick and any(p.slow for p in seeing)
+        result = 'unseen' if not seeing else 'undecided' if slow and all(p.slow for p in seeing) else 'survived'
+        return {'result': result, 'by': '', 'why': NOT_ASKED if slow else '', 'seconds': spent}
 
 
 _judge = None
@@ -191,6 +199,23 @@ class Judges:
         return lambda: verdict
 
 
+def judge_together(mutants, settings, options, noted, deadline):
+    """Notes the mutants that switched builds kill. Returns what is known of the others, for where no time is left to judge
+    them one by one: {key: verdict}."""
+    fresh = [m for m in mutants if m.key not in noted.known]
+    tree = programs.Tree(PROJECT, options.work, 'together', settings.folders, settings.headers, settings.includes)
+    judging = together.Together(tree, fresh, lambda text: print(text, flush=True))
+    asked = [p for p in settings.programs if not (options.quick and p.slow)]
+    killed = set()
+    for number, by, why in judging.judge(asked, deadline):
+        killed.add(number)
+        noted.note(fresh[number], {'result': 'killed', 'by': f'{by} (switched)', 'why': why, 'seconds': 0})
+    left = {n: m for n, m in enumerate(fresh) if n not in killed and n not in judging.out}
+    print(f'{len(fresh)} mutants in one build: {len(killed)} killed, {len(judging.out)} without a switch', flush=True)
+    return {m.key: {'result': 'survived', 'by': '', 'why': 'in switched builds', 'seconds': 0}
+            for n, m in left.items() if judging.passed[n] and not judging.not_asked[n]}
+
+
 # --- lists -------------------------------------------------------------------------------------------------------------
 
 def load_reasons(path):
@@ -221,9 +246,33 @@ def load_known(path, project=PROJECT):
     return found, complaints
 
 
-def changed_files(reference):
-    git = subprocess.run(['git', 'diff', '--name-only', reference], cwd=PROJECT, capture_output=True, text=True)
-    return set(git.stdout.split()) if git.returncode == 0 else set()
+def git(*words):
+    """What git says; nothing where it fails."""
+    said = subprocess.run(['git', *words], cwd=PROJECT, capture_output=True, text=True)
+    return said.stdout if said.returncode == 0 else ''
+
+
+def base_of(reference):
+    """The last commit that the reference and HEAD have in common; the first of all where history is too short."""
+    return git('merge-base', reference, 'HEAD').strip() or git('rev-list', '--max-parents=0', 'HEAD').split('\n')[0]
+
+
+def lines_of_diff(diff):
+    """{file: numbers of the lines that a diff without context adds or changes}"""
+    changed, file = {}, None
+    for line in diff.split('\n'):
+        if line.startswith('+++ '):
+            file = line[6:] if line.startswith('+++ b/') else None
+        elif file and (hunk := re.match(r'@@ -\S+ \+(\d+)(?:,(\d+))? @@', line)):
+            first, count = int(hunk[1]), int(hunk[2] or 1)
+            changed.setdefault(file, set()).update(range(first, first + count))
+    return changed
+
+
+def changed_lines(reference):
+    """The same of all that differs from a reference, uncommitted changes too."""
+    base = base_of(reference)
+    return lines_of_diff(git('diff', '-U0', base)) if base else {}
 
 
 def tree_hash(settings, how):
@@ -297,7 +346,7 @@ def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--count', type=int, default=300, help='valid mutants to judge')
     parser.add_argument('--seed', type=int, default=20)
-    parser.add_argument('--changed', nargs='?', const='HEAD~1', metavar='REF')
+    parser.add_argument('--changed', nargs='?', const=os.environ.get('FXDYN_LANDED_ON') or 'HEAD~20', metavar='REF')
     parser.add_argument('--files', nargs='*', default=['*'], metavar='PATTERN', help='only of these files')
     parser.add_argument('--known', nargs='?', const='', metavar='NAME', help='all of known.toml, or those named so')
     parser.add_argument('--again', type=pathlib.Path, metavar='RESULTS')
@@ -305,8 +354,10 @@ def arguments():
     parser.add_argument('--seconds', type=float, default=float('inf'), help='no new mutant after this time')
     parser.add_argument('--allow', type=float, default=5, metavar='PERCENT', help='survivors without a reason')
     parser.add_argument('--no-sanitizers', action='store_true', help='spare survivors the second round with sanitizers')
-    parser.add_argument('--quick', action='store_true',
-                        help='neither sanitizers nor slow programs; what those alone might kill stays undecided')
+    parser.add_argument('--quick', action='store_true', help='neither sanitizers nor slow programs; a survivor is one of '
+                        'the others, and undecided where there are none')
+    parser.add_argument('--together', action='store_true', help='at first as many as can be in one build of each program, '
+                        'switched on at run time; half of --seconds')
     parser.add_argument('--without', nargs='*', default=[], metavar='PROGRAM',
                         help='spare these programs; survivors are then only candidates for --again')
     parser.add_argument('--jobs', type=int, default=1)
@@ -344,15 +395,18 @@ def choose(options, settings):
         mutants = [m for f in files for m in mutate.mutants_of(f, (PROJECT / f).read_text()) if m.key in survivors]
         return f'survivors of {options.again.name} again', mutants, len(mutants)
     title = f'seed {options.seed}'
-    changed = sorted(changed_files(options.changed).intersection(files)) if options.changed else []
+    lines = changed_lines(options.changed) if options.changed else {}
+    changed = sorted(set(lines).intersection(files))
     if changed:
-        title += f', of what {options.changed} has in another form: {" ".join(changed)}'
-    return title, drawn(changed or files, options.seed), options.count
+        title += f', of what was changed since {options.changed}: {" ".join(changed)}'
+    mutants = drawn(changed or files, options.seed)
+    if changed:
+        mutants = sorted(mutants, key=lambda m: m.line_number not in lines[m.file])
+    return title, iter(mutants), options.count
 
 
 def commit():
-    git = subprocess.run(['git', 'describe', '--always', '--dirty'], cwd=PROJECT, capture_output=True, text=True)
-    return git.stdout.strip() or 'unknown'
+    return git('describe', '--always', '--dirty').strip() or 'unknown'
 
 
 def main():
@@ -373,7 +427,11 @@ def main():
         sys.exit(f'{options.work} is in use by another run; --work names another folder')
     path = options.results or options.work / f'results-{options.seed}.jsonl'
     noted = Results(path, tree_hash(settings, (options.no_sanitizers, options.quick))) if options.known is None else None
-    results, start = [], time.monotonic()
+    results, start, of_switches = [], time.monotonic(), {}
+    if options.together and noted:
+        first = list(itertools.islice(mutants, int(SPARE * count) + 1))
+        mutants = itertools.chain(first, mutants)
+        of_switches = judge_together(first, settings, options, noted, start + options.seconds / 2)
 
     def verdicts(judges):
         """(mutant, verdict, whether it is new) in the order in which the mutants are drawn, so that the same seed
@@ -382,7 +440,8 @@ def main():
         for mutant in mutants:
             known = noted.known.get(mutant.key) if noted else None
             if known is None:
-                deadline = start + options.seconds * (FIRST_VERDICT if begun < options.jobs else 1)
+                first = begun < options.jobs and not (of_switches or noted and noted.known)
+                deadline = start + options.seconds * (FIRST_VERDICT if first else 1)
                 under_way.append((mutant, judges.begin(mutant, deadline), True))
                 begun += 1
             else:
@@ -395,6 +454,8 @@ def main():
 
     with Judges(settings, options) as judges:
         for mutant, verdict, new in verdicts(judges):
+            if verdict['result'] == 'undecided':
+                verdict = of_switches.get(mutant.key, verdict)
             results.append((mutant, verdict))
             if new and noted and verdict['result'] != 'undecided':
                 noted.note(mutant, verdict)

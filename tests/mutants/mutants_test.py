@@ -11,6 +11,7 @@ sys.dont_write_bytecode = True
 import mutants
 import mutate
 import programs
+import together
 
 
 def changes(text, defined=()):
@@ -140,7 +141,7 @@ class Judge(unittest.TestCase):
             self.assertEqual((root / 'model/toy.hpp').read_text(), HEADER)
         programs.LEAST_TIME_S = short
 
-    def test_what_only_a_slow_program_might_kill_is_undecided_in_a_quick_run(self):
+    def test_what_no_quick_program_sees_is_undecided_in_a_quick_run(self):
         change = ('if (x < limit) return limit;', 'if (x >= limit) return limit;')
         with self.project() as (judge, _):
             judge.settings.programs[0] = dataclasses.replace(judge.settings.programs[0], slow=True)
@@ -153,6 +154,39 @@ class Judge(unittest.TestCase):
         with self.project() as (judge, _):
             mutant = mutate.mutants_of('model/toy.hpp', HEADER)[0]
             self.assertEqual(judge.judge(mutant, deadline=0)['result'], 'undecided')
+
+    def test_many_mutants_in_one_build(self):
+        short, together.LEAST_TIME_S = together.LEAST_TIME_S, 1
+        with self.project() as (judge, _):
+            listed = mutate.mutants_of('model/toy.hpp', HEADER)
+            judging = together.Together(judge.tree, listed, lambda text: None)
+            killed = {listed[n].becomes: (by, why) for n, by, why in judging.judge(judge.settings.programs)}
+            self.assertEqual(killed['if (x >= limit) return limit;'], ('toy', 'status 1'))
+            self.assertEqual(killed['while (n < to) n += 0;'], ('toy', programs.OUT_OF_TIME))
+            self.assertNotIn('if (x <= limit) return limit;', killed)
+            passed = {listed[n].becomes for n in judging.passed}
+            self.assertIn('if (x <= limit) return limit;', passed)
+            # What only the compiler computes has no switch that shows.
+            self.assertNotIn('constexpr int doubled = 3 * limit;', passed | set(killed))
+        together.LEAST_TIME_S = short
+
+    def test_in_switched_text_every_line_stays_where_it_was(self):
+        text = ('int f(int a, int b) {\n  if (a < b) return a;\n  while (a > b)\n    a -= b;\n'
+                '  return g(a ? 1 : b + 2);\n}\n')
+        listed = list(enumerate(mutate.mutants_of('toy.hpp', text)))
+        switched, lines, left_out = together.switched(text, listed)
+        self.assertEqual(left_out, set())
+        self.assertEqual(switched.count('\n'), text.count('\n'))
+        for number, mutant in listed:
+            self.assertIn(number, lines[mutant.line_number])
+        self.assertIn('{ if (!(', switched)
+
+    def test_after_the_deadline_nothing_more_is_asked(self):
+        with self.project() as (judge, _):
+            listed = mutate.mutants_of('model/toy.hpp', HEADER)
+            judging = together.Together(judge.tree, listed, lambda text: None)
+            self.assertEqual(list(judging.judge(judge.settings.programs, deadline=0)), [])
+            self.assertEqual(set(judging.not_asked), set(range(len(listed))) - judging.out)
 
     def test_what_is_no_program_is_no_kill(self):
         with self.project() as (judge, _):
@@ -175,6 +209,11 @@ class Judge(unittest.TestCase):
 
 
 class Lists(unittest.TestCase):
+    def test_lines_of_a_diff(self):
+        diff = ('diff --git a/model/a.hpp b/model/a.hpp\n--- a/model/a.hpp\n+++ b/model/a.hpp\n@@ -1,2 +1,3 @@\n'
+                '@@ -9 +10 @@ x\n@@ -20,2 +21,0 @@\n--- a/gone.hpp\n+++ /dev/null\n@@ -1 +0,0 @@\n')
+        self.assertEqual(mutants.lines_of_diff(diff), {'model/a.hpp': {1, 2, 3, 10}})
+
     def test_reasons_count_and_survivors_without_one_are_found(self):
         mutant = mutate.Mutant('model/toy.hpp', 'number', 0, 1, '', 7, 'a = 1;', 'a = 2;', 1)
         results = [(mutant, {'result': 'survived', 'by': '', 'why': '', 'seconds': 1})]

@@ -39,6 +39,7 @@ class Program:
     sees: tuple = ()        # with `command`: which files it sees, as patterns
     sanitize: bool = True
     slow: bool = False
+    seconds: float = 10     # of processor time to build and run it, about: cheap ones are asked first
 
 
 @dataclasses.dataclass

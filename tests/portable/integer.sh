@@ -1,15 +1,24 @@
 #!/usr/bin/env bash
-# integer.sh BUILD_DIR SOURCE..: builds a test or a program with clang's checks of integers (overflow, signed or not, lost
-# bits and signs, shifts) and runs it: the first find in model/, hal/ or firmware/ ends it.
+# integer.sh BUILD_DIR MODEL SOURCE..: builds a test or a program with clang's checks of integers (overflow, signed or not,
+# lost bits and signs, shifts) and runs it: the first find in model/, hal/ or firmware/ ends it. MODEL: whose tables it
+# gets, golden or golden/remembers.
 set -euo pipefail
 build=$1
-shift
+model=tests/$2
+shift 2
 root=$(cd "$(dirname "$0")/../.." && pwd)
 cd "$root"
 mkdir -p "$build"
-sources=("${@/#/$root/}")
-clang++-14 -std=c++20 -O1 -g1 -fsanitize=integer,undefined -fno-sanitize-recover=all \
-  -fsanitize-ignorelist=tests/portable/not_checked.txt -I"$root" -isystem /usr/include/eigen3 \
-  -DFXDYN_SOURCE_DIR="\"$root\"" -DFXDYN_TABLES_HEADER='"tests/golden/tables.hpp"' -DFXDYN_VECTORS_HEADER='"tests/golden/vectors.hpp"' \
-  "${sources[@]}" -o "$build/test" -lrapidcheck -lgtest_main -lgtest -lpthread -lfmt
-UBSAN_OPTIONS=print_stacktrace=1 RC_PARAMS=seed=1 timeout 100 "$build/test"
+flags=(-std=c++20 -O1 -g1 -fsanitize=integer,undefined -fno-sanitize-recover=all
+  -fsanitize-ignorelist=tests/portable/not_checked.txt -I"$root" -isystem /usr/include/eigen3
+  -DFXDYN_SOURCE_DIR="\"$root\"" -DFXDYN_TABLES_HEADER="\"$model/tables.hpp\"" -DFXDYN_VECTORS_HEADER="\"$model/vectors.hpp\"")
+objects=()
+for source in "$@"; do
+  object=$build/$(basename "$source" .cpp).o
+  clang++-14 "${flags[@]}" -c "$root/$source" -o "$object"
+  objects+=("$object")
+done
+clang++-14 -fsanitize=integer,undefined "${objects[@]}" -o "$build/test" -lrapidcheck -lgtest_main -lgtest -lpthread -lfmt \
+  -Wl,--as-needed -lurdfdom_model -ltinyxml -lconsole_bridge
+rm "${objects[@]}"
+UBSAN_OPTIONS=print_stacktrace=1 RC_PARAMS=seed=1 timeout 300 "$build/test"
