@@ -12,6 +12,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using Step = std::optional<VectorXd>;
 
 /// y = amplitude exp(-rate t)
 struct Decay {
@@ -38,7 +39,7 @@ TEST(GaussNewton, FindsTheShapeAndTheCoefficient) {
   int rounds = 0;
   const VectorXd rate = gauss_newton(
       VectorXd::Constant(1, 0.5), {.most_rounds = 50, .tolerance = 1e-10},
-      [&](const VectorXd& x, int) { return ++rounds, std::optional(decay.step(x[0])); },
+      [&](const VectorXd& x, int) { return ++rounds, Step(decay.step(x[0])); },
       [&](const VectorXd& x, int) {
         const double now = decay.square(x[0]);
         return now <= best ? (best = now, true) : false;
@@ -54,9 +55,7 @@ TEST(GaussNewton, ShortensAStepThatLeadsAway) {
   double now = std::atan(3.0);
   const VectorXd x = gauss_newton(
       VectorXd::Constant(1, 3), {.most_rounds = 50, .tolerance = 1e-12},
-      [](const VectorXd& at, int) {
-        return std::optional(VectorXd::Constant(1, -std::atan(at[0]) * (1 + at[0] * at[0])));
-      },
+      [](const VectorXd& at, int) { return Step(VectorXd::Constant(1, -std::atan(at[0]) * (1 + at[0] * at[0]))); },
       [&](const VectorXd& at, int) {
         const double there = std::fabs(std::atan(at[0]));
         return there <= now ? (now = there, true) : false;
@@ -67,8 +66,7 @@ TEST(GaussNewton, ShortensAStepThatLeadsAway) {
 TEST(GaussNewton, EndsWhereNoShareOfTheStepIsBetter) {
   int tried = 0;
   const VectorXd x = gauss_newton(
-      VectorXd::Zero(2), {.shrink = 0.5, .shortest = 0.2},
-      [](const VectorXd&, int) { return std::optional(VectorXd::Ones(2)); },
+      VectorXd::Zero(2), {.shrink = 0.5, .shortest = 0.2}, [](const VectorXd&, int) { return Step(VectorXd::Ones(2)); },
       [&](const VectorXd&, int) { return ++tried < 0; });
   EXPECT_EQ(tried, 3);  // 1, 1/2, 1/4
   EXPECT_EQ(x, VectorXd::Zero(2));
@@ -76,9 +74,7 @@ TEST(GaussNewton, EndsWhereNoShareOfTheStepIsBetter) {
 
 TEST(GaussNewton, KeepsTheBounds) {
   const GaussNewton rules{.lower = VectorXd::Constant(1, -1), .upper = VectorXd::Constant(1, 2)};
-  const auto up = [](const VectorXd&, int round) {
-    return round < 3 ? std::optional(VectorXd::Constant(1, 5)) : std::nullopt;
-  };
+  const auto up = [](const VectorXd&, int round) { return round < 3 ? Step(VectorXd::Constant(1, 5)) : std::nullopt; };
   EXPECT_EQ(gauss_newton(VectorXd::Zero(1), rules, up, [](const VectorXd&, int) { return true; })[0], 2);
 }
 
