@@ -61,6 +61,8 @@ class BlockSolver {
   std::size_t joints() const { return rows_.size(); }
   Eigen::Index columns() const { return columns_; }
   const Blocks& blocks() const { return blocks_; }
+  /// Other folds of the same blocks.
+  void judge_by(std::vector<Fold> folds) { blocks_.folds = std::move(folds); }
   const JointRows& rows(std::size_t joint) const { return rows_[joint]; }
   /// One over the variance of each joint's residual.
   const Eigen::VectorXd& weights() const { return weights_; }

@@ -2,6 +2,22 @@
 
 namespace fxdyn::diagnosis {
 
+namespace {
+
+std::vector<Fold> whole_logs(const Blocks& blocks) {
+  std::vector<Fold> out;
+  for (std::size_t l = 0; l < blocks.of_log.size(); ++l) {
+    if (!blocks.of_log[l].fits) return {};
+    if (blocks.of_log[l].healthy) continue;
+    Fold& fold = out.emplace_back();
+    for (std::size_t b = 0; b < blocks.all.size(); ++b) (blocks.all[b].log == l ? fold.judge : fold.fit).push_back(b);
+  }
+  if (out.size() < 2) out.clear();
+  return out;
+}
+
+}  // namespace
+
 std::vector<std::size_t> Blocks::fit_of(bool healthy) const {
   std::vector<std::size_t> out;
   for (const std::size_t b : fit) {
@@ -27,6 +43,7 @@ Blocks make_blocks(const std::vector<SessionLog>& logs) {
     if (entry.fits) out.fit.push_back(b);
   }
   out.folds = folds_of(uses, parts, LeaveOut::part_of_each);
+  out.whole_logs = whole_logs(out);
   return out;
 }
 

@@ -17,12 +17,14 @@ struct Block {
 
 /// The rows of all logs, one after the other, as blocks and folds. With validate logs there is one fold, which they
 /// judge, and a block is a log. Else today's logs are cut: a fold is a part of each of them, judged by a fit of all
-/// others. A whole log left out would ask the others for what their motion does not show.
+/// others; or a whole log is, where the others' motion shows enough to predict it (Linearised decides).
 struct Blocks {
   std::vector<Block> all;
   std::vector<Block> of_log;     ///< by log: all of its rows
   std::vector<std::size_t> fit;  ///< blocks that fit coefficients
   std::vector<Fold> folds;       ///< places in `all`
+  /// Where no log validates and several fit: a log each, judged by a fit of the others.
+  std::vector<Fold> whole_logs;
 
   Eigen::Index rows() const { return of_log.back().first + of_log.back().count; }
   /// Blocks of one session that fit.

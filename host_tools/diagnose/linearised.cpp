@@ -30,6 +30,22 @@ Linearised::Linearised(const Models& models, const std::vector<SessionLog>& logs
   const std::vector<std::size_t>& structured = log_columns_.background();
   parallel_for(structured.size(), [&](std::size_t k) { add_background(structured[k]); });
   solver_->estimate_weights();
+  if (!blocks.whole_logs.empty() && predicts(blocks.whole_logs)) solver_->judge_by(blocks.whole_logs);
+}
+
+bool Linearised::predicts(const std::vector<Fold>& folds) const {
+  MatrixXd none, fit, judge;
+  VectorXd projection;
+  solver_->normal(nuisance(), {}, none, projection);  // priors
+  for (const Fold& fold : folds) {
+    solver_->normal(nuisance(), fold.fit, fit, projection);
+    solver_->normal(nuisance(), fold.judge, judge, projection);
+    // Variance of the prediction, in noise variances, mean of the judge's rows.
+    const double variance =
+        (SymmetricSolver(fit).inverse() * (judge - none)).trace() / solver_->row_count(fold.judge).sum();
+    if (!(variance <= 1)) return false;
+  }
+  return true;
 }
 
 void Linearised::whiten(std::size_t joint) {

@@ -60,6 +60,8 @@ class Linearised {
  private:
   void whiten(std::size_t joint);
   void add_background(std::size_t joint);
+  /// Whether a fit of the others predicts what each fold's judge shows of the nuisance to within the noise.
+  bool predicts(const std::vector<Fold>& folds) const;
   bool rotor_is_separated(std::size_t joint, const std::vector<std::size_t>& groups) const;
 
   LogColumns log_columns_;

@@ -456,8 +456,8 @@ class ReportWriter {
 
 std::string gate_of(const std::vector<ProcessedLog>& now) {
   if (std::any_of(now.begin(), now.end(), is_validate)) return "validate logs";
-  return fmt::format("blocks of the train log{}, each judged by coefficients fitted to the others",
-                     now.size() == 1 ? "" : "s");
+  return fmt::format("{}, each judged by coefficients fitted to the others",
+                     now.size() == 1 ? "blocks of the train log" : "train logs, whole or in parts");
 }
 
 DiagnosisResult verdicts(const Conclusion& conclusion) { return ReportWriter(conclusion).all(); }

@@ -50,6 +50,9 @@ TEST(BlocksOfLogs, WithoutValidateLogsAFoldIsAPartOfEveryTrainLog) {
   ASSERT_EQ(blocks.folds.size(), 5U);  // the healthy session never judges
   EXPECT_EQ(blocks.folds[1].judge, (Places{1, 6}));
   EXPECT_EQ(blocks.folds[1].fit, (Places{0, 2, 3, 4, 5, 7, 8, 9, 10}));
+  ASSERT_EQ(blocks.whole_logs.size(), 2U);
+  EXPECT_EQ(blocks.whole_logs[1].judge, (Places{5, 6, 7, 8, 9}));
+  EXPECT_EQ(blocks.whole_logs[1].fit, (Places{0, 1, 2, 3, 4, 10}));
 }
 
 TEST(BlocksOfLogs, ASingleTrainLogIsCut) {

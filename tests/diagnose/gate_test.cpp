@@ -118,7 +118,7 @@ TEST(WhatJudges, IsNamed) {
   ProcessedLog train, validate;
   validate.role = Role::validate;
   EXPECT_EQ(gate_of({train, validate}), "validate logs");
-  EXPECT_EQ(gate_of({train, train}), "blocks of the train logs, each judged by coefficients fitted to the others");
+  EXPECT_EQ(gate_of({train, train}), "train logs, whole or in parts, each judged by coefficients fitted to the others");
   EXPECT_EQ(gate_of({train}), "blocks of the train log, each judged by coefficients fitted to the others");
 }
 

@@ -79,12 +79,12 @@ TEST(DiagnosisVerdict, TestLogsDecideNothing) {
 
 TEST(DiagnosisVerdict, SaysWhatJudgedAndWhatTheFiguresAreOn) {
   const json report = diagnosed("no_validate", {.missing = effect("ripple", 2, ripple), .validate = false});
-  EXPECT_EQ(report.at("gate"), "blocks of the train logs, each judged by coefficients fitted to the others");
+  EXPECT_EQ(report.at("gate"), "train logs, whole or in parts, each judged by coefficients fitted to the others");
   EXPECT_EQ(report.at("figures_on"), "test logs");
   test::only(report, 1, "ripple");
   const json alone =
       diagnosed("train_only", {.missing = effect("ripple", 2, ripple), .validate = false, .test = false});
-  EXPECT_EQ(alone.at("figures_on"), "blocks of the train logs, each judged by coefficients fitted to the others");
+  EXPECT_EQ(alone.at("figures_on"), "train logs, whole or in parts, each judged by coefficients fitted to the others");
   const json &here = alone.at("joints").at(1), &there = report.at("joints").at(1);
   // A fast and a slow log that judge one another do it less well than others like both.
   EXPECT_NEAR(here.at("gap_before"), there.at("gap_before"), 0.4 * there.at("gap_before").get<double>());
