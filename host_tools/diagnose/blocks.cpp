@@ -29,6 +29,7 @@ std::vector<std::size_t> Blocks::fit_of(bool healthy) const {
 Blocks make_blocks(const std::vector<SessionLog>& logs) {
   Blocks out;
   std::vector<LogUse> uses;
+  uses.reserve(logs.size());
   for (const SessionLog& entry : logs)
     uses.push_back({.rows = entry.log.rows(), .fits = entry.fits, .judges = !entry.healthy});
   Eigen::Index first = 0;

@@ -58,6 +58,8 @@ struct JointDiagnosis {
 };
 
 /// Content of diagnosis.json.
+// A null of JSON is made without memory, though its constructor does not say so.
+// NOLINTNEXTLINE(bugprone-exception-escape)
 struct DiagnosisResult {
   Verdict verdict = Verdict::nothing_missing;
   std::vector<JointDiagnosis> joints;

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <memory>
 
-#include "host_tools/diagnose/base_parameters.hpp"
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
@@ -117,19 +116,25 @@ HeldOut judge(const Outcome& outcome, const std::vector<SessionLog>& logs, const
 
 VectorXd gap_of(const HeldOut& held) { return (held.before - held.after).cwiseMax(0.0) + held.excess; }
 
-/// Standard deviations by which an effect's coefficients together are off nothing: the root of theta^T C^-1 theta.
+/// Standard deviations by which an effect's coefficients together are off nothing, root of theta^T C^-1 theta, its
+/// shapes as they are. What they leave open is which curve it is, not whether it is there.
 double deviations_off_nothing(const Linearised& problem, const EffectId& id, const MatrixXd& covariance) {
-  std::vector<Index> place;
+  std::vector<Index> place, shapes;
   for (std::size_t c = 0; c < problem.unknowns().size(); ++c) {
     const Unknown& u = problem.unknowns()[c];
     const bool its = u.body == id.body && u.effect == id.effect && (id.body || u.joint == id.joint);
     if (its && u.kind == Unknown::Kind::linear && !u.change) place.push_back(static_cast<Index>(c));
+    if (its && u.kind == Unknown::Kind::shape) shapes.push_back(static_cast<Index>(c));
   }
   if (place.empty()) return 0;
   VectorXd theta(static_cast<Index>(place.size()));
   for (std::size_t i = 0; i < place.size(); ++i)
     theta[static_cast<Index>(i)] = problem.unknowns()[static_cast<std::size_t>(place[i])].value;
-  const MatrixXd own = covariance(place, place);
+  MatrixXd own = covariance(place, place);
+  if (!shapes.empty()) {
+    const MatrixXd with = covariance(shapes, place);
+    own -= with.transpose() * SymmetricSolver(MatrixXd(covariance(shapes, shapes))).inverse() * with;
+  }
   return std::sqrt(std::max(0.0, theta.dot(SymmetricSolver(own).solve(theta))));
 }
 
@@ -262,36 +267,6 @@ std::size_t weakest(const Gate& gate, const Outcome& outcome, const VectorXd& be
   return worst;
 }
 
-/// Whether any joint is worse off: of those with names of their own, these are gone by now.
-bool is_spoiled(const Outcome& outcome, const VectorXd& before, const VectorXd& after) {
-  for (Index j = 0; j < after.size(); ++j) {
-    if (is_worse(outcome.models.options.gate, before, after, j)) return true;
-  }
-  return false;
-}
-
-/// Base parameters as they were before anything was named; what was named explains torque by itself.
-void hold_base(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs) {
-  Models& models = outcome.models;
-  models.base_held = true;
-  for (std::size_t k = 0; k < nominal.base.size(); ++k) {
-    const double step = nominal.base[k].value - models.current.base[k].value;
-    add_to_base(models.current, k, step);
-    if (models.has_baseline) add_to_base(models.healthy, k, step);
-  }
-  refit(models, logs, outcome.whitening, 4);
-  outcome.look_again(logs);
-}
-
-/// The effect that brings least, as a place in the gate's groups.
-std::size_t least(const Gate& gate) {
-  std::size_t out = 0;
-  for (std::size_t i = 1; i < gate.groups.size(); ++i) {
-    if (gate.held.alone[i].sum() < gate.held.alone[out].sum()) out = i;
-  }
-  return out;
-}
-
 }  // namespace
 
 VectorXd plain_error(const IdentifiedModel& model, const std::vector<SessionLog>& logs) {
@@ -332,15 +307,8 @@ Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<Se
     believe(gate, outcome);
     const VectorXd after =
         gate.groups.empty() || before.size() == 0 ? before : plain_error(outcome.models.current, logs);
-    std::size_t worst = weakest(gate, outcome, before, after);
-    if (worst == gate.groups.size()) {
-      if (gate.groups.empty() || !is_spoiled(outcome, before, after)) break;
-      if (!outcome.models.base_held && outcome.models.rotors.empty()) {
-        hold_base(outcome, nominal, logs);
-        continue;
-      }
-      worst = least(gate);
-    }
+    const std::size_t worst = weakest(gate, outcome, before, after);
+    if (worst == gate.groups.size()) break;
     const EffectId gone = outcome.problem->groups()[gate.groups[worst]].id;
     std::erase_if(outcome.found, [&](const Finding& f) { return f.id == gone; });
     std::vector<EffectId> ids;

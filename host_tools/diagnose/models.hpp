@@ -21,7 +21,6 @@ struct Models {
   std::vector<std::size_t> background;  ///< joints whose healthy session has structure that no effect explains
   std::vector<EffectCandidate> held;    ///< unnamed effects that stay what the healthy session's fit gave
   std::vector<Rotor> rotors;
-  bool base_held = false;      ///< base parameters stay what they are: names explain torque by themselves
   double smallest_step_s = 1;  ///< of all logs and of the drive's tick: what bounds a delay
   Options options;             ///< thresholds of all that is done with these models
 

@@ -37,8 +37,6 @@ struct PriorOptions {
   double refitted_rotor = 0.005;
   /// -; a share that is 1 by definition; theory: any value far below the data's own deviation holds it at 1
   double share = 1e-3;
-  /// share of itself; a base parameter that stays what it is; theory: far below the data's own deviation
-  double held = 1e-4;
   /// standard deviations; a coefficient that moved further has changed; theory: 2 Phi(-2) = 4.6 % of healthy ones
   double changed = 2;
 };

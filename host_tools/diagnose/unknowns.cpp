@@ -77,10 +77,6 @@ class Builder {
       Unknown u;
       u.index = k;
       u.value = now_.base[k].value;
-      if (models_.base_held) {
-        u.prior = u.value;
-        u.prior_std = models_.options.prior.held * std::fabs(u.value) + 1e-9;
-      }
       out_.all.push_back(u);
     }
   }
@@ -275,7 +271,7 @@ void keep_friction(IdentifiedModel& model) {
     const auto most = most_lugre_damping(joint, joint.dq_limit);
     if (!most) continue;
     for (EffectFit& fit : joint.effects) {
-      if (fit.effect == Lugre::name) fit.linear[1] = std::clamp(fit.linear[1], 0.0, within * *most);
+      if (fit.effect == Lugre::name) fit.linear[1] = std::min(fit.linear[1], within * *most);
     }
   }
 }

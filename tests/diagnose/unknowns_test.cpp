@@ -78,16 +78,6 @@ TEST_F(UnknownsOfAModel, LuGreStaysFriction) {
   EXPECT_NEAR(joint.find("lugre")->linear[1], *most_lugre_damping(joint, joint.dq_limit), 1);
 }
 
-TEST_F(UnknownsOfAModel, BaseParametersStayWhereTheyAreHeld) {
-  models_.base_held = true;
-  const Unknowns unknowns = make_unknowns(models_);
-  for (const Unknown& u : unknowns.all) {
-    if (u.kind != Kind::base) continue;
-    EXPECT_EQ(u.prior, u.value);
-    EXPECT_LT(u.prior_std, 1e-3 * std::fabs(u.value) + 1e-8);
-  }
-}
-
 TEST_F(UnknownsOfAModel, HowMuchIsAThreshold) {
   models_.has_baseline = true;
   models_.healthy = models_.current;

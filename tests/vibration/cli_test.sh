@@ -27,13 +27,15 @@ assert model["tracking_motor"] <= 0.2 * none["tracking_motor"]
 assert model["tracking_motor"] <= 0.5 * rigid["tracking_motor"]
 assert model["residual"] < none["residual"]
 assert model["tracking_motor"] < wrong["tracking_motor"] < none["tracking_motor"]
-# The shoulder's elasticity is found without a link encoder, by the torque alone. With it the model's torque follows the
+# Whether the shoulder's elasticity shows without a link encoder is close: with it the model's torque follows the
 # path's fourth derivative, which jumps where a move starts: double computes a spike (roughness 0.032), fixed point stops
 # at the joint's limits (0.015) and follows better. On a path without such jumps both are the same.
 real = rows["model", "real", "none"]
 for figure in ("tracking_motor", "tracking_link", "roughness"):
     assert model[figure] <= 1.01 * real[figure], (figure, model, real)
-assert result["fixed_against_double"]["model_elastic_shaped"]["error_change"] < 1e-4  # 1.9e-6
+for row, change in result["fixed_against_double"].items():
+    if row.endswith("shaped"):
+        assert change["error_change"] < 1e-4, (row, change)  # 1.9e-6
 PYTHON
 
 # The same arm with encoders on its links: how its gears bend is identified from its own logs, and with the motors ahead by
