@@ -1,7 +1,5 @@
 #include "host_tools/diagnose/deflection.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -64,10 +62,9 @@ class JointDeflection {
     closure_ = close();
     Deflections out;
     if (closure_.all() < options_.least_closure) {
-      // .. and so little that encoders may make it themselves is not worth a word.
-      if (closure_.before >= options_.noted * closure_.noise)
-        out.notes.push_back(fmt::format("{}: the deflection that the link encoder shows is none that has a name",
-                                        model_.robot.joints[joint_].name));
+      // .. where it is more than encoders make themselves, and than the healthy session shows.
+      if (closure_.before >= options_.noted * closure_.noise && !healthy_bends_as_much())
+        out.unexplained.push_back(joint_);
       return out;
     }
     const VectorXd colour = colour_of_rest();
@@ -138,6 +135,16 @@ class JointDeflection {
         alike = std::fabs(today - healthy_sizes_[p]) < options_.same * healthy_sizes_[p];
     }
     return alike;
+  }
+
+  /// Whether the healthy session's deflection is as large, whatever it is.
+  bool healthy_bends_as_much() const {
+    if (logs_.healthy.empty()) return false;
+    const auto mean_square = [](const DeflectionRows& rows) {
+      return residual(rows.offsets(), rows.delta()).squaredNorm() / static_cast<double>(rows.delta().size());
+    };
+    const double healthy = mean_square(others(logs_.healthy)), today = mean_square(rows_);
+    return today < std::pow(1 + options_.same, 2) * healthy;
   }
 
   /// Judged by coefficients that were fitted to something else: the validate logs, or each train log by the others.
@@ -234,7 +241,7 @@ Deflections find_deflections(const IdentifiedModel& model, const MatrixXd& base_
   Deflections out;
   for (std::size_t j = 0; j < n; ++j) {
     out.found.insert(out.found.end(), found[j].found.begin(), found[j].found.end());
-    out.notes.insert(out.notes.end(), found[j].notes.begin(), found[j].notes.end());
+    out.unexplained.insert(out.unexplained.end(), found[j].unexplained.begin(), found[j].unexplained.end());
     background.insert(background.end(), learned[j].begin(), learned[j].end());
   }
   return out;

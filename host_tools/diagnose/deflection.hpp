@@ -23,7 +23,7 @@ struct DeflectionEffect {
 
 struct Deflections {
   std::vector<DeflectionEffect> found;
-  std::vector<std::string> notes;
+  std::vector<std::size_t> unexplained;  ///< joints whose deflection no set of effects closes, unlike a healthy one
 };
 
 /// Elasticity, backlash and eccentricity of the joints that have a link encoder, from

@@ -7,8 +7,10 @@
 #include <numeric>
 #include <optional>
 
+#include "host_tools/diagnose/certainty.hpp"
 #include "host_tools/diagnose/changes.hpp"
 #include "host_tools/diagnose/deflection.hpp"
+#include "host_tools/diagnose/deviations.hpp"
 #include "host_tools/diagnose/gate.hpp"
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/diagnose/sessions.hpp"
@@ -49,46 +51,6 @@ IdentifiedModel nominal_model(Project project, GateData& data, bool healthy, Pro
     joint.flexible.reset();
   }
   return model;
-}
-
-/// Standard deviations from the information of a fit around the models as they are.
-void add_deviations(Models& models, const Linearised& problem) {
-  const LinearFit fit = problem.solver().solve(problem.unknown_columns());
-  const MatrixXd covariance = SymmetricSolver(fit.information).inverse();
-  IdentifiedModel& model = models.current;
-  for (JointFit& joint : model.joints) {
-    for (EffectFit& effect : joint.effects) {
-      if (find_effect(effect.effect)->acts_on == ActsOn::position && !effect.linear_std.empty())
-        continue;  // from a link encoder
-      effect.linear_std.assign(effect.linear.size(), 0.0);
-      effect.shape_std.assign(effect.shape.size(), 0.0);
-    }
-  }
-  for (EffectFit& effect : model.body) effect.linear_std.assign(effect.linear.size(), 0.0);
-  for (std::size_t c = 0; c < problem.unknowns().size(); ++c) {
-    const Unknown& u = problem.unknowns()[c];
-    const double variance = covariance(static_cast<Index>(c), static_cast<Index>(c));
-    const double std = std::sqrt(std::max(variance, 0.0));
-    if (u.kind == Unknown::Kind::base) {
-      model.base[u.index].std = std;
-    } else if (u.kind == Unknown::Kind::width) {
-      model.joints[u.joint].sign_width_std = std * model.joints[u.joint].sign_width;
-    } else {
-      EffectFit& effect = u.body ? model.body[u.effect] : model.joints[u.joint].effects[u.effect];
-      if (u.kind == Unknown::Kind::shape) {
-        effect.shape_std[u.index] = std * effect.shape[u.index];
-      } else {
-        double& place = effect.linear_std[u.index];
-        place = std;
-        if (u.change) {
-          // Right after the common part: their sum is today's.
-          const auto i = static_cast<Index>(c);
-          place = std::sqrt(std::max(0.0, variance + covariance(i - 1, i - 1) + 2 * covariance(i - 1, i)));
-        }
-        if (effect.effect == Payload::name && u.index > 0) place = std / std::max(effect.linear[0], 1e-9);
-      }
-    }
-  }
 }
 
 /// In residuals with structure neighbouring rows say the same: a column counts as the residual's slowest part does.
@@ -185,6 +147,8 @@ class Diagnoser {
     Outcome outcome = explore(models_, logs_, settings_, never_, 2, progress_);
     Gate gate = pass(outcome, models_.current, logs_, still_);
     if (refit_links(outcome)) gate = pass(outcome, models_.current, logs_, still_);
+    weigh_evidence(outcome, gate);
+    const std::vector<Likely> likely = set_aside(outcome, gate, logs_, still_);
     Models& found = outcome.models;
     if (gate.groups.empty() && deflections_.found.empty()) {
       if (found.rotors.size() != models_.rotors.size()) {
@@ -204,12 +168,12 @@ class Diagnoser {
     } else {
       add_deviations(found, *outcome.problem);
     }
-    believe(found.current, gate, *outcome.problem);
+    mark_named(found.current, outcome);
     result.model = found.current;
     if (models_.has_baseline) add_notes(changed_parameters(*outcome.problem));
     const auto impacts = find_impacts(result.model, data_.logs, found.healthy, baseline_, options().impact);
-    result.report =
-        verdicts({result.nominal, result.model, outcome, gate, deflections_, impacts, still_, data_.logs, test_});
+    result.report = verdicts(
+        {result.nominal, result.model, outcome, gate, likely, deflections_, impacts, still_, data_.logs, test_});
     for (std::size_t j = 0; j < joints(); ++j) {
       // What stands still has no friction that these logs show.
       if (!still_[j]) continue;
@@ -266,7 +230,6 @@ class Diagnoser {
     }
     std::vector<DeflectionEffect> already;
     deflections_ = find_deflections(model, covariance, data_.logs, baseline_, already, options().deflection);
-    add_notes(deflections_.notes);
     if (!baseline_.empty() && std::none_of(baseline_.begin(), baseline_.end(), linked) && !deflections_.found.empty())
       notes_.push_back("the baseline has no qlink columns: what the link encoders show may have been there before");
     std::vector<bool> judged(joints(), false);
@@ -417,15 +380,13 @@ class Diagnoser {
     data_.notes.insert(data_.notes.end(), healthy.notes.begin(), healthy.notes.end());
   }
 
-  /// What is not believed stays as an unnamed column, since the gate's data say that it helps.
-  void believe(IdentifiedModel& model, const Gate& gate, const Linearised& problem) const {
-    for (std::size_t i = 0; i < gate.groups.size(); ++i) {
-      const EffectId& id = problem.groups()[gate.groups[i]].id;
-      if (id.body) {
-        model.body[id.effect].named = gate.robot_closure[i] >= options().gate.least_closure;
-      } else {
-        model.joints[id.joint].effects[id.effect].named = gate.believed[i];
-      }
+  /// What is there for sure stays as a column without a name where its name is not: its torque is measured all the
+  /// same.
+  static void mark_named(IdentifiedModel& model, const Outcome& outcome) {
+    for (const Finding& finding : outcome.found) {
+      const EffectId& id = finding.id;
+      EffectFit& fit = id.body ? model.body[id.effect] : model.joints[id.joint].effects[id.effect];
+      fit.named = finding.evidence.certainty == Certainty::established;
     }
   }
 

@@ -13,11 +13,14 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::array<std::pair<Verdict, std::string_view>, 4> verdict_names{
+constexpr std::array<std::pair<Verdict, std::string_view>, 5> verdict_names{
     {{Verdict::nothing_missing, "nothing_missing"},
-     {Verdict::effects_found, "effects_found"},
+     {Verdict::explained, "explained"},
+     {Verdict::partly_explained, "partly_explained"},
      {Verdict::unexplained, "unexplained"},
      {Verdict::not_excited, "not_excited"}}};
+
+constexpr const char* schema = "fxdyn.diagnosis/2";
 
 json or_null(const std::optional<double>& value) { return value ? json(*value) : json(nullptr); }
 std::optional<double> optional_of(const json& value) {
@@ -33,14 +36,41 @@ json to_json(const GapRegion& region) {
   json out{{"signal", region.signal},
            {"from", region.from},
            {"to", region.to},
-           {"share_of_gap", or_null(region.share_of_gap)}};
+           {"share_of_gap", or_null(region.share_of_gap)},
+           {"share_of_time", or_null(region.share_of_time)}};
   if (!region.log.empty()) out["log"] = region.log;
   return out;
 }
 
 GapRegion region_of(const json& file) {
-  return {file.at("signal"), number_of(file.at("from")), number_of(file.at("to")), optional_of(file.at("share_of_gap")),
+  return {file.at("signal"),
+          number_of(file.at("from")),
+          number_of(file.at("to")),
+          optional_of(file.at("share_of_gap")),
+          optional_of(file.at("share_of_time")),
           file.value("log", "")};
+}
+
+json to_json(const GapPlace& where) {
+  json regions = json::array();
+  for (const GapRegion& region : where.regions) regions.push_back(to_json(region));
+  return {{"sentence", where.sentence}, {"regions", regions}};
+}
+
+GapPlace place_of(const json& file) {
+  GapPlace out{file.at("sentence"), {}};
+  for (const json& region : file.at("regions")) out.regions.push_back(region_of(region));
+  return out;
+}
+
+json to_json(const std::optional<GapLeft>& left) {
+  if (!left) return nullptr;
+  return {{"share", left->share}, {"low", left->low}, {"high", left->high}};
+}
+
+std::optional<GapLeft> left_of(const json& file) {
+  if (file.is_null()) return {};
+  return GapLeft{number_of(file.at("share")), number_of(file.at("low")), number_of(file.at("high"))};
 }
 
 json to_json(const NamedEffect& effect) {
@@ -48,17 +78,15 @@ json to_json(const NamedEffect& effect) {
   for (const NamedParameter& p : effect.parameters)
     parameters.push_back({{"name", p.name}, {"value", p.value}, {"unit", p.unit}, {"std", or_null(p.std)}});
   json out{{"effect", effect.effect},
+           {"certainty", effect.established ? "established" : "likely"},
+           {"log10_odds_nothing", effect.odds_nothing},
+           {"log10_odds_rival", or_null(effect.odds_rival)},
+           {"rival", effect.rival.empty() ? json(nullptr) : json(effect.rival)},
            {"parameters", parameters},
            {"score", effect.score},
            {"held_out_closure", or_null(effect.held_out_closure)},
            {"alternatives", effect.alternatives},
            {"model_share", effect.model_share}};
-  if (effect.odds_nothing) {
-    out["certainty"] = effect.established ? "established" : "likely";
-    out["log10_odds_nothing"] = *effect.odds_nothing;
-    out["log10_odds_rival"] = or_null(effect.odds_rival);
-    out["rival"] = effect.rival.empty() ? json(nullptr) : json(effect.rival);
-  }
   if (!effect.signal.empty()) out["signal"] = effect.signal;
   if (effect.joints) out["joints"] = *effect.joints;
   return out;
@@ -72,12 +100,10 @@ NamedEffect effect_of(const json& file) {
   out.score = number_of(file.at("score"));
   out.held_out_closure = optional_of(file.at("held_out_closure"));
   out.signal = file.value("signal", "");
-  if (file.contains("certainty")) {
-    out.established = file.at("certainty") == "established";
-    out.odds_nothing = optional_of(file.at("log10_odds_nothing"));
-    out.odds_rival = optional_of(file.at("log10_odds_rival"));
-    if (file.at("rival").is_string()) out.rival = file.at("rival");
-  }
+  out.established = file.at("certainty") == "established";
+  out.odds_nothing = number_of(file.at("log10_odds_nothing"));
+  out.odds_rival = optional_of(file.at("log10_odds_rival"));
+  if (file.at("rival").is_string()) out.rival = file.at("rival");
   out.alternatives = strings_of(file.at("alternatives"));
   out.model_share = number_of(file.at("model_share"));
   if (file.contains("joints")) out.joints = file.at("joints").get<std::vector<std::size_t>>();
@@ -97,8 +123,6 @@ std::vector<NamedEffect> effects_of(const json& list) {
 }
 
 json to_json(const JointDiagnosis& joint) {
-  json where = json::array();
-  for (const GapRegion& region : joint.where) where.push_back(to_json(region));
   return {{"joint", joint.joint},
           {"index", joint.index},
           {"unit", joint.unit},
@@ -107,9 +131,10 @@ json to_json(const JointDiagnosis& joint) {
           {"gap_after", or_null(joint.gap_after)},
           {"noise_floor", or_null(joint.noise_floor)},
           {"closure", or_null(joint.closure)},
-          {"where", where},
+          {"left", to_json(joint.left)},
+          {"where", to_json(joint.where)},
           {"effects", to_json(joint.effects)},
-          {"resembles", joint.resembles},
+          {"undecided", joint.undecided},
           {"not_identifiable", joint.not_identifiable},
           {"lack_of_fit", {{"state_p", or_null(joint.state_p)}, {"time_p", or_null(joint.time_p)}}}};
 }
@@ -124,9 +149,10 @@ JointDiagnosis joint_of(const json& file) {
   out.gap_after = optional_of(file.at("gap_after"));
   out.noise_floor = optional_of(file.at("noise_floor"));
   out.closure = optional_of(file.at("closure"));
-  for (const json& region : file.at("where")) out.where.push_back(region_of(region));
+  out.left = left_of(file.at("left"));
+  out.where = place_of(file.at("where"));
   out.effects = effects_of(file.at("effects"));
-  out.resembles = strings_of(file.at("resembles"));
+  out.undecided = file.at("undecided");
   out.not_identifiable = strings_of(file.at("not_identifiable"));
   const json& lack = file.at("lack_of_fit");
   out.state_p = optional_of(lack.at("state_p"));
@@ -153,11 +179,11 @@ Verdict verdict_of(std::string_view name) {
 json to_json(const DiagnosisResult& result) {
   json joints = json::array();
   for (const JointDiagnosis& joint : result.joints) joints.push_back(to_json(joint));
-  json out{{"schema", "fxdyn.diagnosis/1"},
+  json out{{"schema", schema},
            {"verdict", to_string(result.verdict)},
            {"joints", joints},
            {"robot_effects", to_json(result.robot_effects)},
-           {"resembles", result.resembles},
+           {"undecided", result.undecided},
            {"not_identifiable", result.not_identifiable},
            {"next_experiment", result.next_experiment},
            {"gate", result.gate},
@@ -169,11 +195,14 @@ json to_json(const DiagnosisResult& result) {
 }
 
 DiagnosisResult diagnosis_of(const json& file) {
+  if (file.value("schema", "") != schema)
+    throw InputError(fmt::format("diagnosis.json: schema '{}', expected '{}': run `fxdyn diagnose` again",
+                                 file.value("schema", ""), schema));
   DiagnosisResult out;
   out.verdict = verdict_of(file.at("verdict").get<std::string>());
   for (const json& joint : file.at("joints")) out.joints.push_back(joint_of(joint));
   out.robot_effects = effects_of(file.at("robot_effects"));
-  out.resembles = strings_of(file.at("resembles"));
+  out.undecided = file.at("undecided");
   out.not_identifiable = strings_of(file.at("not_identifiable"));
   out.next_experiment = file.at("next_experiment");
   out.gate = file.at("gate");

@@ -8,7 +8,9 @@
 
 namespace fxdyn {
 
-enum class Verdict { nothing_missing, effects_found, unexplained, not_excited };
+/// What is there, and what is left: `explained`, what is left is within the noise; `partly_explained`, effects are
+/// established and structure is left; `unexplained`, structure is left and nothing is established.
+enum class Verdict { nothing_missing, explained, partly_explained, unexplained, not_excited };
 std::string_view to_string(Verdict verdict);
 /// @throws InputError: there is none of that name
 Verdict verdict_of(std::string_view name);
@@ -17,8 +19,19 @@ Verdict verdict_of(std::string_view name);
 struct GapRegion {
   std::string signal;  ///< dq, q, ddq, load, t, direction, frequency
   double from = 0, to = 0;
-  std::optional<double> share_of_gap;
+  std::optional<double> share_of_gap, share_of_time;
   std::string log;  ///< empty: of all logs
+};
+
+/// Where a gap sits.
+struct GapPlace {
+  std::string sentence;  ///< "61 % of the gap at velocity -0.05 .. 0.05 rad/s, in 8 % of the time"
+  std::vector<GapRegion> regions;
+};
+
+/// Share of a gap that no finding explains, and the interval that holds it with 95 %.
+struct GapLeft {
+  double share = 0, low = 0, high = 0;
 };
 
 /// A parameter of an effect that was named.
@@ -28,7 +41,7 @@ struct NamedParameter {
   std::optional<double> std;  ///< none: not known
 };
 
-/// An effect that was named, at a joint or on the robot.
+/// An effect that is established or likely, at a joint or on the robot.
 struct NamedEffect {
   std::string effect;
   std::vector<NamedParameter> parameters;
@@ -36,11 +49,12 @@ struct NamedEffect {
   std::optional<double> held_out_closure;
   std::string signal;  ///< "q - qlink": a deflection shows it; empty: the torque does
   std::vector<std::string> alternatives;
-  /// On data that fitted none of it, log10 of the odds against nothing, whatever else is missing at its joint, and
-  /// against the effect that comes nearest; none: not known, or no other comes near.
-  std::optional<double> odds_nothing, odds_rival;
+  bool established = false;  ///< else it is likely: not part of the model
+  /// On data that did not fit it, log10 of the odds against nothing, whatever else is missing at its joint, and against
+  /// the effect that comes nearest.
+  double odds_nothing = 0;
+  std::optional<double> odds_rival;                ///< none: no other comes near
   std::string rival;                               ///< that effect
-  bool established = false;                        ///< both are 1000 to 1; else it is likely
   double model_share = 0;                          ///< of the model's torque
   std::optional<std::vector<std::size_t>> joints;  ///< on the robot: those that feel it, from 1
 };
@@ -51,9 +65,13 @@ struct JointDiagnosis {
   Verdict verdict = Verdict::nothing_missing;
   std::optional<double> gap_before{}, gap_after{}, noise_floor{};  ///< [N*m | N]; none: it stands still
   std::optional<double> closure{};                                 ///< none: the torque has nothing to close
-  std::vector<GapRegion> where{};
+  std::optional<GapLeft> left{};                                   ///< likewise
+  GapPlace where{};
   std::vector<NamedEffect> effects{};
-  std::vector<std::string> resembles{}, not_identifiable{};
+  /// Sets of which one effect is there for sure, and the data don't tell which. The model has the first, without a
+  /// name.
+  std::vector<std::vector<std::string>> undecided{};
+  std::vector<std::string> not_identifiable{};
   std::optional<double> state_p{}, time_p{};  ///< lack of fit
 };
 
@@ -64,7 +82,8 @@ struct DiagnosisResult {
   Verdict verdict = Verdict::nothing_missing;
   std::vector<JointDiagnosis> joints;
   std::vector<NamedEffect> robot_effects;
-  std::vector<std::string> resembles, not_identifiable;
+  std::vector<std::vector<std::string>> undecided;  ///< on the robot
+  std::vector<std::string> not_identifiable;
   std::string next_experiment, gate, figures_on;
   bool baseline = false;
   std::vector<std::string> notes;

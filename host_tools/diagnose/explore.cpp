@@ -102,9 +102,9 @@ Outcome explore(Models models, const std::vector<SessionLog>& logs, const Search
     progress.step();
     Search search(problem, settings);
     const std::vector<std::size_t> start = in_model(problem);
-    const Choice choice = search.unite(search.run(start, progress));
+    Choice choice = search.unite(search.run(start, progress));
     if (pass == 0) out.not_identifiable = blind_spots(problem, search);
-    const std::vector<Found> found = search.explain(choice);
+    const std::vector<Found> found = search.explain(choice);  // may take a rival
     // The model follows the choice. What is appended first leaves the ids of the others as they are.
     std::vector<EffectId> ids;
     Index column = first_of_groups(problem, choice);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 
+#include "host_tools/diagnose/deviations.hpp"
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
@@ -36,6 +37,28 @@ std::unique_ptr<Linearised> without(const Outcome& outcome, const std::vector<Se
   return out;
 }
 
+/// Rows of one stretch, in seconds: neighbouring errors say the same.
+constexpr double stretch_s = 2;
+/// Standard deviations to either side of a normal distribution's 95 %.
+constexpr double deviations_of_95 = 1.96;
+
+/// Adds a fold's stretches at a joint. @param before, after residuals of all rows
+void add_stretches(const Linearised& problem, const Fold& fold, const VectorXd& before, const VectorXd& after,
+                   double weight, std::vector<Stretch>& to) {
+  for (const std::size_t b : fold.judge) {
+    const Block& block = problem.blocks().all[b];
+    if (block.healthy) continue;
+    const ProcessedLog& log = problem.logs()[block.log].log;
+    const auto rows =
+        std::max<Index>(1, static_cast<Index>(stretch_s / (log.step_s * static_cast<double>(log.decimation))));
+    for (Index first = 0; first < block.count; first += rows) {
+      const Index from = block.first + first, count = std::min(rows, block.count - first);
+      to.push_back({weight * before.segment(from, count).squaredNorm(),
+                    weight * after.segment(from, count).squaredNorm(), static_cast<double>(count)});
+    }
+  }
+}
+
 /// Squares of judged rows, coefficients of some groups fitted to others.
 VectorXd judged(const Linearised& problem, const std::vector<std::size_t>& groups, const Fold& fold) {
   const BlockSolver& solver = problem.solver();
@@ -53,6 +76,7 @@ HeldOut hold_out(const Outcome& outcome, const std::vector<SessionLog>& logs, co
   HeldOut out;
   out.before = out.after = out.leftover = out.excess = out.rows = VectorXd::Zero(n);
   out.alone.assign(groups.size(), VectorXd::Zero(n));
+  out.stretches.resize(problem.joints());
   const std::unique_ptr<Linearised> plain = groups.empty() ? nullptr : without(outcome, logs, problem, groups);
   const Linearised& before = plain ? *plain : problem;
   const Fold fitted{problem.blocks().fit, problem.blocks().fit_of(false)};
@@ -64,16 +88,19 @@ HeldOut hold_out(const Outcome& outcome, const std::vector<SessionLog>& logs, co
     const LinearFit all = problem.solver().solve(with, fold.fit);
     const VectorXd after = problem.solver().square(all, fold.judge).cwiseProduct(w);
     out.after += after;
+    const LinearFit none = before.solver().solve(before.columns_of(in_model(before)), fold.fit);
     VectorXd share(n), healthy(VectorXd::Zero(n));
     parallel_for(problem.joints(), [&](std::size_t j) {
       const auto k = static_cast<Index>(j);
       share[k] = structured_share(problem, j, all, features[j], fold.judge);
       if (problem.models().has_baseline)
         healthy[k] = structured_share(problem, j, all, features[j], problem.blocks().fit, true);
+      add_stretches(problem, fold, before.solver().residual(j, none), problem.solver().residual(j, all), w[k],
+                    out.stretches[j]);
     });
     out.leftover += after.cwiseProduct(share);
     out.excess += after.cwiseProduct((share - healthy).cwiseMax(0.0));
-    out.before += judged(before, fold).cwiseProduct(w);
+    out.before += before.solver().square(none, fold.judge).cwiseProduct(w);
   }
   for (std::size_t i = 0; i < groups.size(); ++i) {
     std::vector<std::size_t> others = groups;
@@ -109,47 +136,13 @@ HeldOut judge(const Outcome& outcome, const std::vector<SessionLog>& logs, const
          {&HeldOut::before, &HeldOut::after, &HeldOut::leftover, &HeldOut::excess, &HeldOut::rows,
           &HeldOut::fitted_before, &HeldOut::fitted_after, &HeldOut::fitted_rows})
       (held.*of)[k] = (band.*of)[k];
+    held.stretches[j] = band.stretches[j];
     for (std::size_t i = 0; i < groups.size(); ++i) held.alone[i][k] = band.alone[i][k];
   }
   return held;
 }
 
 VectorXd gap_of(const HeldOut& held) { return (held.before - held.after).cwiseMax(0.0) + held.excess; }
-
-/// Standard deviations by which an effect's coefficients together are off nothing, root of theta^T C^-1 theta, its
-/// shapes as they are. What they leave open is which curve it is, not whether it is there.
-double deviations_off_nothing(const Linearised& problem, const EffectId& id, const MatrixXd& covariance) {
-  std::vector<Index> place, shapes;
-  for (std::size_t c = 0; c < problem.unknowns().size(); ++c) {
-    const Unknown& u = problem.unknowns()[c];
-    const bool its = u.body == id.body && u.effect == id.effect && (id.body || u.joint == id.joint);
-    if (its && u.kind == Unknown::Kind::linear && !u.change) place.push_back(static_cast<Index>(c));
-    if (its && u.kind == Unknown::Kind::shape) shapes.push_back(static_cast<Index>(c));
-  }
-  if (place.empty()) return 0;
-  VectorXd theta(static_cast<Index>(place.size()));
-  for (std::size_t i = 0; i < place.size(); ++i)
-    theta[static_cast<Index>(i)] = problem.unknowns()[static_cast<std::size_t>(place[i])].value;
-  MatrixXd own = covariance(place, place);
-  if (!shapes.empty()) {
-    const MatrixXd with = covariance(shapes, place);
-    own -= with.transpose() * SymmetricSolver(MatrixXd(covariance(shapes, shapes))).inverse() * with;
-  }
-  return std::sqrt(std::max(0.0, theta.dot(SymmetricSolver(own).solve(theta))));
-}
-
-/// By group; a share, which is 1 by definition, is not asked.
-std::vector<double> deviations_off_nothing(const Linearised& problem, const std::vector<std::size_t>& groups) {
-  std::vector<double> out(groups.size(), 1e300);
-  if (groups.empty()) return out;
-  const LinearFit fit = problem.solver().solve(problem.unknown_columns());
-  const MatrixXd covariance = SymmetricSolver(fit.information).inverse();
-  for (std::size_t i = 0; i < groups.size(); ++i) {
-    const Group& group = problem.groups()[groups[i]];
-    if (!find_effect(group.candidate.effect)->share) out[i] = deviations_off_nothing(problem, group.id, covariance);
-  }
-  return out;
-}
 
 /// Whether an effect brings anything: over all joints, and as a share of the gap at its own.
 bool holds(const Outcome& outcome, const Group& group, const HeldOut& held, std::size_t i) {
@@ -295,16 +288,60 @@ std::size_t Gate::place(const Linearised& problem, const EffectId& id) const {
   return groups.size();
 }
 
+namespace {
+
+/// An effect on the robot: what comes back without it against what it leaves on the joints that it reaches.
+void judge_robot(Gate& gate, const Outcome& outcome) {
+  const HeldOut& held = gate.held;
+  gate.robot_closure.assign(gate.groups.size(), 0.0);
+  for (std::size_t i = 0; i < gate.groups.size(); ++i) {
+    if (!outcome.problem->groups()[gate.groups[i]].on_body) continue;
+    double left = 0;
+    for (Index j = 0; j < held.excess.size(); ++j) {
+      if (held.alone[i][j] > outcome.models.options.gate.least_felt) left += held.excess[j];
+    }
+    const double back = held.alone[i].sum();
+    gate.robot_closure[i] = back / std::max(back + left, 1e-300);
+  }
+}
+
+}  // namespace
+
+Share left_of(const HeldOut& held, double gap, Index joint) {
+  Share out;
+  if (!(gap > 0)) return out;
+  const std::vector<Stretch>& stretches = held.stretches[static_cast<std::size_t>(joint)];
+  double rows = 0, square = 0;
+  for (const Stretch& s : stretches) rows += s.rows;
+  out.share = held.excess[joint] / gap;
+  const double noise = (held.after[joint] - held.excess[joint]) / std::max(rows, 1.0);
+  for (const Stretch& s : stretches) {
+    const double left = s.after - noise * s.rows;
+    square += std::pow(left - out.share * (s.before - s.after + left), 2);
+  }
+  const double reach = deviations_of_95 * std::sqrt(square) / gap;
+  out.low = std::max(0.0, out.share - reach);
+  out.high = std::min(1.0, out.share + reach);
+  return out;
+}
+
+Gate judge_again(const Outcome& outcome, const std::vector<SessionLog>& logs, const std::vector<bool>& still) {
+  Gate gate;
+  gate.groups = in_model(*outcome.problem);
+  gate.held = judge(outcome, logs, gate.groups);
+  conclude(gate, outcome, still);
+  believe(gate, outcome);
+  judge_robot(gate, outcome);
+  return gate;
+}
+
 Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs,
           const std::vector<bool>& still) {
   choose_time_constants(outcome, logs);
   const VectorXd before = plain_error(nominal, logs);
   Gate gate;
   for (;;) {
-    gate.groups = in_model(*outcome.problem);
-    gate.held = judge(outcome, logs, gate.groups);
-    conclude(gate, outcome, still);
-    believe(gate, outcome);
+    gate = judge_again(outcome, logs, still);
     const VectorXd after =
         gate.groups.empty() || before.size() == 0 ? before : plain_error(outcome.models.current, logs);
     const std::size_t worst = weakest(gate, outcome, before, after);
@@ -317,18 +354,6 @@ Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<Se
     for (std::size_t i = 0; i < ids.size(); ++i) outcome.found[i].id = ids[i];
     refit(outcome.models, logs, outcome.whitening, 3);
     outcome.look_again(logs);
-  }
-  // An effect on the robot: what comes back without it against what it leaves on the joints that it reaches.
-  const HeldOut& held = gate.held;
-  gate.robot_closure.assign(gate.groups.size(), 0.0);
-  for (std::size_t i = 0; i < gate.groups.size(); ++i) {
-    if (!outcome.problem->groups()[gate.groups[i]].on_body) continue;
-    double left = 0;
-    for (Index j = 0; j < held.excess.size(); ++j) {
-      if (held.alone[i][j] > outcome.models.options.gate.least_felt) left += held.excess[j];
-    }
-    const double back = held.alone[i].sum();
-    gate.robot_closure[i] = back / std::max(back + left, 1e-300);
   }
   return gate;
 }

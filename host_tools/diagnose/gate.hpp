@@ -8,6 +8,16 @@
 
 namespace fxdyn::diagnosis {
 
+/// Sums over some seconds of a joint's rows that judge: squares without and with the named effects.
+struct Stretch {
+  double before = 0, after = 0, rows = 0;
+};
+
+/// A share and the interval that holds it with 95 %.
+struct Share {
+  double share = 0, low = 0, high = 0;
+};
+
 /// Squares of judged residuals per joint, weighted to unit variance: whitened, but for joints with structure left,
 /// which are judged in the whole band.
 struct HeldOut {
@@ -15,7 +25,8 @@ struct HeldOut {
   Eigen::VectorXd leftover;  ///< structure that is left
   Eigen::VectorXd excess;    ///< .. beyond the share of it that the healthy session shows
   Eigen::VectorXd fitted_before, fitted_after, fitted_rows;  ///< of today's rows that fit, with a fit of all
-  std::vector<Eigen::VectorXd> alone;  ///< by named group: what comes back when it alone is removed
+  std::vector<Eigen::VectorXd> alone;           ///< by named group: what comes back when it alone is removed
+  std::vector<std::vector<Stretch>> stretches;  ///< by joint
 };
 
 /// What the data that fitted no coefficient say of the named effects.
@@ -33,6 +44,14 @@ struct Gate {
   /// Place of an effect in `groups`; groups.size(): it has none.
   std::size_t place(const Linearised& problem, const EffectId& id) const;
 };
+
+/// Share of a joint's gap that no finding explains: excess / gap. Its variance is that of a ratio of sums over
+/// stretches r, var = sum_s (left_s - r gap_s)^2 / gap^2 (Cochran 1977, Sampling Techniques, ch. 6), since neighbouring
+/// errors are not independent.
+Share left_of(const HeldOut& held, double gap, Eigen::Index joint);
+
+/// Judges the outcome as it is, each fold by a fit of the others.
+Gate judge_again(const Outcome& outcome, const std::vector<SessionLog>& logs, const std::vector<bool>& still);
 
 /// Mean squares of the filtered error on the logs that judge, by joint; empty: there are none.
 Eigen::VectorXd plain_error(const IdentifiedModel& model, const std::vector<SessionLog>& logs);

@@ -140,6 +140,10 @@ struct GateOptions {
   double sure_deviations = 2;
   /// log10 odds against nothing and against the closest rival; an effect is established; theory: 1000 to 1
   double established = 3;
+  /// standard deviations; .. and its coefficients are off nothing by; theory: 2 Phi(-4) = 6e-5 of noise is further off
+  double established_deviations = 4;
+  /// log10 odds likewise; an effect is likely; theory: 20 to 1. So little apart, two effects are not told apart
+  double likely = 1.3;
   /// noise variances; from there on a joint feels an effect on the robot; hand
   double least_felt = 6;
 };
@@ -166,7 +170,7 @@ struct DeflectionOptions {
   double least_part = 0.05;
   /// share of the healthy session's size; a part that differs by less has not changed; hand
   double same = 0.33;
-  /// times the noise's power; a deflection without a name that gets a note; hand
+  /// times the noise's power; a deflection without a name that leaves the joint unexplained; hand
   double noted = 2;
   /// share of the load; uncertainty of the load in a direction that is not followed; hand
   double load_uncertainty = 1e-3;
@@ -186,6 +190,9 @@ struct ReportOptions {
   double upright = 1e-3;
   /// share of the gap less share of the samples; a region that is listed beside the first; hand
   double least_contrast = 0.15;
+  /// chance; an error that has nothing to do with the motion makes as clear a region; theory: the clearest of 49
+  /// shifts in time of the error against the motion
+  double region_chance = 0.02;
 };
 
 struct Options {

@@ -129,7 +129,7 @@ std::vector<std::size_t> shown_joints(const DiagnosisResult& diagnosis, std::siz
     if (index >= 1 && index <= joints) shown[index - 1] = true;
   };
   for (const JointDiagnosis& joint : diagnosis.joints) {
-    if (joint.verdict == Verdict::effects_found || joint.verdict == Verdict::unexplained) mark(joint.index);
+    if (joint.verdict != Verdict::nothing_missing && joint.verdict != Verdict::not_excited) mark(joint.index);
   }
   for (const NamedEffect& effect : diagnosis.robot_effects) {
     for (const std::size_t index : effect.joints.value_or(std::vector<std::size_t>{})) mark(index);

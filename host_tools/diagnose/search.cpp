@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include "host_tools/diagnose/models.hpp"
@@ -21,9 +22,9 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// How far the search goes, no thresholds: sets that are followed, on so many first levels; candidates of a state whose
-/// shapes are refined; ripples of a joint that are tried; rounds of swaps; levels at most.
+/// shapes are refined; ripples of a joint that are tried; rounds of swaps; levels at most; rivals that take over.
 constexpr std::size_t beam_width = 3, most_refined = 4, most_ripples = 3;
-constexpr int beam_levels = 3, swap_rounds = 4, most_levels = 64;
+constexpr int beam_levels = 3, swap_rounds = 4, most_levels = 64, most_swaps = 2;
 /// Residuals at other times, from whose scores Gumbel's distribution is taken.
 constexpr int shifts = 24;
 /// Gumbel's distribution: its scale over the standard deviation, sqrt(6) / pi; its mean beyond the mode, Euler's
@@ -33,6 +34,12 @@ constexpr double gumbel_scale = 0.7797, gumbel_mean = 0.5772;
 constexpr double noise_free = 1e-12;
 /// Bounds below are none.
 constexpr double no_bound = -1e5;
+
+/// Whether an effect has another one's torque as a special case.
+bool contains(const EffectCandidate& whole, const EffectCandidate& part) {
+  const auto& unites = find_effect(whole.effect)->unites;
+  return std::find(unites.begin(), unites.end(), part.effect) != unites.end();
+}
 
 bool of_spectrum(const Group& group) { return find_effect(group.candidate.effect)->of_spectrum(); }
 
@@ -122,17 +129,19 @@ Choice Search::evaluate(const std::vector<std::size_t>& groups) const {
   MatrixXd inverse;
   for (const std::size_t g : groups) {
     const Group& group = problem_.groups()[g];
+    bool possible = true;
     for (Index i = 0; i < group.count; ++i, ++column) {
       if (group.lower[static_cast<std::size_t>(i)] < no_bound) continue;
       const double x = out.fit.x[column], below = group.lower[static_cast<std::size_t>(i)] - x;
       if (below <= 0) continue;
       if (inverse.size() == 0) inverse = solver.inverse();
-      out.possible &=
-          group.count > 1 && below < options().beyond_bound * std::sqrt(std::max(inverse(column, column), 0.0));
+      possible &= group.count > 1 && below < options().beyond_bound * std::sqrt(std::max(inverse(column, column), 0.0));
     }
-    if (!is_share(group)) continue;
-    const double share = out.fit.x[column - 1];
-    out.possible &= share > options().least_share && share < options().most_share;
+    if (is_share(group)) {
+      const double share = out.fit.x[column - 1];
+      possible &= share > options().least_share && share < options().most_share;
+    }
+    out.impossible += possible ? 0 : 1;
   }
   return out;
 }
@@ -306,7 +315,7 @@ Choice Search::run(const std::vector<std::size_t>& start, Progress& progress) {
         std::sort(key.begin(), key.end());
         if (!seen.insert(key).second) continue;
         Choice choice = evaluate(groups);
-        if (choice.possible && choice.score > beam[s].score + needed) next.push_back(std::move(choice));
+        if (choice.possible() && choice.score > beam[s].score + needed) next.push_back(std::move(choice));
       }
     }
     progress.step();
@@ -336,7 +345,7 @@ Choice Search::run(const std::vector<std::size_t>& start, Progress& progress) {
         std::vector<std::size_t> groups = others;
         groups.push_back(refine(without, one.group));
         Choice choice = evaluate(groups);
-        if (!choice.possible || choice.score <= best.score + options().swap_gain) continue;
+        if (!choice.possible() || choice.score <= best.score + options().swap_gain) continue;
         best = std::move(choice);
         changed = true;
       }
@@ -355,8 +364,8 @@ Choice Search::pruned(Choice choice, std::size_t kept) const {
       std::vector<std::size_t> others = choice.groups;
       std::erase(others, g);
       Choice without = evaluate(others);
-      const bool needed = choice.possible && choice.score - without.score >= threshold(g);
-      if (!needed && without.possible && (!best || without.score > best->score)) best = std::move(without);
+      const bool needed = choice.possible() && choice.score - without.score >= threshold(g);
+      if (!needed && without.possible() && (!best || without.score > best->score)) best = std::move(without);
     }
     if (!best) break;
     choice = std::move(*best);
@@ -375,7 +384,7 @@ bool Search::trade(Choice& best) {
     groups.push_back(added);
     Choice choice = pruned(evaluate(groups), added);
     const bool shorter = choice.groups.size() <= best.groups.size();
-    if (!choice.possible || !shorter || choice.score <= best.score + options().swap_gain) continue;
+    if (!choice.possible() || !shorter || choice.score <= best.score + options().swap_gain) continue;
     best = std::move(choice);
     return true;
   }
@@ -406,7 +415,20 @@ double Search::held_out(const Choice& choice, const VectorXd& weights) const {
   return sum;
 }
 
-std::vector<Found> Search::explain(const Choice& choice) {
+std::vector<Found> Search::explain(Choice& choice) {
+  std::vector<Found> out;
+  for (int swap = 0;; ++swap) {
+    std::optional<Choice> better;
+    out = explain(choice, better);
+    // On data that fitted neither.
+    if (!better || swap == most_swaps) return out;
+    choice = std::move(*better);
+  }
+}
+
+std::vector<Found> Search::explain(const Choice& choice, std::optional<Choice>& better) {
+  const double clear = -2 * std::numbers::ln10 * problem_.models().options.gate.likely;
+  double least = clear;
   std::vector<Found> out;
   const VectorXd weights = weights_of(choice.fit);
   const double own = held_out(choice, weights);
@@ -427,10 +449,19 @@ std::vector<Found> Search::explain(const Choice& choice) {
       std::vector<std::size_t> groups = others;
       groups.push_back(refine(without, one.group));
       const Choice instead = evaluate(groups);
-      if (instead.possible && instead.score > choice.score - options().alternative)
+      // What else of the set has left its bounds since it was chosen is not the rival's fault.
+      if (instead.impossible > choice.impossible) continue;
+      if (instead.score > choice.score - options().alternative)
         found.alternatives.push_back({problem_.groups()[groups.back()].candidate, choice.score - instead.score});
-      if (!instead.possible) continue;
-      const double gain = held_out(instead, weights) - own;
+      double gain = held_out(instead, weights) - own;
+      // A rival that has the effect as a special case fits as well whatever the truth is: its parameters have their
+      // price.
+      const bool whole = contains(group.candidate, mine.candidate);
+      if (whole) gain += choice.score - instead.score;
+      if (!whole && gain < least && instead.score - without.score >= threshold(groups.back())) {
+        least = gain;
+        better = instead;
+      }
       if (!found.rival || gain < found.rival->gain)
         found.rival = Rival{problem_.groups()[groups.back()].candidate, gain};
     }

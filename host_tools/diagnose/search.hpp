@@ -19,7 +19,9 @@ struct Choice {
   LinearFit fit;
   /// -sum N ln(RSS / N) over the joints - sum over effects of ((linear + nonlinear) ln N + 2 ln grid)
   double score = -1e300;
-  bool possible = true;  ///< coefficients keep their bounds
+  std::size_t impossible = 0;  ///< effects whose coefficients don't keep their bounds
+
+  bool possible() const { return impossible == 0; }
 };
 
 /// Place in the fit's coefficients at which those of its groups begin.
@@ -33,7 +35,9 @@ struct Alternative {
 /// The effect that comes nearest to a chosen one.
 struct Rival {
   EffectCandidate candidate;
-  double gain = 0;  ///< what the set with the chosen one is better by on data that fitted neither [noise variances]
+  /// What the set with the chosen one is better by on data that fitted neither [noise variances], and by its score
+  /// where the rival has it as a special case: no data refute that one.
+  double gain = 0;
 };
 
 /// One effect of the outcome.
@@ -60,7 +64,10 @@ class Search {
   /// The choice with an effect that unites others (EffectTraits::unites) in place of those of them that it has, joint
   /// by joint, where that scores better.
   Choice unite(Choice best);
-  std::vector<Found> explain(const Choice& choice);
+  /// What speaks for each effect of a choice. One whose rival is clearly better on data that fitted neither gives way.
+  std::vector<Found> explain(Choice& choice);
+  /// @param better the choice with the rival that is best on data that fitted neither, where one is clearly better
+  std::vector<Found> explain(const Choice& choice, std::optional<Choice>& better);
   Choice evaluate(const std::vector<std::size_t>& groups) const;
   /// Squares that a choice leaves on the folds' judges, in variances of what it leaves where it was fitted.
   double held_out(const Choice& choice, const Eigen::VectorXd& weights) const;

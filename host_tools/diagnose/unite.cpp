@@ -65,7 +65,7 @@ std::optional<Choice> Search::united(const Choice& choice, const EffectInfo& inf
     std::vector<std::size_t> groups = others;
     groups.push_back(g);
     Choice tried = evaluate(groups);
-    if (tried.possible && (!best || tried.score > best->score)) best = std::move(tried);
+    if (tried.possible() && (!best || tried.score > best->score)) best = std::move(tried);
   };
   for (const auto& shape : starts(info, members, scales_of(problem_, joint))) {
     const Group start = candidate(info, joint, shape);

@@ -75,7 +75,8 @@ class ReportWriter {
     judged_.resize(judges_.size());
     parallel_for(shown_.size() + judges_.size(), [&](std::size_t l) {
       if (l >= shown_.size()) {
-        judged_[l - shown_.size()] = predict(conclusion_.model, *judges_[l - shown_.size()]);
+        const std::size_t k = l - shown_.size();
+        judged_[k] = predict(conclusion_.model, *judges_[k]);
         return;
       }
       before_[l] = predict(conclusion_.nominal, *shown_[l]);
@@ -87,13 +88,13 @@ class ReportWriter {
     DiagnosisResult out;
     for (std::size_t j = 0; j < conclusion_.model.joints.size(); ++j)
       out.joints.push_back(conclusion_.still[j] ? still(j) : moving(j));
-    out.robot_effects = of_robot(out.resembles);
+    out.robot_effects = of_robot(out.undecided);
     // A joint whose gap a load closes is explained by it.
     for (JointDiagnosis& joint : out.joints) {
       const bool reached = std::any_of(out.robot_effects.begin(), out.robot_effects.end(), [&](const NamedEffect& e) {
-        return std::find(e.joints->begin(), e.joints->end(), joint.index) != e.joints->end();
+        return e.established && std::find(e.joints->begin(), e.joints->end(), joint.index) != e.joints->end();
       });
-      if (reached && joint.verdict == Verdict::nothing_missing) joint.verdict = Verdict::effects_found;
+      if (reached && joint.verdict == Verdict::nothing_missing) joint.verdict = Verdict::explained;
     }
     for (const std::string& effect : conclusion_.outcome.not_identifiable.back()) {
       // What of a load or a tilt is not part of the base parameters, the poses show.
@@ -101,15 +102,12 @@ class ReportWriter {
                          problem_.has_baseline() ? "other poses and loads"
                                                  : "the same motions recorded without it (role = \"baseline\")"));
     }
-    const auto any = [&](Verdict verdict) {
-      return std::any_of(out.joints.begin(), out.joints.end(),
-                         [&](const JointDiagnosis& joint) { return joint.verdict == verdict; });
-    };
-    const bool found = any(Verdict::effects_found) || any_effect_ || !out.robot_effects.empty();
-    out.verdict = any(Verdict::unexplained) || !out.resembles.empty() ? Verdict::unexplained
-                  : found                                             ? Verdict::effects_found
-                  : any(Verdict::not_excited)                         ? Verdict::not_excited
-                                                                      : Verdict::nothing_missing;
+    std::vector<Verdict> of_joints;
+    for (const JointDiagnosis& joint : out.joints) of_joints.push_back(joint.verdict);
+    const bool on_robot = std::any_of(out.robot_effects.begin(), out.robot_effects.end(),
+                                      [](const NamedEffect& e) { return e.established; });
+    if (on_robot || !out.undecided.empty()) of_joints.push_back(Verdict::explained);
+    out.verdict = worst(of_joints);
     out.not_identifiable = conclusion_.outcome.not_identifiable.back();
     out.next_experiment = next_;
     out.gate = gate_of(conclusion_.now);
@@ -177,43 +175,46 @@ class ReportWriter {
                                   [](const EffectFit& body) { return body.named && body.effect == GravityTilt::name; });
   }
 
-  NamedEffect named(const EffectFit& fit, const EffectId& id, double closed) {
+  NamedEffect named(const EffectFit& fit, const Finding& finding) {
+    const EffectId& id = finding.id;
     NamedEffect out;
-    const auto found = std::find_if(conclusion_.outcome.found.begin(), conclusion_.outcome.found.end(),
-                                    [&](const Finding& f) { return f.id == id; });
-    const bool known = found != conclusion_.outcome.found.end();
-    for (const Alternative& a : known ? found->alternatives : std::vector<Alternative>{}) {
+    for (const Alternative& a : finding.alternatives) {
       const bool body = find_effect(a.candidate.effect)->acts_on == ActsOn::body;
       if (!id.body && !body && a.candidate.joint != id.joint) continue;
       if (std::find(out.alternatives.begin(), out.alternatives.end(), a.candidate.effect) != out.alternatives.end())
         continue;
       out.alternatives.push_back(a.candidate.effect);
-      const std::size_t joint = id.body && !body ? a.candidate.joint : id.joint;
-      const std::string place = id.body && body ? "" : fmt::format(" at joint {}", joint + 1);
-      advise(
-          fmt::format("{} or {}{}: {}", fit.effect, a.candidate.effect, place, cure(fit.effect, a.candidate.effect)));
+      advise_between(fit.effect, id, a.candidate);
     }
     out.effect = fit.effect;
     out.parameters = parameters_of(fit, joint_of(id.joint), conclusion_.model.joints[id.joint].rated_torque);
-    out.score = known ? found->score : 0.0;
-    out.held_out_closure = closed;
-    add_odds(out, id, known && found->rival ? &*found->rival : nullptr);
+    out.score = finding.score;
+    out.held_out_closure = finding.evidence.closure;
+    out.established = finding.evidence.certainty == Certainty::established;
+    out.odds_nothing = finding.evidence.against_nothing;
+    out.odds_rival = finding.evidence.against_rival;
+    if (finding.rival) out.rival = finding.rival->candidate.effect;
     return out;
   }
 
-  /// What speaks for an effect on the data that judged. @param rival null: nothing else comes near
-  void add_odds(NamedEffect& effect, const EffectId& id, const Rival* rival) const {
-    constexpr double variances = 2 * std::numbers::ln10;  // of chi^2, a factor of ten in likelihood
-    const Gate& gate = conclusion_.gate;
-    const std::size_t i = gate.place(problem_, id);
-    if (i == gate.groups.size()) return;
-    effect.odds_nothing = (id.body ? gate.held.alone[i].sum() : gate.own[i].gain) / variances;
-    if (rival != nullptr) {
-      effect.rival = rival->candidate.effect;
-      effect.odds_rival = rival->gain / variances;
+  void advise_between(const std::string& effect, const EffectId& id, const EffectCandidate& other) {
+    const bool body = find_effect(other.effect)->acts_on == ActsOn::body;
+    const std::size_t joint = id.body && !body ? other.joint : id.joint;
+    const std::string place = id.body && body ? "" : fmt::format(" at joint {}", joint + 1);
+    advise(fmt::format("{} or {}{}: {}", effect, other.effect, place, cure(effect, other.effect)));
+  }
+
+  /// An effect and its rival, of which one is there.
+  std::vector<std::string> undecided(const EffectFit& fit, const Finding& finding) {
+    advise_between(fit.effect, finding.id, finding.rival->candidate);
+    return {fit.effect, finding.rival->candidate.effect};
+  }
+
+  const Finding* finding_of(const EffectId& id) const {
+    for (const Finding& finding : conclusion_.outcome.found) {
+      if (finding.id == id) return &finding;
     }
-    const double least = problem_.models().options.gate.established;
-    effect.established = *effect.odds_nothing >= least && (rival == nullptr || *effect.odds_rival >= least);
+    return nullptr;
   }
 
   JointDiagnosis still(std::size_t j) {
@@ -223,12 +224,11 @@ class ReportWriter {
     return out;
   }
 
-  /// RMS errors of a joint [N*m | N], and its errors over the logs that are shown.
+  /// RMS errors of a joint on the logs that are shown [N*m | N].
   struct Figures {
     double before = 0, after = 0;
     double gate = 0;   ///< on the logs that judged
     double floor = 0;  ///< of the noise
-    std::vector<VectorXd> errors;
   };
 
   Figures figures(std::size_t j) const {
@@ -239,8 +239,7 @@ class ReportWriter {
     for (std::size_t l = 0; l < shown_.size(); ++l) {
       const ProcessedLog& log = *shown_[l];
       const Index samples = log.last - log.first;
-      out.errors.push_back(error_of(log, before_[l], j));
-      before += out.errors.back().segment(log.first, samples).squaredNorm();
+      before += error_of(log, before_[l], j).segment(log.first, samples).squaredNorm();
       after += error_of(log, after_[l], j).segment(log.first, samples).squaredNorm();
       count += static_cast<double>(samples);
     }
@@ -258,20 +257,15 @@ class ReportWriter {
     return out;
   }
 
-  /// Effects that were named at a joint. @param resembles those that are not believed
-  std::vector<NamedEffect> effects_of(std::size_t j, std::vector<std::string>& resembles) {
-    const auto k = static_cast<Index>(j);
-    const Gate& gate = conclusion_.gate;
+  /// Effects that were found at a joint. @param open those that are undecided
+  std::vector<NamedEffect> effects_of(std::size_t j, std::vector<std::vector<std::string>>& open) {
     std::vector<NamedEffect> out;
     const auto& fits = conclusion_.model.joints[j].effects;
     for (std::size_t e = 0; e < fits.size(); ++e) {
-      const EffectId id{false, j, e};
-      const std::size_t i = gate.place(problem_, id);
-      if (i == gate.groups.size()) continue;  // nominal, or a link encoder's
-      if (!fits[e].named) {
-        resembles.push_back(fits[e].effect);
-        continue;
-      }
+      const Finding* finding = finding_of({false, j, e});
+      if (finding == nullptr) continue;  // nominal, or a link encoder's
+      if (finding->evidence.undecided) open.push_back(undecided(fits[e], *finding));
+      if (finding->evidence.certainty == Certainty::unlisted) continue;
       if (part_of_tilt(j, fits[e])) {
         notes_.push_back(fmt::format(
             "{}: the tilt makes masses about this axis felt, which no upright robot shows: the model carries them as "
@@ -279,9 +273,11 @@ class ReportWriter {
             joint_of(j).name));
         continue;
       }
-      NamedEffect one = named(fits[e], id, gate.gap[k] > 0 ? gate.held.alone[i][k] / gate.gap[k] : 0);
-      one.model_share = model_share(j, e);
-      out.push_back(std::move(one));
+      out.push_back(named(fits[e], *finding));
+      out.back().model_share = model_share(j, e);
+    }
+    for (const Likely& likely : conclusion_.likely) {
+      if (!likely.finding.id.body && likely.finding.id.joint == j) out.push_back(named(likely.fit, likely.finding));
     }
     for (const DeflectionEffect& seen : conclusion_.deflections.found) {
       if (seen.joint == j) out.push_back(named(seen));
@@ -297,6 +293,9 @@ class ReportWriter {
     out.effect = seen.fit.effect;
     out.parameters = parameters_of(seen.fit, joint_of(seen.joint), joint.rated_torque);
     out.score = seen.score;
+    // The score is twice the logarithm of a Bayes factor.
+    out.odds_nothing = seen.score / (2 * std::numbers::ln10);
+    out.established = out.odds_nothing >= problem_.models().options.gate.established;
     if (seen.held_out) out.held_out_closure = seen.closure;
     out.signal = "q - qlink";
     out.model_share = model_share(seen.joint, static_cast<std::size_t>(place - joint.effects.begin()));
@@ -349,60 +348,84 @@ class ReportWriter {
     advise(fmt::format("record more of joint {}{}", j + 1, which));
   }
 
-  static GapRegion region_of(const Impacts& impacts) {
-    return {"t", impacts.t - 0.05, impacts.t + 0.05, {}, impacts.log};
+  static GapPlace place(const Impacts& impacts) {
+    return {fmt::format("impacts, the largest at {:.2f} s of {}", impacts.t, impacts.log),
+            {{"t", impacts.t - 0.05, impacts.t + 0.05, {}, {}, impacts.log}}};
+  }
+
+  /// Whether the model has an effect at a joint whose name is not established.
+  bool is_there(std::size_t j) const {
+    const auto& found = conclusion_.outcome.found;
+    return std::any_of(found.begin(), found.end(), [&](const Finding& f) {
+      return !f.id.body && f.id.joint == j && f.evidence.there && f.evidence.certainty != Certainty::established;
+    });
   }
 
   JointDiagnosis moving(std::size_t j) {
     const auto k = static_cast<Index>(j);
     const Figures of = figures(j);
-    std::vector<std::string> resembles;
-    std::vector<NamedEffect> effects = effects_of(j, resembles);
-    note_other_test_logs(j, of);
-    const bool reached = robot_reaches(k), nothing_found = effects.empty() && !reached;
-    const std::optional<Impacts>& impacts = conclusion_.impacts[j];
-    note_impacts(j);
-    const LackOfFit& lack = conclusion_.outcome.lack[j];
-    const bool structured = conclusion_.outcome.structured(j);
-    const bool unexplained = (structured && (nothing_found || conclusion_.gate.remains[j])) || !resembles.empty() ||
-                             (nothing_found && impacts);
-    const Verdict verdict = unexplained        ? Verdict::unexplained
-                            : !effects.empty() ? Verdict::effects_found
-                                               : Verdict::nothing_missing;
-    any_effect_ |= !effects.empty();
-    // What only bends leaves no gap in the torque, and noise alone has nothing to close.
-    const bool of_torque =
-        !resembles.empty() || reached || unexplained ||
-        std::any_of(effects.begin(), effects.end(), [](const NamedEffect& e) { return e.signal.empty(); });
-    if (!effects.empty() || !resembles.empty() || reached) note_risen_error(j, of);
-    std::sort(effects.begin(), effects.end(),
+    JointDiagnosis out{joint_of(j).name, joint_of(j).torque_unit(), j + 1};
+    out.effects = effects_of(j, out.undecided);
+    std::sort(out.effects.begin(), out.effects.end(),
               [](const NamedEffect& a, const NamedEffect& b) { return a.score > b.score; });
-    std::vector<GapRegion> regions;
-    const bool only_impacts = impacts && nothing_found && resembles.empty() && !structured;
+    const auto any = [&](auto&& of_effect) { return std::any_of(out.effects.begin(), out.effects.end(), of_effect); };
+    const std::optional<Impacts>& impacts = conclusion_.impacts[j];
+    const std::vector<std::size_t>& bends = conclusion_.deflections.unexplained;
+    JointState state;
+    state.structured = conclusion_.outcome.structured(j);
+    state.remains = conclusion_.gate.remains[j];
+    state.established = any([](const NamedEffect& e) { return e.established; });
+    state.reached = robot_reaches(k);
+    state.there = is_there(j);
+    state.likely = any([](const NamedEffect& e) { return !e.established; });
+    state.impacts = impacts.has_value();
+    state.bends = std::find(bends.begin(), bends.end(), j) != bends.end();
+    out.verdict = verdict_of(state);
+
+    note_other_test_logs(j, of);
+    note_impacts(j);
+    const bool changed = state.established || state.there || state.reached;
+    if (changed) note_risen_error(j, of);
+    const bool left = out.verdict == Verdict::unexplained || out.verdict == Verdict::partly_explained;
+    // What only bends leaves no gap in the torque, and noise alone has nothing to close.
+    const bool of_torque = state.there || state.reached || (left && (state.structured || state.likely)) ||
+                           any([](const NamedEffect& e) { return e.signal.empty(); });
+    const bool only_impacts = state.impacts && !changed && !state.structured;
     if (only_impacts) {
-      regions.push_back(region_of(*impacts));
-    } else if (unexplained || (verdict != Verdict::nothing_missing && of_torque) ||
-               of.before >= report_.much_larger * of.floor) {
-      regions = where(conclusion_.nominal, shown_, j, of.errors, std::min(of.floor, of.before), report_);
-    }
-    if (unexplained) note_doubtful_direction(j);
-    if (only_impacts) {
+      out.where = place(*impacts);
       advise(fmt::format("look at the raw torque of joint {} there; an encoder on its link would show a gap", j + 1));
-    } else if (unexplained) {
-      advise_on_gap(j, regions);
+    } else if (of_torque) {
+      out.where = place_of_gap(j, std::min(of.floor, of.before));
     }
-    JointDiagnosis out{joint_of(j).name, joint_of(j).torque_unit(), j + 1, verdict};
+    if (left && of_torque) note_doubtful_direction(j);
+    if (left && !only_impacts) advise_on_gap(j, out.where.regions);
+    if (state.bends) {
+      notes_.push_back(
+          fmt::format("{}: the deflection that the link encoder shows is none that has a name", joint_of(j).name));
+    }
     out.gap_before = of.before;
     out.gap_after = of.after;
     out.noise_floor = std::min(of.floor, of.after);
-    if (of_torque) out.closure = conclusion_.gate.closure[k];
-    out.where = std::move(regions);
-    out.effects = std::move(effects);
-    out.resembles = std::move(resembles);
+    if (of_torque) {
+      out.closure = conclusion_.gate.closure[k];
+      const Share share = left_of(conclusion_.gate.held, conclusion_.gate.gap[k], k);
+      out.left = GapLeft{share.share, share.low, share.high};
+    }
     out.not_identifiable = conclusion_.outcome.not_identifiable[j];
-    out.state_p = lack.state_p;
-    out.time_p = lack.time_p;
+    out.state_p = conclusion_.outcome.lack[j].state_p;
+    out.time_p = conclusion_.outcome.lack[j].time_p;
     return out;
+  }
+
+  /// Where the gap of the model before sits, on the logs that fit and those that judge.
+  GapPlace place_of_gap(std::size_t j, double noise) const {
+    std::vector<const ProcessedLog*> logs;
+    std::vector<VectorXd> errors;
+    for (const ProcessedLog& log : conclusion_.now) {
+      logs.push_back(&log);
+      errors.push_back(error_of(log, predict(conclusion_.nominal, log), j));
+    }
+    return where(conclusion_.nominal, logs, j, errors, noise, report_);
   }
 
   /// Whether a named effect on the robot is felt at a joint.
@@ -416,25 +439,30 @@ class ReportWriter {
     return false;
   }
 
-  std::vector<NamedEffect> of_robot(std::vector<std::string>& resembles) {
+  std::vector<NamedEffect> of_robot(std::vector<std::vector<std::string>>& open) {
     std::vector<NamedEffect> robot;
+    const Gate& gate = conclusion_.gate;
     for (std::size_t e = 0; e < conclusion_.model.body.size(); ++e) {
       const EffectId id{true, 0, e};
-      const std::size_t i = conclusion_.gate.place(problem_, id);
-      if (i == conclusion_.gate.groups.size()) continue;
-      if (!conclusion_.model.body[e].named) {
-        resembles.push_back(conclusion_.model.body[e].effect);
-        advise(fmt::format("{} explains too little of what it resembles: other loads and postures would tell",
-                           conclusion_.model.body[e].effect));
-        continue;
-      }
-      NamedEffect one = named(conclusion_.model.body[e], id, conclusion_.gate.robot_closure[i]);
+      const Finding* finding = finding_of(id);
+      if (finding == nullptr) continue;
+      if (finding->evidence.undecided) open.push_back(undecided(conclusion_.model.body[e], *finding));
+      if (finding->evidence.certainty == Certainty::unlisted) continue;
+      NamedEffect one = named(conclusion_.model.body[e], *finding);
+      const std::size_t i = gate.place(problem_, id);
       one.joints.emplace();
       for (std::size_t j = 0; j < conclusion_.model.joints.size(); ++j) {
-        if (conclusion_.gate.held.alone[i][static_cast<Index>(j)] > problem_.models().options.gate.least_felt)
+        if (gate.held.alone[i][static_cast<Index>(j)] > problem_.models().options.gate.least_felt)
           one.joints->push_back(j + 1);
       }
       one.model_share = body_share(e);
+      robot.push_back(std::move(one));
+    }
+    for (const Likely& likely : conclusion_.likely) {
+      if (!likely.finding.id.body) continue;
+      NamedEffect one = named(likely.fit, likely.finding);
+      one.joints.emplace();
+      for (const std::size_t j : likely.joints) one.joints->push_back(j + 1);
       robot.push_back(std::move(one));
     }
     return robot;
@@ -446,7 +474,7 @@ class ReportWriter {
   std::vector<const ProcessedLog*> shown_;
   std::string figures_on_, next_;
   std::vector<std::string> notes_;
-  bool blocks_only_ = false, any_effect_ = false;
+  bool blocks_only_ = false;
   std::vector<MatrixXd> before_, after_;
   std::vector<const ProcessedLog*> judges_;  ///< what accepted the names: validate logs, or the train logs
   std::vector<MatrixXd> judged_;             ///< .. and the model's torque on them
@@ -458,6 +486,22 @@ std::string gate_of(const std::vector<ProcessedLog>& now) {
   if (std::any_of(now.begin(), now.end(), is_validate)) return "validate logs";
   return fmt::format("{}, each judged by coefficients fitted to the others",
                      now.size() == 1 ? "blocks of the train log" : "train logs, whole or in parts");
+}
+
+Verdict verdict_of(const JointState& state) {
+  const bool explained = state.established || state.there || state.reached;
+  const bool left = (state.structured && (!explained || state.remains)) ||
+                    (!explained && (state.impacts || state.likely)) || state.bends;
+  if (left) return explained ? Verdict::partly_explained : Verdict::unexplained;
+  return explained ? Verdict::explained : Verdict::nothing_missing;
+}
+
+Verdict worst(const std::vector<Verdict>& verdicts) {
+  for (const Verdict verdict :
+       {Verdict::unexplained, Verdict::partly_explained, Verdict::explained, Verdict::not_excited}) {
+    if (std::find(verdicts.begin(), verdicts.end(), verdict) != verdicts.end()) return verdict;
+  }
+  return Verdict::nothing_missing;
 }
 
 DiagnosisResult verdicts(const Conclusion& conclusion) { return ReportWriter(conclusion).all(); }

@@ -1,7 +1,10 @@
 #include "host_tools/diagnose/where.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
@@ -15,53 +18,106 @@ using Eigen::VectorXd;
 
 constexpr Index bins = 24;
 constexpr std::size_t most_regions = 4;
+/// Seconds whose mean error is the quietest of a log's.
+constexpr double stretch_s = 0.5;
 
+/// A region, as it is compared with others.
 struct Region {
   std::string signal;
-  double from = 0, to = 0, share = 0, contrast = 0;
-  std::string log{};  ///< empty: of all logs
+  double from = 0, to = 0;
+  double share = 0, of_time = 0;  ///< of the gap's power, of the samples
+  std::string log{};              ///< empty: of all logs
+  double contrast() const { return share - of_time; }
 };
 
-/// What shares are of: the gap's power, and samples.
-struct Whole {
-  double power = 0, samples = 0;
-};
-
-/// The interval with the largest share of the gap beyond its share of the samples.
-Region concentrated(const std::string& signal, const VectorXd& values, const VectorXd& square, double noise,
-                    const Whole& of) {
-  Region best{signal};
-  std::vector<double> sorted(values.begin(), values.end());
-  std::sort(sorted.begin(), sorted.end());
-  const double from = sorted[sorted.size() / 200], to = sorted[sorted.size() - 1 - sorted.size() / 200];
-  if (!(to > from)) return best;
-  VectorXd power = VectorXd::Zero(bins), count = VectorXd::Zero(bins);
-  for (Index k = 0; k < values.size(); ++k) {
-    const auto bin = std::clamp<Index>(static_cast<Index>((values[k] - from) / (to - from) * bins), 0, bins - 1);
-    power[bin] += square[k] - noise * noise;
-    count[bin] += 1;
-  }
-  if (!(of.power > 0)) return best;
-  for (Index a = 0; a < bins; ++a) {
-    double p = 0, c = 0;
-    for (Index b = a; b < bins; ++b) {
-      p += power[b];
-      c += count[b];
-      const double contrast = p / of.power - c / of.samples;
-      if (contrast <= best.contrast) continue;
-      best.contrast = contrast;
-      best.share = std::min(1.0, p / of.power);
-      best.from = from + (to - from) * static_cast<double>(a) / bins;
-      best.to = from + (to - from) * static_cast<double>(b + 1) / bins;
+/// Values of a signal in classes of equal width, without the outermost half per cent.
+class Classes {
+ public:
+  explicit Classes(const VectorXd& values) : count_(VectorXd::Zero(bins)) {
+    std::vector<double> sorted(values.begin(), values.end());
+    std::sort(sorted.begin(), sorted.end());
+    from_ = sorted[sorted.size() / 200];
+    to_ = sorted[sorted.size() - 1 - sorted.size() / 200];
+    of_.reserve(sorted.size());
+    for (const double value : values) {
+      const double place = to_ > from_ ? (value - from_) / (to_ - from_) * bins : 0;
+      of_.push_back(std::clamp<Index>(static_cast<Index>(place), 0, bins - 1));
+      count_[of_.back()] += 1;
     }
+  }
+
+  /// The interval with the largest share of the power beyond its share of the samples.
+  Region clearest(const std::string& signal, const VectorXd& power, double whole, double samples) const {
+    Region best{signal};
+    if (!(to_ > from_) || !(whole > 0)) return best;
+    VectorXd of_class = VectorXd::Zero(bins);
+    for (Index k = 0; k < power.size(); ++k) of_class[of_[static_cast<std::size_t>(k)]] += power[k];
+    for (Index a = 0; a < bins; ++a) {
+      double p = 0, c = 0;
+      for (Index b = a; b < bins; ++b) {
+        p += of_class[b];
+        c += count_[b];
+        if (p / whole - c / samples <= best.contrast()) continue;
+        best.share = p / whole;
+        best.of_time = c / samples;
+        best.from = from_ + (to_ - from_) * static_cast<double>(a) / bins;
+        best.to = from_ + (to_ - from_) * static_cast<double>(b + 1) / bins;
+      }
+    }
+    return best;
+  }
+
+ private:
+  double from_ = 0, to_ = 0;
+  std::vector<Index> of_;
+  VectorXd count_;
+};
+
+/// One joint's motion and power above the noise at the rows of all logs.
+struct Samples {
+  VectorXd q, dq, ddq, load, t, power;
+  std::vector<Index> first;  ///< row of each log
+};
+
+/// Takes the noise off: as much as the quietest half second has, at most.
+void take_noise(const std::vector<const ProcessedLog*>& logs, Samples& samples, double noise) {
+  double square = noise * noise;
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    const double row_s = logs[l]->step_s * static_cast<double>(logs[l]->decimation);
+    const Index rows = logs[l]->rows(), stretch = std::max<Index>(1, static_cast<Index>(stretch_s / row_s));
+    for (Index k = 0; k + stretch <= rows; k += stretch)
+      square = std::min(square, samples.power.segment(samples.first[l] + k, stretch).mean());
+  }
+  samples.power.array() -= square;
+}
+
+/// The power at other times of each log: what has nothing to do with the motion. @param turn share of a log
+VectorXd shifted(const Samples& samples, double turn) {
+  VectorXd out(samples.power.size());
+  for (std::size_t l = 0; l < samples.first.size(); ++l) {
+    const Index first = samples.first[l];
+    const Index rows = (l + 1 < samples.first.size() ? samples.first[l + 1] : out.size()) - first;
+    const auto by = static_cast<Index>(turn * static_cast<double>(rows));
+    out.segment(first, rows - by) = samples.power.segment(first + by, rows - by);
+    out.segment(first + rows - by, by) = samples.power.segment(first, by);
+  }
+  return out;
+}
+
+/// The clearest interval of a signal, if the error at other times has none that is as clear.
+std::optional<Region> concentrated(const std::string& signal, const VectorXd& values, const Samples& samples,
+                                   double chance) {
+  const Classes classes(values);
+  const double whole = samples.power.sum();
+  const auto count = static_cast<double>(values.size());
+  const Region best = classes.clearest(signal, samples.power, whole, count);
+  const int shifts = static_cast<int>(std::ceil(1 / chance)) - 1;
+  for (int s = 1; s <= shifts; ++s) {
+    const VectorXd other = shifted(samples, static_cast<double>(s) / (shifts + 1));
+    if (classes.clearest(signal, other, whole, count).contrast() >= best.contrast()) return {};
   }
   return best;
 }
-
-/// One joint's motion and squared error at the rows of all logs.
-struct Samples {
-  VectorXd q, dq, ddq, load, t, square;
-};
 
 Samples samples_of(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs, std::size_t joint,
                    const std::vector<VectorXd>& error) {
@@ -69,7 +125,7 @@ Samples samples_of(const IdentifiedModel& model, const std::vector<const Process
   Index total = 0;
   for (const ProcessedLog* log : logs) total += log->rows();
   Samples out;
-  for (VectorXd* v : {&out.q, &out.dq, &out.ddq, &out.load, &out.t, &out.square}) v->resize(total);
+  for (VectorXd* v : {&out.q, &out.dq, &out.ddq, &out.load, &out.t, &out.power}) v->resize(total);
   IdentifiedModel rigid = model;
   for (JointFit& fit : rigid.joints) {
     fit.effects.clear();
@@ -78,6 +134,7 @@ Samples samples_of(const IdentifiedModel& model, const std::vector<const Process
   Index row = 0;
   for (std::size_t l = 0; l < logs.size(); ++l) {
     const ProcessedLog& log = *logs[l];
+    out.first.push_back(row);
     const MotionRows m = log.joint_motion(j);
     const VectorXd structural = predict(rigid, log).col(j);
     for (Index r = 0; r < log.rows(); ++r, ++row) {
@@ -87,42 +144,27 @@ Samples samples_of(const IdentifiedModel& model, const std::vector<const Process
       out.ddq[row] = m.ddq(k, 0);
       out.load[row] = structural[k];
       out.t[row] = log.t[k];
-      out.square[row] = error[l][k] * error[l][k];
+      out.power[row] = error[l][k] * error[l][k];
     }
   }
   return out;
 }
 
 /// Clocks start anywhere: time is a log's own.
-Region in_time(const std::vector<const ProcessedLog*>& logs, const Samples& samples, double noise, const Whole& all) {
+Region in_time(const std::vector<const ProcessedLog*>& logs, const Samples& samples) {
   Region best{"t"};
-  Index first = 0;
-  for (const ProcessedLog* log : logs) {
-    Region region = concentrated("t", samples.t.segment(first, log->rows()), samples.square.segment(first, log->rows()),
-                                 noise, all);
-    if (logs.size() > 1) region.log = log->name;
-    if (region.contrast > best.contrast) best = region;
-    first += log->rows();
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    const Index first = samples.first[l], rows = logs[l]->rows();
+    Region region = Classes(samples.t.segment(first, rows))
+                        .clearest("t", samples.power.segment(first, rows), samples.power.sum(),
+                                  static_cast<double>(samples.power.size()));
+    if (logs.size() > 1) region.log = logs[l]->name;
+    if (region.contrast() > best.contrast()) best = region;
   }
   return best;
 }
 
-/// Direction of motion, as -1..0 or 0..1; an empty interval: there is no gap.
-Region in_direction(const Samples& samples, double noise) {
-  double forward = 0, backward = 0, ahead = 0;
-  for (Index k = 0; k < samples.dq.size(); ++k) {
-    (samples.dq[k] > 0 ? forward : backward) += samples.square[k] - noise * noise;
-    ahead += samples.dq[k] > 0;
-  }
-  const double whole = forward + backward, share = ahead / static_cast<double>(std::max<Index>(samples.dq.size(), 1));
-  if (!(whole > 0)) return {"direction"};
-  const bool positive = forward / whole - share > 0;
-  const double mine = positive ? forward / whole : backward / whole;
-  return {"direction", positive ? 0.0 : -1.0, positive ? 1.0 : 0.0, std::min(1.0, mine),
-          mine - (positive ? share : 1 - share)};
-}
-
-/// Octaves of frequency, without a white noise of that size; contrast against the band.
+/// Octaves of frequency, without a white noise of that size; their share of the band instead of that of time.
 Region in_frequency(const std::vector<const ProcessedLog*>& logs, const std::vector<VectorXd>& error, double noise) {
   const double cutoff = logs.front()->filter.torque_cutoff_hz;
   VectorXd power;
@@ -143,37 +185,65 @@ Region in_frequency(const std::vector<const ProcessedLog*>& logs, const std::vec
     const double to = std::max(2 * from, 0.5);
     const auto a = static_cast<Index>(from / step), b = std::min<Index>(power.size(), static_cast<Index>(to / step));
     if (b <= a) continue;
-    const double share = std::min(1.0, power.segment(a, b - a).sum() / whole), contrast = share - (to - from) / cutoff;
-    if (contrast > best.contrast) best = {"frequency", from, to, share, contrast};
+    const double share = std::min(1.0, power.segment(a, b - a).sum() / whole), of_band = (to - from) / cutoff;
+    if (share - of_band > best.contrast()) best = {"frequency", from, to, share, of_band};
   }
   return best;
 }
 
+/// "at velocity -0.05 .. 0.05 rad/s"
+std::string place_of(const GapRegion& region, const Joint& joint) {
+  const std::string position = joint.position_unit();
+  if (region.signal == "direction") return region.to > 0 ? "in positive direction" : "in negative direction";
+  const auto range = [&](const std::string& name, const std::string& unit) {
+    return fmt::format("at {} {:.3g} .. {:.3g} {}", name, region.from, region.to, unit);
+  };
+  if (region.signal == "q") return range("position", position);
+  if (region.signal == "dq") return range("velocity", position + "/s");
+  if (region.signal == "ddq") return range("acceleration", position + "/s^2");
+  if (region.signal == "load") return range("load", joint.torque_unit());
+  if (region.signal == "frequency") return range("frequency", "Hz");
+  return range("time", "s") + (region.log.empty() ? "" : " of " + region.log);
+}
+
+std::string sentence(const GapRegion& region, const Joint& joint) {
+  std::string out = fmt::format("{:.0f} % of the gap is {}", 100 * *region.share_of_gap, place_of(region, joint));
+  if (region.signal != "frequency") out += fmt::format(", {:.0f} % of the time", 100 * *region.share_of_time);
+  return out;
+}
+
 }  // namespace
 
-std::vector<GapRegion> where(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs,
-                             std::size_t joint, const std::vector<VectorXd>& error, double noise,
-                             const ReportOptions& options) {
-  const Samples samples = samples_of(model, logs, joint, error);
-  const auto total = static_cast<double>(samples.square.size());
-  const Whole all{samples.square.sum() - noise * noise * total, total};
+GapPlace where(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs, std::size_t joint,
+               const std::vector<VectorXd>& error, double noise, const ReportOptions& options) {
+  Samples samples = samples_of(model, logs, joint, error);
+  take_noise(logs, samples, noise);
   std::vector<Region> regions;
-  const auto add = [&](Region region) {
-    if (region.share > 0) regions.push_back(std::move(region));
+  const auto add = [&](const std::string& signal, const VectorXd& values) {
+    if (const auto region = concentrated(signal, values, samples, options.region_chance)) regions.push_back(*region);
   };
-  add(concentrated("dq", samples.dq, samples.square, noise, all));
-  add(concentrated("q", samples.q, samples.square, noise, all));
-  add(concentrated("ddq", samples.ddq, samples.square, noise, all));
-  add(concentrated("load", samples.load, samples.square, noise, all));
-  add(in_time(logs, samples, noise, all));
-  if (const Region region = in_direction(samples, noise); region.to > region.from) regions.push_back(region);
-  add(in_frequency(logs, error, noise));
-  std::sort(regions.begin(), regions.end(), [](const Region& a, const Region& b) { return a.contrast > b.contrast; });
-  std::vector<GapRegion> out;
-  for (const Region& region : regions) {
-    if (out.size() >= most_regions || (region.contrast < options.least_contrast && !out.empty())) break;
-    out.push_back({region.signal, region.from, region.to, region.share, region.log});
+  add("dq", samples.dq);
+  add("q", samples.q);
+  add("ddq", samples.ddq);
+  add("load", samples.load);
+  add("direction", samples.dq.cwiseSign());
+  if (!regions.empty() && regions.back().signal == "direction") {
+    // All of one sign, not the edge of an interval.
+    regions.back().to > 0 ? regions.back().from = 0 : regions.back().to = 0;
   }
+  std::sort(regions.begin(), regions.end(),
+            [](const Region& a, const Region& b) { return a.contrast() > b.contrast(); });
+  // What has no place in the motion may have one in time, or in the spectrum.
+  if (regions.empty()) regions.push_back(in_time(logs, samples));
+  if (regions.front().contrast() < options.least_contrast) regions = {in_frequency(logs, error, noise)};
+  GapPlace out;
+  for (const Region& region : regions) {
+    if (out.regions.size() >= most_regions || region.contrast() < options.least_contrast) break;
+    out.regions.push_back(
+        {region.signal, region.from, region.to, std::min(1.0, region.share), region.of_time, region.log});
+  }
+  out.sentence = out.regions.empty() ? "the gap is the same everywhere in these logs"
+                                     : sentence(out.regions.front(), model.robot.joints[joint]);
   return out;
 }
 

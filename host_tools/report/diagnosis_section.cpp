@@ -21,11 +21,14 @@ constexpr const char* plus_minus = " ± ";
 
 std::string what_it_means(const json& diagnosis) {
   const std::string verdict = diagnosis.value("verdict", "");
-  if (verdict == "effects_found")
-    return "Effects found: the model lacked physics, and held-out data confirms its name.";
+  if (verdict == "explained")
+    return "Explained: the model lacked physics; held-out data confirms the effects below, and what is left is noise.";
+  if (verdict == "partly_explained")
+    return "Partly explained: held-out data confirms the effects below, and on some joint structure is left.";
   if (verdict == "nothing_missing") return "Nothing missing: what remains between model and log looks like noise.";
   if (verdict == "unexplained")
-    return "Unexplained: on some joint the model misses structure that no effect of the catalogue explains.";
+    return "Unexplained: on some joint the model misses structure, and no effect of the catalogue is established "
+           "there.";
   if (verdict == "not_excited") return "Not excited: the motion in the logs can't tell.";
   return verdict;
 }
@@ -42,7 +45,8 @@ Cell n(const std::string& text) { return {text, "n"}; }
 
 const char* colour_of(const json& joint) {
   const std::string verdict = joint.value("verdict", "");
-  return verdict == "nothing_missing" || verdict == "effects_found" ? "good" : verdict == "unexplained" ? "bad" : "";
+  if (verdict == "nothing_missing" || verdict == "explained") return "good";
+  return verdict == "unexplained" ? "bad" : "";
 }
 
 std::string joint_table(const json& joints) {
@@ -52,40 +56,37 @@ std::string joint_table(const json& joints) {
                {"gap before", "n"},
                {"gap after", "n"},
                {"noise floor", "n"},
-               {"gap closed", "n"},
+               {"left unexplained", "n"},
                {"where the gap sits"},
                {"not identifiable"}});
   for (std::size_t j = 0; j < joints.size(); ++j) {
     const json& joint = joints[j];
-    const std::string unit = joint.value("unit", "");
-    std::string regions;
-    for (const json& region : joint.value("where", json::array()))
-      regions += (regions.empty() ? "" : "; ") + words::where(region, unit);
-    const std::string like = words::list(joint.value("resembles", json::array()));
-    if (!like.empty()) regions += (regions.empty() ? "" : "; ") + std::string("resembles ") + like;
+    std::string found_where = words::where(joint);
+    for (const json& set : joint.value("undecided", json::array()))
+      found_where += (found_where.empty() ? "" : "; ") + words::either(set) + " is there";
     table.add({{words::joint(joint, j)},
-               {unit},
+               {joint.value("unit", "")},
                {words::verdict(joint), colour_of(joint)},
                n(words::figure(joint, "gap_before")),
                n(words::figure(joint, "gap_after")),
                n(words::figure(joint, "noise_floor")),
-               n(words::closure(joint)),
-               {regions},
+               n(words::left(joint)),
+               {found_where},
                {words::list(joint.value("not_identifiable", json::array()))}});
   }
   return table.html() +
          paragraph(
              "The gap is the RMS of measured minus model torque on held-out logs, both filtered alike, noise not "
-             "subtracted. Closed: the share of the gap's power above the noise that the effects found take away. "
-             "\"Resembles\": an effect that helps, but explains too little to be named; the "
-             "model keeps it without a name.");
+             "subtracted. Left unexplained: the share of the gap's power above the noise that no finding explains, "
+             "with its "
+             "95 % interval.");
 }
 
 std::string effect_table(const json& diagnosis) {
   Table table({{"joint"},
                {"effect"},
+               {"certainty"},
                {"parameters"},
-               {"score", "n"},
                {"closes", "n"},
                {"of the model's torque", "n"},
                {"could as well be"}});
@@ -94,8 +95,8 @@ std::string effect_table(const json& diagnosis) {
     any = true;
     table.add({{joint},
                {effect.value("effect", "")},
+               {words::certainty(effect)},
                {words::parameters(effect, plus_minus)},
-               n(words::figure(effect, "score")),
                n(words::share(effect, "held_out_closure")),
                n(words::share(effect, "model_share")),
                {words::list(effect.value("alternatives", json::array()))}});
@@ -111,8 +112,10 @@ std::string effect_table(const json& diagnosis) {
   if (!any) return "";
   return subsection("Effects found") + table.html() +
          paragraph(
-             "± is one standard deviation. Score: gain in log likelihood (times two) beyond the penalty for parameters "
-             "and search. Closes: the share of the gap that comes back when this effect alone is taken out.");
+             "± is one standard deviation. Established: 1000 to 1 against nothing and against the closest rival, on "
+             "data "
+             "that did not fit it. Likely: 20 to 1; it is not in the model. Closes: the share of the gap that comes "
+             "back when this effect alone is taken out.");
 }
 
 std::string evidence_section(const json& evidence) {

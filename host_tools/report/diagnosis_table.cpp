@@ -79,19 +79,19 @@ std::string joint_rows(const json& joints) {
   for (std::size_t j = 0; j < joints.size(); ++j)
     width = std::max(width, shortened(words::joint(joints[j], j)).size() + 1);
   const auto row = [&](const std::string& name, const std::string& verdict, const std::string& gap,
-                       const std::string& unit, const std::string& noise, const std::string& closed) {
-    return fmt::format("{:<{}}{:<16}{:>20} {:<4}{:>8}{:>7}  ", name, width, verdict, gap, unit, noise, closed);
+                       const std::string& unit, const std::string& noise, const std::string& left) {
+    return fmt::format("{:<{}}{:<17}{:>20} {:<4}{:>8}{:>17}  ", name, width, verdict, gap, unit, noise, left);
   };
-  std::string head = row("joint", "verdict", "gap before -> after", "", "noise", "closed");
+  std::string head = row("joint", "verdict", "gap before -> after", "", "noise", "left unexplained");
   std::string out = head + "effects\n";
   for (std::size_t j = 0; j < joints.size(); ++j) {
     const json& joint = joints[j];
-    const std::string left =
+    const std::string begin =
         row(shortened(words::joint(joint, j)), words::verdict(joint), change(joint, "gap_before", "gap_after"),
-            joint.value("unit", ""), words::figure(joint, "noise_floor"), words::closure(joint));
+            joint.value("unit", ""), words::figure(joint, "noise_floor"), words::left(joint));
     const std::vector<std::string> lines = wrap(all_effects(joint), page_width - head.size());
     for (std::size_t i = 0; i < lines.size(); ++i) {
-      std::string line = (i == 0 ? left : std::string(head.size(), ' ')) + lines[i];
+      std::string line = (i == 0 ? begin : std::string(head.size(), ' ')) + lines[i];
       line.erase(line.find_last_not_of(' ') + 1);
       out += line + "\n";
     }
@@ -102,25 +102,23 @@ std::string joint_rows(const json& joints) {
 std::string where_lines(const json& joints) {
   std::string out;
   for (std::size_t j = 0; j < joints.size(); ++j) {
-    std::string regions;
-    for (const json& region : joints[j].value("where", json::array()))
-      regions += (regions.empty() ? "" : "; ") + words::where(region, joints[j].value("unit", ""));
-    if (!regions.empty()) out += indented(words::joint(joints[j], j), regions);
+    const std::string sentence = words::where(joints[j]);
+    if (!sentence.empty()) out += indented(words::joint(joints[j], j), sentence);
   }
   return out.empty() ? "" : "where the gap sits\n" + out;
 }
 
-/// Effects that an unexplained gap resembles without being one of them.
-std::string resembling_lines(const json& diagnosis) {
-  const json joints = diagnosis.value("joints", json::array());
+/// "presliding or lugre" of each set in which one effect is there.
+std::string undecided_lines(const json& diagnosis) {
   std::string out;
-  for (std::size_t j = 0; j < joints.size(); ++j) {
-    const std::string names = words::list(joints[j].value("resembles", json::array()));
-    if (!names.empty()) out += indented(words::joint(joints[j], j), names);
-  }
-  const std::string robot = words::list(diagnosis.value("resembles", json::array()));
-  if (!robot.empty()) out += indented("robot", robot);
-  return out.empty() ? "" : "unexplained, resembles (kept in the model without a name)\n" + out;
+  const auto add = [&](const std::string& whose, const json& sets) {
+    for (const json& set : sets) out += indented(whose, words::either(set) + " is there; the model has the first");
+  };
+  const json joints = diagnosis.value("joints", json::array());
+  for (std::size_t j = 0; j < joints.size(); ++j)
+    add(words::joint(joints[j], j), joints[j].value("undecided", json::array()));
+  add("robot", diagnosis.value("undecided", json::array()));
+  return out.empty() ? "" : "found, but these logs don't tell which\n" + out;
 }
 
 std::string alternative_lines(const json& diagnosis) {
@@ -146,7 +144,7 @@ std::string robot_lines(const json& diagnosis) {
     if (!joints.empty()) line += (line.empty() ? "seen on joints " : "; seen on joints ") + joints;
     if (effect.contains("held_out_closure"))
       line += "; closes " + words::share(effect, "held_out_closure") + " of the gap";
-    out += indented(effect.value("effect", ""), line);
+    out += indented((effect.value("certainty", "") == "likely" ? "likely " : "") + effect.value("effect", ""), line);
   }
   return out.empty() ? "" : "on the robot as a whole\n" + out;
 }
@@ -206,7 +204,7 @@ std::string diagnosis_table(const json& diagnosis) {
   std::string out = "\ndiagnosis: " + words::verdict(diagnosis) + "\n";
   if (const std::string on = words::figures_on(diagnosis); !on.empty()) out += "gaps on " + on + "\n";
   out += clamped_lines(diagnosis) + joint_rows(joints) + robot_lines(diagnosis) + where_lines(joints) +
-         resembling_lines(diagnosis) + alternative_lines(diagnosis) + hidden_lines(diagnosis) +
+         undecided_lines(diagnosis) + alternative_lines(diagnosis) + hidden_lines(diagnosis) +
          evidence_lines(diagnosis);
   if (const std::string next = words::next_experiment(diagnosis); !next.empty()) out += indented("next", next);
   for (const json& note : diagnosis.value("notes", json::array())) {

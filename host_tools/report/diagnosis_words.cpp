@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <nlohmann/json.hpp>
-#include <string_view>
 
 namespace fxdyn::diagnosis_words {
 namespace {
@@ -18,23 +16,6 @@ std::string text(const json& of, const char* key) {
 }
 
 bool has_number(const json& of, const char* key) { return of.contains(key) && of.at(key).is_number(); }
-
-struct Signal {
-  std::string_view key, title, unit;  ///< unit of a revolute joint
-};
-// The names of diagnosis.json; what is not among them is shown as it is.
-constexpr std::array signals{
-    Signal{"q", "position", "rad"}, Signal{"dq", "velocity", "rad/s"}, Signal{"ddq", "acceleration", "rad/s^2"},
-    Signal{"t", "time", "s"},       Signal{"load", "load", "N*m"},     Signal{"frequency", "frequency", "Hz"},
-};
-
-std::string unit_for(std::string_view revolute, const std::string& torque_unit) {
-  std::string unit(revolute);
-  if (torque_unit != "N") return unit;
-  if (unit == "N*m") return "N";
-  if (unit.starts_with("rad")) unit.replace(0, 3, "m");
-  return unit;
-}
 
 }  // namespace
 
@@ -52,8 +33,29 @@ std::string share(const json& of, const char* key) {
   return has_number(of, key) ? fmt::format("{:.0f} %", 100 * of.at(key).get<double>()) : "-";
 }
 
-std::string closure(const json& joint) {
-  return text(joint, "verdict") == "nothing_missing" ? "-" : share(joint, "closure");
+std::string left(const json& joint) {
+  const json of = joint.value("left", json());
+  if (!of.is_object() || !has_number(of, "share")) return "-";
+  return fmt::format("{} ({:.0f} .. {:.0f})", share(of, "share"), 100 * of.value("low", 0.0),
+                     100 * of.value("high", 0.0));
+}
+
+std::string certainty(const json& effect) {
+  const std::string rival = text(effect, "rival");
+  const bool closer = has_number(effect, "log10_odds_rival") && has_number(effect, "log10_odds_nothing") &&
+                      effect.at("log10_odds_rival") < effect.at("log10_odds_nothing");
+  const char* key = closer ? "log10_odds_rival" : "log10_odds_nothing";
+  if (!has_number(effect, key)) return text(effect, "certainty");
+  return fmt::format("{}: 10^{:.0f} to 1 against {}", text(effect, "certainty"), effect.at(key).get<double>(),
+                     closer ? rival : "nothing");
+}
+
+std::string either(const json& names) {
+  std::string out;
+  for (const json& name : names) {
+    if (name.is_string()) out += (out.empty() ? "" : " or ") + name.get<std::string>();
+  }
+  return out;
 }
 
 std::string parameters(const json& of, const char* plus_minus) {
@@ -69,28 +71,11 @@ std::string parameters(const json& of, const char* plus_minus) {
 }
 
 std::string effect(const json& of, const char* plus_minus) {
-  const std::string values = parameters(of, plus_minus);
-  return text(of, "effect") + (values.empty() ? "" : " " + values);
+  const std::string values = parameters(of, plus_minus), likely = text(of, "certainty") == "likely" ? "likely " : "";
+  return likely + text(of, "effect") + (values.empty() ? "" : " " + values);
 }
 
-std::string where(const json& of, const std::string& torque_unit) {
-  const std::string key = text(of, "signal");
-  const auto known = std::find_if(signals.begin(), signals.end(), [&](const Signal& s) { return s.key == key; });
-  const bool found = known != signals.end();
-  const std::string name = found ? std::string(known->title) : key;
-  std::string unit = text(of, "unit");
-  if (unit.empty() && found) unit = unit_for(known->unit, torque_unit);
-  std::string out = has_number(of, "share_of_gap") ? share(of, "share_of_gap") + " of the gap at " : "at ";
-  if (key == "direction")
-    return out + (has_number(of, "to") && of.at("to") > 0 ? "positive" : "negative") + " velocity";
-  out += name;
-  if (has_number(of, "from") && has_number(of, "to"))
-    out += fmt::format(" {} .. {}{}", figure(of, "from"), figure(of, "to"), unit.empty() ? "" : " " + unit);
-  else if (of.contains("value"))
-    out += " " + (of.at("value").is_string() ? text(of, "value") : figure(of, "value"));
-  if (of.contains("log")) out += " of " + text(of, "log");
-  return out;
-}
+std::string where(const json& joint) { return text(joint.value("where", json::object()), "sentence"); }
 
 std::string list(const json& of) {
   std::string out;

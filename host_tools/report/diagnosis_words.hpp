@@ -7,21 +7,24 @@ namespace fxdyn::diagnosis_words {
 
 /// diagnosis.json in words, for terminal and report. What is missing or null in the file becomes "" or "-".
 
-/// "effects found" of "effects_found".
+/// "partly explained" of "partly_explained".
 std::string verdict(const nlohmann::json& of);
 /// Number with three digits, or "-".
 std::string figure(const nlohmann::json& of, const char* key);
 /// "83 %", or "-".
 std::string share(const nlohmann::json& of, const char* key);
-/// Share of the joint's gap that is closed, or "-" where there was none to close.
-std::string closure(const nlohmann::json& joint);
+/// "12 % (8 .. 17)": what no finding explains of a joint's gap; "-" where there was none.
+std::string left(const nlohmann::json& joint);
+/// "established: 10^12 to 1", "likely: 80 to 1 against presliding".
+std::string certainty(const nlohmann::json& effect);
+/// "presliding or lugre" of a list of names.
+std::string either(const nlohmann::json& names);
 /// "stribeck amplitude 2.1+-0.05 N*m, velocity 0.03 rad/s"; `plus_minus`: "+-" or " ± ".
 std::string effect(const nlohmann::json& of, const char* plus_minus);
 /// "amplitude 2.1+-0.05 N*m, ..": the effect's parameters alone.
 std::string parameters(const nlohmann::json& of, const char* plus_minus);
-/// "61 % of the gap at velocity -0.05 .. 0.05 rad/s", "90 % of the gap at negative velocity"; torque_unit: of the
-/// joint, N*m or N.
-std::string where(const nlohmann::json& of, const std::string& torque_unit);
+/// Sentence on where a joint's gap sits, and the further regions; "" where there is none.
+std::string where(const nlohmann::json& joint);
 /// Items "a, b" of a list of names (or of objects with "effect").
 std::string list(const nlohmann::json& of);
 /// "joint_1", or "joint 1" where it has no name.

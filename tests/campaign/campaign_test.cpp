@@ -129,14 +129,14 @@ TEST(Campaign, VisibilityIsToldBeforehand) {
   EXPECT_EQ(unnamed.rival, "spring");
 }
 
-const char* const diagnosis_text = R"({"verdict": "effects_found",
+const char* const diagnosis_text = R"({"verdict": "explained",
  "joints": [
   {"index": 1, "verdict": "nothing_missing", "effects": []},
-  {"index": 2, "verdict": "effects_found", "effects": [
-    {"effect": "stribeck", "score": 20.0, "alternatives": ["presliding", "ripple"]},
-    {"effect": "spring", "score": 90.0, "alternatives": ["gravity_compensator"]}]},
+  {"index": 2, "verdict": "explained", "effects": [
+    {"effect": "stribeck", "certainty": "established", "score": 20.0, "alternatives": ["presliding", "ripple"]},
+    {"effect": "spring", "certainty": "established", "score": 90.0, "alternatives": ["gravity_compensator"]}]},
   {"index": 3, "verdict": "unexplained", "effects": []}],
- "robot_effects": [{"effect": "payload", "score": 50.0, "alternatives": []}]})";
+ "robot_effects": [{"effect": "payload", "certainty": "established", "score": 50.0, "alternatives": []}]})";
 
 json truth_with(const json& effects) { return {{"effects", effects}, {"background", json::array()}}; }
 

@@ -10,9 +10,11 @@ using nlohmann::json;
 
 std::size_t true_joint(const json& effect) { return effect.value("joint", std::size_t{0}); }
 
-std::vector<Named> of(const json& list, std::size_t joint) {
+/// @param certainty established or likely
+std::vector<Named> of(const json& list, std::size_t joint, const std::string& certainty) {
   std::vector<Named> named;
   for (const json& entry : list) {
+    if (entry.at("certainty") != certainty) continue;
     Named one;
     one.effect = entry.at("effect");
     one.joint = joint;
@@ -58,27 +60,32 @@ json as_json(const std::vector<Named>& named) {
 
 }  // namespace
 
-std::vector<Named> named_effects(const json& diagnosis) {
+/// Structure is left at a joint, whatever was found there.
+bool is_left(const json& joint) {
+  return joint.at("verdict") == "unexplained" || joint.at("verdict") == "partly_explained";
+}
+
+std::vector<Named> named_effects(const json& diagnosis, const std::string& certainty) {
   std::vector<Named> named;
   std::size_t joint = 0;
   for (const json& entry : diagnosis.at("joints")) {
     ++joint;
-    for (Named& one : of(entry.at("effects"), entry.value("index", joint))) named.push_back(std::move(one));
+    for (Named& one : of(entry.at("effects"), entry.value("index", joint), certainty)) named.push_back(std::move(one));
   }
-  for (Named& one : of(diagnosis.at("robot_effects"), 0)) named.push_back(std::move(one));
+  for (Named& one : of(diagnosis.at("robot_effects"), 0, certainty)) named.push_back(std::move(one));
   std::stable_sort(named.begin(), named.end(), [](const Named& a, const Named& b) { return a.score > b.score; });
   return named;
 }
 
 json score(const json& truth, const json& diagnosis, std::optional<double> closure) {
   const std::string verdict = diagnosis.at("verdict");
-  std::vector<Named> named = named_effects(diagnosis);
-  json out{{"verdict", verdict}, {"named", as_json(named)}};
+  std::vector<Named> named = named_effects(diagnosis, "established"), likely = named_effects(diagnosis, "likely");
+  json out{{"verdict", verdict}, {"named", as_json(named)}, {"likely", as_json(likely)}};
   std::set<std::size_t> unexplained;
   std::size_t index = 0;
   for (const json& entry : diagnosis.at("joints")) {
     ++index;
-    if (entry.at("verdict") == "unexplained") unexplained.insert(entry.value("index", index));
+    if (is_left(entry)) unexplained.insert(entry.value("index", index));
   }
   out["unexplained_joints"] = unexplained;
   if (closure) out["closure"] = *closure;
@@ -88,9 +95,19 @@ json score(const json& truth, const json& diagnosis, std::optional<double> closu
   const auto is_of = [](const Named& one, const json& list) {
     return std::any_of(list.begin(), list.end(), [&](const json& effect) { return is_right(one, effect); });
   };
-  std::erase_if(named, [&](const Named& one) { return is_of(one, truth.at("background")) && !is_of(one, effects); });
+  const auto is_healthy = [&](const Named& one) { return is_of(one, truth.at("background")) && !is_of(one, effects); };
+  std::erase_if(named, is_healthy);
+  std::erase_if(likely, is_healthy);
+  const auto right_of = [&](const std::vector<Named>& list) {
+    return std::count_if(list.begin(), list.end(), [&](const Named& one) { return is_of(one, effects); });
+  };
+  out["established_right"] = right_of(named);
+  out["established_all"] = named.size();
+  out["likely_right"] = right_of(likely);
+  out["likely_all"] = likely.size();
   if (effects.empty()) {
-    out["false_alarm"] = !named.empty() || verdict == "unexplained" || verdict == "not_excited";
+    out["false_alarm"] =
+        !named.empty() || verdict == "unexplained" || verdict == "partly_explained" || verdict == "not_excited";
     out["passed"] = !out["false_alarm"];
     return out;
   }
@@ -117,7 +134,7 @@ json score(const json& truth, const json& diagnosis, std::optional<double> closu
   const bool on_body = felt.contains(0);
   out["flagged_elsewhere"] =
       !on_body && !std::includes(felt.begin(), felt.end(), unexplained.begin(), unexplained.end());
-  out["detected"] = verdict == "effects_found" || verdict == "unexplained";
+  out["detected"] = verdict != "nothing_missing" && verdict != "not_excited";
 
   const json& first = effects.front();
   if (first.value("outside", false)) {

@@ -13,7 +13,7 @@ struct Named {
   double score = 0;
   std::vector<std::string> alternatives;
 };
-std::vector<Named> named_effects(const nlohmann::json& diagnosis);
+std::vector<Named> named_effects(const nlohmann::json& diagnosis, const std::string& certainty = "established");
 
 /// The verdict on one case: what was said beside what is true. `truth`, `diagnosis`: truth.json and diagnosis.json;
 /// `closure` of true_closure(), where the case has one.

@@ -74,6 +74,10 @@ std::vector<Threshold> of_the_judges() {
       {"gate.worse", "-", place<gate, &GateOptions::worse>},
       {"gate.least_closure", "share", place<gate, &GateOptions::least_closure>},
       {"gate.sure_closure", "share", place<gate, &GateOptions::sure_closure>},
+      {"gate.sure_deviations", "deviations", place<gate, &GateOptions::sure_deviations>},
+      {"gate.established", "log10 odds", place<gate, &GateOptions::established>},
+      {"gate.established_deviations", "deviations", place<gate, &GateOptions::established_deviations>},
+      {"gate.likely", "log10 odds", place<gate, &GateOptions::likely>},
       {"gate.beside_background", "share", place<gate, &GateOptions::beside_background>, Reads::with_baseline},
       {"gate.least_felt", "noise variances", place<gate, &GateOptions::least_felt>},
       {"impact.beyond", "deviations", place<impact, &ImpactOptions::beyond>, Reads::with_baseline},
@@ -194,7 +198,8 @@ Answer answer_of(const nlohmann::json& truth, const nlohmann::json& report) {
     out.joints.insert(one.joint);
   }
   for (const nlohmann::json& joint : report.at("joints")) {
-    if (joint.at("verdict") == "unexplained") out.joints.insert(joint.at("index").get<std::size_t>());
+    if (joint.at("verdict") == "unexplained" || joint.at("verdict") == "partly_explained")
+      out.joints.insert(joint.at("index").get<std::size_t>());
   }
   out.right = score(truth, report, {}).at("passed");
   return out;

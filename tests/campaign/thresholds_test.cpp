@@ -59,12 +59,13 @@ TEST(Thresholds, HaveFortyCases) {
 
 TEST(Thresholds, AnAnswerIsVerdictNamesAndJoints) {
   const json truth = {{"effects", {{{"effect", "spring"}, {"joint", 2}}}}, {"background", json::array()}};
-  const json report = {
-      {"verdict", "unexplained"},
-      {"joints",
-       {{{"index", 1}, {"verdict", "unexplained"}, {"effects", json::array()}},
-        {{"index", 2}, {"verdict", "effects_found"}, {"effects", {{{"effect", "spring"}, {"score", 10}}}}}}},
-      {"robot_effects", json::array()}};
+  const json report = {{"verdict", "unexplained"},
+                       {"joints",
+                        {{{"index", 1}, {"verdict", "unexplained"}, {"effects", json::array()}},
+                         {{"index", 2},
+                          {"verdict", "explained"},
+                          {"effects", {{{"effect", "spring"}, {"certainty", "established"}, {"score", 10}}}}}}},
+                       {"robot_effects", json::array()}};
   const Answer answer = answer_of(truth, report);
   EXPECT_EQ(answer.verdict, "unexplained");
   EXPECT_EQ(answer.effects, std::set<std::string>{"spring"});
@@ -73,7 +74,7 @@ TEST(Thresholds, AnAnswerIsVerdictNamesAndJoints) {
 }
 
 TEST(Thresholds, ChangesAreCountedCaseByCase) {
-  const Answer found{"effects_found", {"spring"}, {2}, true}, other{"effects_found", {"ripple"}, {2}, false},
+  const Answer found{"explained", {"spring"}, {2}, true}, other{"explained", {"ripple"}, {2}, false},
       nothing{"nothing_missing", {}, {}, false};
   const Threshold gain = deciding_thresholds().front();
   const auto rows = rows_of({gain}, {{found, {found}, {nothing}}, {found, {other}, {found}}});

@@ -38,6 +38,12 @@ double share(const json& r) {
 }
 bool has(const json& r, const char* key) { return r.contains("score") && r.at("score").value(key, false); }
 
+/// Adds a case's effects of that certainty: right ones, of all.
+void add(Rate& rate, const json& r, const std::string& certainty) {
+  rate.hit += r.at("score").at(certainty + "_right").get<std::size_t>();
+  rate.of += r.at("score").at(certainty + "_all").get<std::size_t>();
+}
+
 std::vector<const json*> where(const std::vector<json>& results, const Filter& filter) {
   std::vector<const json*> list;
   for (const json& r : results) {
@@ -207,10 +213,14 @@ std::vector<Figure> drawn_figures(const std::vector<json>& results) {
            effect == "gravity_compensator";
   };
   const Filter outside = [=](const json& r) { return in(r, "drawn") && is_outside(r) && chi(r, "chi") >= 20; };
-  Rate alarms, refused;
+  Rate alarms, refused, established, likely;
   for (const json* r : where(results, [](const json& r) { return in(r, "drawn"); })) {
     ++refused.of;
     refused.hit += static_cast<std::size_t>(!done(*r));
+    if (done(*r)) {
+      add(established, *r, "established");
+      add(likely, *r, "likely");
+    }
     if (!r->contains("truth") || first_effect(*r) != nullptr) continue;
     ++alarms.of;
     alarms.hit += static_cast<std::size_t>(!done(*r) || has(*r, "false_alarm"));
@@ -224,6 +234,8 @@ std::vector<Figure> drawn_figures(const std::vector<json>& results) {
           at_least("drawn, link encoders", rate(results, of(told, linked), "found"), 0.95),
           at_most("drawn, a name too many", rate(results, told, "too_many"), 0.03),
           at_least("drawn, outside the catalogue: flagged", rate(results, outside, "flagged"), 0.95),
+          at_least("drawn, of what is established: right", established, 0.98),
+          at_least("drawn, of what is likely: right", likely, 0.8),
           at_most("drawn, outside the catalogue: a name", rate(results, outside, "taken"), 0.03),
           at_most("drawn, clean robots: false alarms", alarms, 0.01),
           at_most("drawn, no answer", refused, 0)};

@@ -96,7 +96,7 @@ TEST_F(DeflectionOfAGear, ThatBentBeforeIsTheBackground) {
 TEST_F(DeflectionOfAGear, IsNoneInTheNoiseOfTheEncoders) {
   const Deflections found = find({log(Role::train, 1, straight), log(Role::validate, 2, straight)});
   EXPECT_TRUE(found.found.empty());
-  EXPECT_TRUE(found.notes.empty());
+  EXPECT_TRUE(found.unexplained.empty());
 }
 
 TEST_F(DeflectionOfAGear, AloneIsJudgedByItsOwnRows) {

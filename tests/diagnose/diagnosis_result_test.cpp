@@ -20,6 +20,10 @@ DiagnosisResult example() {
   stribeck.effect = "stribeck";
   stribeck.parameters = {{"velocity", "rad/s", 0.04, 0.01}, {"amplitude", "N*m", 2.1, {}}};
   stribeck.score = 412;
+  stribeck.established = true;
+  stribeck.odds_nothing = 40.2;
+  stribeck.odds_rival = 3.7;
+  stribeck.rival = "presliding";
   stribeck.held_out_closure = 0.83;
   stribeck.alternatives = {"presliding"};
   stribeck.model_share = 0.4;
@@ -27,27 +31,31 @@ DiagnosisResult example() {
   bends.effect = "elasticity";
   bends.held_out_closure.reset();
   bends.signal = "q - qlink";
+  bends.established = false;
+  bends.odds_rival.reset();
+  bends.rival.clear();
   NamedEffect load = stribeck;
   load.effect = "payload";
   load.joints = {2, 3};
 
-  JointDiagnosis moving{"shoulder", "N*m", 1, Verdict::effects_found};
+  JointDiagnosis moving{"shoulder", "N*m", 1, Verdict::partly_explained};
   moving.gap_before = 1.9;
   moving.gap_after = 0.4;
   moving.noise_floor = 0.35;
   moving.closure = 0.83;
-  moving.where = {{"dq", -0.05, 0.05, 0.61, ""}, {"t", 3, 3.1, {}, "b.csv"}};
+  moving.left = GapLeft{0.2, 0.1, 0.3};
+  moving.where = {"61 % of the gap is slow", {{"dq", -0.05, 0.05, 0.61, 0.08, ""}, {"t", 3, 3.1, {}, {}, "b.csv"}}};
   moving.effects = {stribeck, bends};
-  moving.resembles = {"saturation"};
+  moving.undecided = {{"presliding", "lugre"}};
   moving.not_identifiable = {"spring"};
   moving.state_p = 1e-12;
   moving.time_p = 0.3;
 
   DiagnosisResult out;
-  out.verdict = Verdict::effects_found;
+  out.verdict = Verdict::partly_explained;
   out.joints = {moving, {"elbow", "N", 2, Verdict::not_excited}};
   out.robot_effects = {load};
-  out.resembles = {"gravity_tilt"};
+  out.undecided = {{"payload", "gravity_tilt"}};
   out.not_identifiable = {"payload"};
   out.next_experiment = "record a log in which joint 2 moves";
   out.gate = "validate logs";
@@ -69,17 +77,26 @@ TEST(DiagnosisResult, ComesBackFromItsFile) {
 
 TEST(DiagnosisResult, WhatIsNotKnownIsNullOrNotThere) {
   const json file = to_json(example());
-  EXPECT_EQ(file.at("schema"), "fxdyn.diagnosis/1");
+  EXPECT_EQ(file.at("schema"), "fxdyn.diagnosis/2");
   const json &moving = file.at("joints").at(0), &still = file.at("joints").at(1);
-  EXPECT_EQ(moving.at("verdict"), "effects_found");
+  EXPECT_EQ(moving.at("verdict"), "partly_explained");
+  EXPECT_EQ(moving.at("left"), (json{{"share", 0.2}, {"low", 0.1}, {"high", 0.3}}));
+  EXPECT_EQ(moving.at("undecided"), json::parse(R"([["presliding", "lugre"]])"));
+  EXPECT_EQ(moving.at("effects").at(0).at("certainty"), "established");
+  EXPECT_EQ(moving.at("effects").at(0).at("log10_odds_rival"), 3.7);
+  EXPECT_EQ(moving.at("effects").at(1).at("certainty"), "likely");
+  EXPECT_TRUE(moving.at("effects").at(1).at("rival").is_null());
   EXPECT_TRUE(moving.at("effects").at(0).at("parameters").at(1).at("std").is_null());
   EXPECT_FALSE(moving.at("effects").at(0).contains("signal"));
   EXPECT_TRUE(moving.at("effects").at(1).at("held_out_closure").is_null());
   EXPECT_EQ(moving.at("effects").at(1).at("signal"), "q - qlink");
   EXPECT_FALSE(moving.at("effects").at(0).contains("joints"));
-  EXPECT_FALSE(moving.at("where").at(0).contains("log"));
-  EXPECT_TRUE(moving.at("where").at(1).at("share_of_gap").is_null());
-  for (const char* key : {"gap_before", "gap_after", "noise_floor", "closure"}) EXPECT_TRUE(still.at(key).is_null());
+  const json& regions = moving.at("where").at("regions");
+  EXPECT_EQ(regions.at(0).at("share_of_time"), 0.08);
+  EXPECT_FALSE(regions.at(0).contains("log"));
+  EXPECT_TRUE(regions.at(1).at("share_of_gap").is_null());
+  for (const char* key : {"gap_before", "gap_after", "noise_floor", "closure", "left"})
+    EXPECT_TRUE(still.at(key).is_null());
   EXPECT_TRUE(still.at("lack_of_fit").at("state_p").is_null());
   EXPECT_EQ(still.at("effects"), json::array());
   DiagnosisResult alone = example();
@@ -98,6 +115,12 @@ TEST(DiagnosisResult, AFigureThatIsNoNumberIsReadAsNone) {
 TEST(DiagnosisResult, AnUnknownVerdictIsRefused) {
   json file = to_json(example());
   file["joints"][0]["verdict"] = "puzzling";
+  EXPECT_THROW(diagnosis_of(file), InputError);
+}
+
+TEST(DiagnosisResult, AFileOfAnotherSchemaIsRefused) {
+  json file = to_json(example());
+  file["schema"] = "fxdyn.diagnosis/1";
   EXPECT_THROW(diagnosis_of(file), InputError);
 }
 

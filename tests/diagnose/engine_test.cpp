@@ -21,7 +21,7 @@ TEST(Diagnosis, NothingIsMissingWhereOnlyFrictionChangedALittle) {
 
 TEST(Diagnosis, NamesWhatIsMissingWithItsParameters) {
   const json report = diagnosed("ripple", {.missing = effect("ripple", 2, "wavenumber = 31.0, cos = 0.15, sin = 0.1")});
-  EXPECT_EQ(report.at("verdict"), "effects_found");
+  EXPECT_EQ(report.at("verdict"), "explained");
   const json& ripple = only(report, 1, "ripple");
   EXPECT_NEAR(parameter(ripple, "wavenumber"), 31, 0.3);
   EXPECT_NEAR(std::hypot(parameter(ripple, "cos"), parameter(ripple, "sin")), std::hypot(0.15, 0.1), 0.02);
@@ -62,7 +62,7 @@ TEST(Diagnosis, WhatGrewSinceTheHealthySessionIsAFinding) {
   // Wear: the ripple of the healthy gear is half of today's.
   const std::string ripple = effect("ripple", 1, "wavenumber = 12.0, cos = 0.6, sin = 0.2");
   const json report = diagnosed("grown", {.missing = ripple, .already = ripple});
-  EXPECT_EQ(report.at("verdict"), "effects_found");
+  EXPECT_EQ(report.at("verdict"), "explained");
   const json& found = only(report, 0, "ripple");
   EXPECT_NEAR(parameter(found, "wavenumber"), 12, 0.3);
   EXPECT_NEAR(parameter(found, "cos"), 0.6, 0.1);

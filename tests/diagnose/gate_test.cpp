@@ -55,17 +55,36 @@ TEST_F(NamesAtTheGate, OnlyWhatBringsSomethingStays) {
   EXPECT_NEAR(gate.held.alone[0][1], gate.held.before[1] - gate.held.after[1], 0.1 * gate.held.before[1]);
   EXPECT_EQ(gate.place(*outcome_.problem, outcome_.found[0].id), 0U);
 
+  weigh_evidence(outcome_, gate);
+  const Evidence& evidence = outcome_.found[0].evidence;
+  EXPECT_GT(evidence.against_nothing, 10);
+  EXPECT_GT(evidence.deviations, 10);
+  EXPECT_TRUE(evidence.there);
+  EXPECT_EQ(evidence.certainty, Certainty::established);
+
   const Deflections no_deflections;
   const std::vector<std::optional<Impacts>> no_impacts(6);
   const std::vector<ProcessedLog> no_test;
-  const json report = to_json(verdicts(
-      {nominal_, outcome_.models.current, outcome_, gate, no_deflections, no_impacts, still_, processed_, no_test}));
-  EXPECT_EQ(report.at("verdict"), "effects_found") << report.dump(1);
+  const json report = to_json(verdicts({nominal_,
+                                        outcome_.models.current,
+                                        outcome_,
+                                        gate,
+                                        {},
+                                        no_deflections,
+                                        no_impacts,
+                                        still_,
+                                        processed_,
+                                        no_test}));
+  EXPECT_EQ(report.at("verdict"), "explained") << report.dump(1);
   EXPECT_EQ(report.at("gate"), "validate logs");
   const json& joint = report.at("joints").at(1);
-  EXPECT_EQ(joint.at("verdict"), "effects_found");
+  EXPECT_EQ(joint.at("verdict"), "explained");
   ASSERT_EQ(joint.at("effects").size(), 1U);
   EXPECT_EQ(joint.at("effects").at(0).at("effect"), "ripple");
+  EXPECT_EQ(joint.at("effects").at(0).at("certainty"), "established");
+  EXPECT_LT(joint.at("left").at("share"), 0.1);
+  EXPECT_LE(joint.at("left").at("low"), joint.at("left").at("share"));
+  EXPECT_GE(joint.at("left").at("high"), joint.at("left").at("share"));
   EXPECT_LT(joint.at("gap_after"), 0.3 * joint.at("gap_before").get<double>());
   EXPECT_EQ(report.at("joints").at(2).at("verdict"), "nothing_missing");
 }

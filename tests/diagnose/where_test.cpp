@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "host_tools/effects/identified_model.hpp"
 #include "tests/diagnose/small_log.hpp"
 
@@ -23,6 +25,10 @@ class Where : public testing::Test {
   /// Regions of an error of 1 N*m wherever `inside` holds, of a tenth of that elsewhere.
   template <class Inside>
   std::vector<GapRegion> regions(Inside inside) {
+    return place(inside).regions;
+  }
+  template <class Inside>
+  GapPlace place(Inside inside) {
     const MotionRows motion = log_.joint_motion(static_cast<Index>(joint));
     VectorXd error(log_.samples());
     for (Index k = 0; k < error.size(); ++k) error[k] = inside(motion.q(k, 0), motion.dq(k, 0), log_.t[k]) ? 1 : 0.1;
@@ -66,9 +72,23 @@ TEST_F(Where, FindsTheDirection) {
   EXPECT_GT(*found.share_of_gap, 0.95);
 }
 
-// One region is always given, here all of a range; others only where they tell something.
-TEST_F(Where, GivesOneRegionWhereTheGapIsTheSameEverywhere) {
-  EXPECT_EQ(regions([](double, double, double) { return true; }).size(), 1U);
+TEST_F(Where, SaysSoWhereTheGapIsTheSameEverywhere) {
+  const GapPlace found = place([](double, double, double) { return true; });
+  EXPECT_TRUE(found.regions.empty());
+  EXPECT_EQ(found.sentence, "the gap is the same everywhere in these logs");
+}
+
+TEST_F(Where, AnErrorThatHasNothingToDoWithTheMotionHasNoPlaceInIt) {
+  const auto all = regions([](double, double, double t) { return std::fmod(t, 0.37) < 0.1; });
+  for (const char* signal : {"q", "dq", "ddq", "load", "direction"}) {
+    for (const GapRegion& region : all) EXPECT_NE(region.signal, signal);
+  }
+}
+
+TEST_F(Where, TheSentenceHasTheClearestRegion) {
+  EXPECT_TRUE(place([](double q, double, double) {
+                return q > 0.2 && q < 0.4;
+              }).sentence.find("% of the gap is at position 0.") != std::string::npos);
 }
 
 }  // namespace

@@ -1,0 +1,104 @@
+#include "host_tools/diagnose/certainty.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "host_tools/diagnose/deviations.hpp"
+#include "host_tools/diagnose/refit.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::Index;
+
+/// Of chi^2, a factor of ten in likelihood.
+constexpr double variances_per_decade = 2 * std::numbers::ln10;
+
+/// chi^2 of an effect on the data that judge. What else is missing at its joint may not speak for it, so its gain is
+/// beside free curves of all other variables; where names close the joint's gap, nothing else is missing.
+double gain_of(const Gate& gate, const Group& group, std::size_t i) {
+  const double alone = gate.held.alone[i].sum();
+  if (group.on_body) return alone;
+  return gate.accepted[group.candidate.joint] ? std::max(alone, gate.own[i].gain) : gate.own[i].gain;
+}
+
+const EffectFit& fit_of(const IdentifiedModel& model, const EffectId& id) {
+  return id.body ? model.body[id.effect] : model.joints[id.joint].effects[id.effect];
+}
+
+std::vector<std::size_t> felt_at(const Gate& gate, std::size_t i, double least) {
+  std::vector<std::size_t> out;
+  for (Index j = 0; j < gate.held.alone[i].size(); ++j) {
+    if (gate.held.alone[i][j] > least) out.push_back(static_cast<std::size_t>(j));
+  }
+  return out;
+}
+
+}  // namespace
+
+void judge(Evidence& evidence, bool holds, double form, const GateOptions& options) {
+  const double rival = evidence.against_rival.value_or(options.established);
+  evidence.there = evidence.against_nothing >= options.established;
+  evidence.undecided = evidence.there && holds && rival < options.established;
+  const bool sure = evidence.there && holds && evidence.deviations >= options.established_deviations;
+  const bool likely =
+      form >= options.least_closure && evidence.against_nothing >= options.likely && rival >= options.likely;
+  evidence.certainty = sure && !evidence.undecided ? Certainty::established
+                       : likely                    ? Certainty::likely
+                                                   : Certainty::unlisted;
+}
+
+void weigh_evidence(Outcome& outcome, const Gate& gate) {
+  const GateOptions& options = outcome.models.options.gate;
+  const std::vector<double> off_nothing = deviations_off_nothing(*outcome.problem, gate.groups);
+  for (Finding& finding : outcome.found) {
+    const std::size_t i = gate.place(*outcome.problem, finding.id);
+    if (i == gate.groups.size()) continue;
+    const Group& group = outcome.problem->groups()[gate.groups[i]];
+    Evidence& evidence = finding.evidence;
+    evidence.against_nothing = gain_of(gate, group, i) / variances_per_decade;
+    if (finding.rival) evidence.against_rival = finding.rival->gain / variances_per_decade;
+    evidence.deviations = off_nothing[i];
+    const auto j = static_cast<Index>(group.candidate.joint);
+    const double share = gate.gap[j] > 0 ? gate.held.alone[i][j] / gate.gap[j] : 0;
+    evidence.closure = group.on_body ? gate.robot_closure[i] : share;
+    const double form = group.on_body ? gate.robot_closure[i] : gate.own[i].form;
+    const bool holds = group.on_body ? gate.robot_closure[i] >= options.least_closure : gate.believed[i];
+    judge(evidence, holds, form, options);
+  }
+}
+
+std::vector<Likely> set_aside(Outcome& outcome, Gate& gate, const std::vector<SessionLog>& logs,
+                              const std::vector<bool>& still) {
+  const auto goes = [](const Finding& f) { return !f.evidence.there; };
+  std::vector<Likely> out;
+  if (std::none_of(outcome.found.begin(), outcome.found.end(), goes)) return out;
+  Models with = outcome.models;
+  add_deviations(with, *outcome.problem);
+  std::vector<EffectId> gone;
+  for (const Finding& finding : outcome.found) {
+    if (!goes(finding)) continue;
+    gone.push_back(finding.id);
+    if (finding.evidence.certainty == Certainty::unlisted) continue;
+    const std::size_t i = gate.place(*outcome.problem, finding.id);
+    const double felt = outcome.models.options.gate.least_felt;
+    out.push_back({finding, fit_of(with.current, finding.id), felt_at(gate, i, felt)});
+  }
+  while (!gone.empty()) {
+    const EffectId one = gone.back();
+    gone.pop_back();
+    std::erase_if(outcome.found, [&](const Finding& f) { return f.id == one; });
+    std::vector<EffectId> ids = gone;
+    for (const Finding& f : outcome.found) ids.push_back(f.id);
+    take_back(outcome.models, ids, one);
+    std::copy_n(ids.begin(), gone.size(), gone.begin());
+    for (std::size_t i = 0; i < outcome.found.size(); ++i) outcome.found[i].id = ids[gone.size() + i];
+  }
+  refit(outcome.models, logs, outcome.whitening, 4);
+  outcome.look_again(logs);
+  gate = judge_again(outcome, logs, still);
+  return out;
+}
+
+}  // namespace fxdyn::diagnosis

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <vector>
+
+#include "host_tools/diagnose/gate.hpp"
+
+namespace fxdyn::diagnosis {
+
+/// Concludes from the odds and deviations of an effect.
+/// @param holds its form holds against a free curve of its variable, see Gate::believed
+/// @param form share of such a curve's closure that it has
+void judge(Evidence& evidence, bool holds, double form, const GateOptions& options);
+
+/// What speaks for each finding, with all of them in the model.
+void weigh_evidence(Outcome& outcome, const Gate& gate);
+
+/// An effect that is not sure enough for the model.
+struct Likely {
+  Finding finding;  ///< its id tells the joint
+  EffectFit fit;
+  std::vector<std::size_t> joints;  ///< an effect on the robot: those that feel it, from 0
+};
+
+/// Takes all that is not there for sure out of the model, fits the rest again and judges it.
+/// @returns what of it is likely
+std::vector<Likely> set_aside(Outcome& outcome, Gate& gate, const std::vector<SessionLog>& logs,
+                              const std::vector<bool>& still);
+
+}  // namespace fxdyn::diagnosis

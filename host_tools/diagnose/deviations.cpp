@@ -1,0 +1,92 @@
+#include "host_tools/diagnose/deviations.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host_tools/diagnose/models.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/regression/solver.hpp"
+#include "model/effects/payload.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+double deviations_off_nothing(const Linearised& problem, const EffectId& id, const MatrixXd& covariance) {
+  std::vector<Index> place, shapes;
+  for (std::size_t c = 0; c < problem.unknowns().size(); ++c) {
+    const Unknown& u = problem.unknowns()[c];
+    const bool its = u.body == id.body && u.effect == id.effect && (id.body || u.joint == id.joint);
+    if (its && u.kind == Unknown::Kind::linear && !u.change) place.push_back(static_cast<Index>(c));
+    if (its && u.kind == Unknown::Kind::shape) shapes.push_back(static_cast<Index>(c));
+  }
+  if (place.empty()) return 0;
+  VectorXd theta(static_cast<Index>(place.size()));
+  for (std::size_t i = 0; i < place.size(); ++i)
+    theta[static_cast<Index>(i)] = problem.unknowns()[static_cast<std::size_t>(place[i])].value;
+  MatrixXd own = covariance(place, place);
+  if (!shapes.empty()) {
+    const MatrixXd with = covariance(shapes, place);
+    own -= with.transpose() * SymmetricSolver(MatrixXd(covariance(shapes, shapes))).inverse() * with;
+  }
+  return std::sqrt(std::max(0.0, theta.dot(SymmetricSolver(own).solve(theta))));
+}
+
+}  // namespace
+
+std::vector<double> deviations_off_nothing(const Linearised& problem, const std::vector<std::size_t>& groups) {
+  std::vector<double> out(groups.size(), 1e300);
+  if (groups.empty()) return out;
+  const LinearFit fit = problem.solver().solve(problem.unknown_columns());
+  const MatrixXd covariance = SymmetricSolver(fit.information).inverse();
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    const Group& group = problem.groups()[groups[i]];
+    if (!find_effect(group.candidate.effect)->share) out[i] = deviations_off_nothing(problem, group.id, covariance);
+  }
+  return out;
+}
+
+void add_deviations(Models& models, const Linearised& problem) {
+  const LinearFit fit = problem.solver().solve(problem.unknown_columns());
+  const MatrixXd covariance = SymmetricSolver(fit.information).inverse();
+  IdentifiedModel& model = models.current;
+  for (JointFit& joint : model.joints) {
+    for (EffectFit& effect : joint.effects) {
+      if (find_effect(effect.effect)->acts_on == ActsOn::position && !effect.linear_std.empty())
+        continue;  // from a link encoder
+      effect.linear_std.assign(effect.linear.size(), 0.0);
+      effect.shape_std.assign(effect.shape.size(), 0.0);
+    }
+  }
+  for (EffectFit& effect : model.body) effect.linear_std.assign(effect.linear.size(), 0.0);
+  for (std::size_t c = 0; c < problem.unknowns().size(); ++c) {
+    const Unknown& u = problem.unknowns()[c];
+    const double variance = covariance(static_cast<Index>(c), static_cast<Index>(c));
+    const double std = std::sqrt(std::max(variance, 0.0));
+    if (u.kind == Unknown::Kind::base) {
+      model.base[u.index].std = std;
+    } else if (u.kind == Unknown::Kind::width) {
+      model.joints[u.joint].sign_width_std = std * model.joints[u.joint].sign_width;
+    } else {
+      EffectFit& effect = u.body ? model.body[u.effect] : model.joints[u.joint].effects[u.effect];
+      if (u.kind == Unknown::Kind::shape) {
+        effect.shape_std[u.index] = std * effect.shape[u.index];
+      } else {
+        double& place = effect.linear_std[u.index];
+        place = std;
+        if (u.change) {
+          // Right after the common part: their sum is today's.
+          const auto i = static_cast<Index>(c);
+          place = std::sqrt(std::max(0.0, variance + covariance(i - 1, i - 1) + 2 * covariance(i - 1, i)));
+        }
+        if (effect.effect == Payload::name && u.index > 0) place = std / std::max(effect.linear[0], 1e-9);
+      }
+    }
+  }
+}
+
+}  // namespace fxdyn::diagnosis

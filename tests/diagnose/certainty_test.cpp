@@ -1,0 +1,109 @@
+// How sure a name is, and what a joint's verdict follows from.
+
+#include "host_tools/diagnose/certainty.hpp"
+
+#include <gtest/gtest.h>
+
+#include "host_tools/diagnose/verdict.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+/// Evidence of an effect whose form holds as a curve of its own does.
+Evidence judged(double nothing, std::optional<double> rival, double deviations, bool holds = true, double form = 1) {
+  Evidence out;
+  out.against_nothing = nothing;
+  out.against_rival = rival;
+  out.deviations = deviations;
+  judge(out, holds, form, {});
+  return out;
+}
+
+TEST(Certainty, EstablishedAgainstNothingAndAgainstTheRival) {
+  EXPECT_EQ(judged(3, 3, 4).certainty, Certainty::established);
+  EXPECT_EQ(judged(3, {}, 4).certainty, Certainty::established);
+  EXPECT_EQ(judged(2.9, 3, 4).certainty, Certainty::likely);
+  EXPECT_EQ(judged(3, 2.9, 4).certainty, Certainty::likely);
+  EXPECT_EQ(judged(3, 3, 3.9).certainty, Certainty::likely);
+}
+
+TEST(Certainty, LikelyFromTwentyToOne) {
+  EXPECT_EQ(judged(1.3, 1.3, 2).certainty, Certainty::likely);
+  EXPECT_EQ(judged(1.2, 1.3, 2).certainty, Certainty::unlisted);
+  EXPECT_EQ(judged(1.3, 1.2, 2).certainty, Certainty::unlisted);
+}
+
+TEST(Certainty, AFormThatAFreeCurveBeatsIsNotEstablished) {
+  EXPECT_EQ(judged(40, {}, 20, false, 0.6).certainty, Certainty::likely);
+  EXPECT_EQ(judged(40, {}, 20, false, 0.4).certainty, Certainty::unlisted);
+}
+
+TEST(Certainty, WhatIsThereForSureStaysWhateverItsName) {
+  const Evidence either = judged(40, 0.2, 20), other_form = judged(40, {}, 20, false, 0.4), weak = judged(2, 0.2, 20);
+  EXPECT_TRUE(either.there);
+  EXPECT_TRUE(either.undecided);
+  EXPECT_EQ(either.certainty, Certainty::unlisted);
+  EXPECT_TRUE(other_form.there);
+  EXPECT_FALSE(other_form.undecided);
+  EXPECT_FALSE(weak.there);
+  EXPECT_FALSE(weak.undecided);
+  EXPECT_FALSE(judged(40, 5, 20).undecided);
+}
+
+TEST(LeftOver, IsTheExcessWithAnIntervalFromItsStretches) {
+  // Of 10 stretches of 100 rows with noise of variance 1: 300 of power above it before, 60 after.
+  HeldOut held;
+  held.after = Eigen::VectorXd::Constant(1, 1060);
+  held.excess = Eigen::VectorXd::Constant(1, 60);
+  held.stretches = {std::vector<Stretch>(10, Stretch{130, 106, 100})};
+  const Share even = left_of(held, 300, 0);
+  EXPECT_DOUBLE_EQ(even.share, 0.2);
+  EXPECT_NEAR(even.low, 0.2, 1e-9);  // alike everywhere
+  EXPECT_NEAR(even.high, 0.2, 1e-9);
+  // The same sums, what is left in half of the stretches.
+  for (std::size_t s = 0; s < 10; ++s) held.stretches[0][s].after = s < 5 ? 112 : 100;
+  const Share uneven = left_of(held, 300, 0);
+  EXPECT_DOUBLE_EQ(uneven.share, 0.2);
+  // left 12 and 0 of gaps of 30: deviations of 6 each
+  EXPECT_NEAR(uneven.high - uneven.share, 1.96 * std::sqrt(10 * 36.0) / 300, 1e-9);
+  EXPECT_NEAR(uneven.share - uneven.low, uneven.high - uneven.share, 1e-9);
+  EXPECT_EQ(left_of(held, 0, 0).share, 0);
+}
+
+TEST(VerdictOfAJoint, IsWhatIsThereAndWhatIsLeft) {
+  JointState state;
+  EXPECT_EQ(verdict_of(state), Verdict::nothing_missing);
+  state.structured = true;
+  EXPECT_EQ(verdict_of(state), Verdict::unexplained);
+  state.established = true;  // and too little remains on the data that judge
+  EXPECT_EQ(verdict_of(state), Verdict::explained);
+  state.remains = true;
+  EXPECT_EQ(verdict_of(state), Verdict::partly_explained);
+}
+
+TEST(VerdictOfAJoint, ALikelyEffectAloneExplainsNothing) {
+  JointState state;
+  state.likely = true;
+  EXPECT_EQ(verdict_of(state), Verdict::unexplained);
+  state.reached = true;
+  EXPECT_EQ(verdict_of(state), Verdict::explained);
+}
+
+TEST(VerdictOfAJoint, ADeflectionWithoutANameIsLeft) {
+  JointState state;
+  state.bends = true;
+  EXPECT_EQ(verdict_of(state), Verdict::unexplained);
+  state.there = true;
+  EXPECT_EQ(verdict_of(state), Verdict::partly_explained);
+}
+
+TEST(VerdictOfARobot, IsTheWorst) {
+  EXPECT_EQ(worst({}), Verdict::nothing_missing);
+  EXPECT_EQ(worst({Verdict::nothing_missing, Verdict::not_excited}), Verdict::not_excited);
+  EXPECT_EQ(worst({Verdict::not_excited, Verdict::explained}), Verdict::explained);
+  EXPECT_EQ(worst({Verdict::explained, Verdict::partly_explained}), Verdict::partly_explained);
+  EXPECT_EQ(worst({Verdict::partly_explained, Verdict::unexplained}), Verdict::unexplained);
+}
+
+}  // namespace
+}  // namespace fxdyn::diagnosis
