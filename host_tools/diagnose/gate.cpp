@@ -248,6 +248,17 @@ std::size_t weakest(const Gate& gate, const Outcome& outcome, const VectorXd& be
     worst_on_body = on_body;
   }
   if (worst != none) return worst;
+  // What is found elsewhere may spoil a joint at which nothing is.
+  for (Index j = 0; j < static_cast<Index>(outcome.problem->joints()); ++j) {
+    if (!rises(j)) continue;
+    double most = 0;
+    for (std::size_t i = 0; i < none; ++i) {
+      if (gate.held.alone[i][j] >= most) continue;
+      most = gate.held.alone[i][j];
+      worst = i;
+    }
+    if (worst != none) return worst;
+  }
   // Beside a background, and with no more structure than the healthy session has, what is not believed only resembles
   // that background.
   for (std::size_t i = 0; i < none; ++i) {

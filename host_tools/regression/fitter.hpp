@@ -144,6 +144,8 @@ class Fitter {
   NormalEquations normal_equations() const;
   /// Sum over the train rows of the weighted squared residual, and the prior's share.
   double weighted_square(const Solution& solution) const;
+  /// RMS of each joint's residual over the train rows, by their weights [N*m | N].
+  std::vector<double> fitted_rmse(const Solution& solution) const;
   /// Rows of all joints in the train logs, by their weights.
   double train_rows() const;
   double train_rows(std::size_t joint) const;

@@ -42,6 +42,13 @@ std::vector<double> Fitter::weighted_squares(const Solution& solution) const {
   return out;
 }
 
+std::vector<double> Fitter::fitted_rmse(const Solution& solution) const {
+  std::vector<double> out = weighted_squares(solution);
+  for (std::size_t j = 0; j < joints(); ++j)
+    out[j] = std::sqrt(out[j] / (weights_[static_cast<Index>(j)] * std::max(train_rows(j), 1.0)));
+  return out;
+}
+
 double Fitter::weighted_square(const Solution& solution) const {
   const std::vector<double> squares = weighted_squares(solution);
   return std::accumulate(squares.begin(), squares.end(), prior_.empty() ? 0.0 : prior_.square(solution.beta));

@@ -153,6 +153,7 @@ std::vector<TrainOutcome> train(Fitter& fitter, const TrainSettings& settings, P
   const std::size_t steps = settings.pso ? static_cast<std::size_t>(settings.pso->iterations) + 1 : grid_steps;
   progress.stage(settings.pso ? "training the BLS, by particle swarm" : "training the BLS", n * steps);
   const std::vector<Judgement> without = fitter.held_out();
+  const std::vector<double> fitted = fitter.fitted_rmse(fitter.estimate());
   std::vector<Choice> chosen(n);
   if (settings.pso) {
     chosen = by_swarm(fitter, settings, progress, resume);
@@ -162,7 +163,9 @@ std::vector<TrainOutcome> train(Fitter& fitter, const TrainSettings& settings, P
   std::vector<TrainOutcome> outcomes(n);
   for (std::size_t j = 0; j < n; ++j) {
     const Choice& choice = chosen[j];
-    const bool kept = choice.design.bls && choice.quiet && choice.judgement.beats(without[j], options.worth_keeping);
+    const bool carries_over = without[j].rmse <= options.carries_over * fitted[j];
+    const bool kept = choice.design.bls && choice.quiet && carries_over &&
+                      choice.judgement.beats(without[j], options.worth_keeping);
     outcomes[j] = {.error_without = without[j].rmse,
                    .error_with = choice.judgement.rmse,
                    .kept = kept,

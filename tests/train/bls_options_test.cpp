@@ -15,6 +15,7 @@
 #include "host_tools/support/files.hpp"
 #include "host_tools/support/random.hpp"
 #include "host_tools/train/sparse_features.hpp"
+#include "host_tools/train/train.hpp"
 #include "host_tools/train/tuning.hpp"
 #include "tests/support/chains.hpp"
 #include "tests/support/files.hpp"
@@ -173,6 +174,24 @@ TEST(Growth, JointsWithABlsOfTheirOwnStayAsTheyAre) {
   const JointFit design = BlsDesigner(fitter, 3, settings)({.nodes = 12});
   const double grown = fitter.held_out_with(3, design, std::vector<Index>{12}, {1e-3})[0][0].rmse;
   EXPECT_NEAR(grown, fitter.held_out_with(3, design, {1e-3})[0].rmse, 1e-7 * grown);
+}
+
+TEST(Training, NothingIsKeptWhereTheStructureDoesNotCarryOver) {
+  // On the logs that judge the first joint's other friction is five times that of the train logs.
+  const IdentifiedModel model = plant();
+  IdentifiedModel other = model;
+  for (const std::size_t e : {2, 3}) other.joints[0].effects[e].linear[0] *= 5;
+  std::vector<ProcessedLog> logs = record(model, 2);
+  logs[1] = record(other, 2)[1];
+  Fitter fitter(model.robot, logs, nominal(model));
+  fitter.reweight();
+  Progress progress;
+  const std::vector<TrainOutcome> outcomes = train(fitter, {}, progress);
+  EXPECT_FALSE(outcomes[0].kept);
+  EXPECT_LT(outcomes[0].error_with, 0.9 * outcomes[0].error_without);
+  EXPECT_TRUE(outcomes[1].kept);
+  fitter.set_designs(nominal(model));
+  EXPECT_TRUE(train(fitter, {}, progress, {}, {.carries_over = 10})[0].kept);
 }
 
 TEST(Designs, ASigmoidIsHalfATanhAndAnOffset) {
