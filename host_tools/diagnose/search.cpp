@@ -35,7 +35,6 @@ constexpr double noise_free = 1e-12;
 /// Bounds below are none.
 constexpr double no_bound = -1e5;
 
-/// Whether an effect has another one's torque as a special case.
 bool contains(const EffectCandidate& whole, const EffectCandidate& part) {
   const auto& unites = find_effect(whole.effect)->unites;
   return std::find(unites.begin(), unites.end(), part.effect) != unites.end();
@@ -454,10 +453,10 @@ std::vector<Found> Search::explain(const Choice& choice, std::optional<Choice>& 
       if (instead.score > choice.score - options().alternative)
         found.alternatives.push_back({problem_.groups()[groups.back()].candidate, choice.score - instead.score});
       double gain = held_out(instead, weights) - own;
-      // A rival that has the effect as a special case fits as well whatever the truth is: its parameters have their
-      // price.
+      // The set won where it was fitted, prices paid: a rival that bends more has its further price to pay here, too.
+      gain += std::max(0.0, penalty(groups.back()) - penalty(found.group));
+      // Whether it is more than a part of what unites it is asked by unite().
       const bool whole = contains(group.candidate, mine.candidate);
-      if (whole) gain += choice.score - instead.score;
       if (!whole && gain < least && instead.score - without.score >= threshold(groups.back())) {
         least = gain;
         better = instead;

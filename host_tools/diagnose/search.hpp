@@ -35,8 +35,8 @@ struct Alternative {
 /// The effect that comes nearest to a chosen one.
 struct Rival {
   EffectCandidate candidate;
-  /// What the set with the chosen one is better by on data that fitted neither [noise variances], and by its score
-  /// where the rival has it as a special case: no data refute that one.
+  /// What the set with the chosen one is better by on data that fitted neither [noise variances], and by the penalty of
+  /// the rival's further parameters: no data refute what has the chosen one as a special case.
   double gain = 0;
 };
 

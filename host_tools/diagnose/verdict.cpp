@@ -206,8 +206,11 @@ class ReportWriter {
 
   /// An effect and its rival, of which one is there.
   std::vector<std::string> undecided(const EffectFit& fit, const Finding& finding) {
-    advise_between(fit.effect, finding.id, finding.rival->candidate);
-    return {fit.effect, finding.rival->candidate.effect};
+    const EffectCandidate& rival = finding.rival->candidate;
+    advise_between(fit.effect, finding.id, rival);
+    const bool on_body = find_effect(rival.effect)->acts_on == ActsOn::body;
+    const bool elsewhere = !on_body && (finding.id.body || rival.joint != finding.id.joint);
+    return {fit.effect, rival.effect + (elsewhere ? " of " + joint_of(rival.joint).name : "")};
   }
 
   const Finding* finding_of(const EffectId& id) const {

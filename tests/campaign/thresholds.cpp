@@ -36,7 +36,6 @@ std::vector<Threshold> before_the_search() {
       {"noise.mostly_gap", "times the noise", place<noise, &NoiseOptions::mostly_gap>, Reads::without_baseline},
       {"prior.friction_change", "share", place<prior, &PriorOptions::friction_change>, Reads::with_baseline},
       {"prior.offset_change", "share", place<prior, &PriorOptions::offset_change>, Reads::with_baseline},
-      {"prior.smallest_change", "share of rated", place<prior, &PriorOptions::smallest_change>, Reads::with_baseline},
       {"prior.rotor", "share", place<prior, &PriorOptions::rotor>},
       {"prior.link_rotor", "share", place<prior, &PriorOptions::link_rotor>, Reads::with_link_encoders},
       {"prior.changed", "deviations", place<prior, &PriorOptions::changed>, Reads::with_baseline},
@@ -54,13 +53,10 @@ std::vector<Threshold> of_the_search() {
       {"search.least_share", "-", place<search, &SearchOptions::least_share>},
       {"search.most_share", "-", place<search, &SearchOptions::most_share>},
       {"search.beyond_bound", "deviations", place<search, &SearchOptions::beyond_bound>},
-      {"search.refine_from", "share", place<search, &SearchOptions::refine_from>},
-      {"search.same_ripple", "share", place<search, &SearchOptions::same_ripple>},
       {"lack_of_fit.state", "chance", place<lack, &LackOfFitOptions::state>},
       {"lack_of_fit.time", "chance", place<lack, &LackOfFitOptions::time>},
       {"lack_of_fit.line", "chance", place<lack, &LackOfFitOptions::line>},
       {"lack_of_fit.slow_change", "chance", place<lack, &LackOfFitOptions::slow_change>, Reads::with_baseline},
-      {"lack_of_fit.stretch_s", "s", place<lack, &LackOfFitOptions::stretch_s>, Reads::with_baseline},
   };
 }
 
