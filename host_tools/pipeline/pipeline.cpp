@@ -21,6 +21,7 @@
 #include "host_tools/robot/write_urdf.hpp"
 #include "host_tools/simulate/recordings.hpp"
 #include "host_tools/support/error.hpp"
+#include "host_tools/support/parallel.hpp"
 #include "host_tools/support/files.hpp"
 
 namespace fxdyn {
@@ -131,6 +132,7 @@ void Pipeline::write_possible_bodies(const Estimate& estimate) const {
              estimate.physical->inertia);
 }
 
+  const ThreadLimit limit(data().threads);
 void Pipeline::identify() {
   data().notes = data_notes_;
   const auto fitter = fxdyn::identify(project_, data(), progress_);
@@ -154,6 +156,7 @@ void Pipeline::identify() {
 }
 
 void Pipeline::diagnose() {
+  const ThreadLimit limit(data().threads);
   const auto start = Clock::now();
   data().notes = data_notes_;
   std::vector<ProcessedLog> baseline;
@@ -211,6 +214,7 @@ std::vector<StageErrors> Pipeline::diagnosed_stages() const {
 void Pipeline::train() {
   const TrainSettings& settings = project_.train;
   check_motion();
+  const ThreadLimit limit(data().threads);
   std::string inputs = project_hash(project_);
   for (const LogReference& log : data().references) inputs += log.hash;
   ResumeFile resume{directory_ / "train.pso.json", {}, hash_of(inputs)};

@@ -109,6 +109,7 @@ class Experiment {
     const std::vector<Move> moves = make_moves(model_, model_.tick_s, judged_moves);
     const bool bent = bends(model_);
     GateData data = read_gate_data(pipeline_.project(), pipeline_.directory());
+    const ThreadLimit limit(data.threads);
     Progress quiet;
     const IdentifiedModel friction = identify_structure(pipeline_.project(), data, coulomb_and_viscous, "wls", quiet);
     const IdentifiedModel rigid = rigid_part(friction);
