@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "host_tools/effects/effects.hpp"
@@ -320,40 +319,6 @@ LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log, con
 
   add_residuals(rows, fit, possible.theta, out);
   return out;
-}
-
-nlohmann::json load_json(const LoadFit& fit, const Robot& robot) {
-  using nlohmann::json;
-  const auto& p = fit.parameters;
-  const auto entry = [](const LoadParameter& parameter) {
-    return json{{"value", parameter.value},
-                {"std", parameter.std},
-                {"unit", parameter.unit},
-                {"identifiable", parameter.identifiable}};
-  };
-  json com, tensor, joints = json::array();
-  for (std::size_t k = 1; k < 4; ++k) com[p[k].name] = entry(p[k]);
-  for (std::size_t k = 4; k < 10; ++k) tensor[p[k].name] = entry(p[k]);
-  for (std::size_t j = 0; j < robot.size(); ++j) {
-    const auto k = static_cast<Index>(j);
-    joints.push_back({{"joint", robot.joints[j].name},
-                      {"index", j + 1},
-                      {"unit", robot.joints[j].torque_unit()},
-                      {"residual_before", fit.before[k]},
-                      {"residual_after", fit.after[k]},
-                      {"residual_with_model", fit.with_effect[k]},
-                      {"coulomb_change", fit.coulomb[k]},
-                      {"coulomb_change_std", fit.coulomb_std[k]},
-                      {"offset_change", fit.offset[k]}});
-  }
-  return {{"schema", "fxdyn.payload/1"},
-          {"link", robot.joints.back().link},
-          {"frame", "URDF frame of the link"},
-          {"mass", entry(p[0])},
-          {"com", com},
-          {"inertia_about_com", tensor},
-          {"constrained", fit.constrained},
-          {"joints", joints}};
 }
 
 }  // namespace fxdyn

@@ -371,12 +371,27 @@ VibrationResult vibration(const fs::path& project, const fs::path& directory, co
   return result;
 }
 
+namespace {
+
+/// What `vibration` found before, if that is of the files that are there now.
+std::optional<VibrationResult> known_result(const fs::path& directory) {
+  const fs::path file = directory / "vibration.json";
+  if (!fs::exists(file)) return {};
+  const json content = json::parse(read_file(file));
+  try {
+    VibrationResult known = vibration_of(content);
+    if (is_unchanged(known.made_from, directory)) return known;
+  } catch (const json::exception&) {  // another version wrote it
+  }
+  return {};
+}
+
+}  // namespace
+
 VibrationResult vibration_with(const fs::path& project, const fs::path& directory, const Feedforward& drive,
                                const VibrationOptions& options) {
-  const fs::path file = directory / "vibration.json";
-  const json known = fs::exists(file) ? json::parse(read_file(file)) : json();
-  const bool current = !known.is_null() && is_unchanged(known.value("made_from", json()), directory);
-  const VibrationResult host = current ? vibration_of(known) : vibration(project, directory, options);
+  const std::optional<VibrationResult> known = known_result(directory);
+  const VibrationResult host = known ? *known : vibration(project, directory, options);
   return Experiment(project, directory, options).with_drive(host, drive);
 }
 
