@@ -6,12 +6,11 @@
 #include <optional>
 
 #include "host_tools/diagnose/models.hpp"
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/gauss_newton.hpp"
 #include "host_tools/regression/solver.hpp"
-#include "model/effects/payload.hpp"
-#include "model/effects/rotor_inertia.hpp"
 
 namespace fxdyn::diagnosis {
 
@@ -80,7 +79,7 @@ void refit(Models& models, const std::vector<SessionLog>& all, const std::vector
 
 void bring_rotor(Models& models, const Rotor& rotor, double inertia) {
   EffectFit fit;
-  fit.effect = RotorInertia::name;
+  fit.effect = rotor_effect().name;
   fit.linear = {inertia};
   std::vector<IdentifiedModel*> of{&models.current};
   if (models.has_baseline) of.push_back(&models.healthy);
@@ -97,12 +96,13 @@ EffectId name(Models& models, const Group& group, const VectorXd& theta) {
   fit.shape = group.candidate.shape;
   fit.named = true;
   const EffectInfo& info = *find_effect(fit.effect);
+  const bool load = is_load(fit.effect);
   for (Index i = 0; i < theta.size(); ++i) {
     const ParameterInfo& p = info.linear[static_cast<std::size_t>(i)];
-    fit.linear.push_back(fit.effect == Payload::name ? theta[i] : std::clamp(theta[i], p.lower, p.upper));
+    fit.linear.push_back(load ? theta[i] : std::clamp(theta[i], p.lower, p.upper));
   }
   if (info.share) fit.linear[0] = 1;
-  if (fit.effect == Payload::name) {
+  if (load) {
     fit.linear[0] = std::max(fit.linear[0], least_mass);
     for (std::size_t i = 1; i < fit.linear.size(); ++i)
       fit.linear[i] = std::clamp(fit.linear[i] / fit.linear[0], -10.0, 10.0);

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/effects/link_parameters.hpp"
@@ -13,9 +13,6 @@
 #include "host_tools/regression/sandwich.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/error.hpp"
-#include "model/effects/coulomb.hpp"
-#include "model/effects/offset.hpp"
-#include "model/effects/payload.hpp"
 
 namespace fxdyn {
 namespace {
@@ -73,8 +70,8 @@ Rows build_rows(const IdentifiedModel& model, const DhChain& chain, const Proces
   for (Index j = 0; j < n; ++j) {
     const auto at = static_cast<std::size_t>(j);
     const JointSeries series{motion.q.col(j), motion.dq.col(j), motion.ddq.col(j), {}, log.step_s};
-    full[at].col(ten) = effect_columns(Coulomb::name, {}, model.joints[at].sign_width, series);
-    full[at].col(ten + 1) = effect_columns(Offset::name, {}, model.joints[at].sign_width, series);
+    full[at].col(ten) = effect_columns(dry_friction_effect().name, {}, model.joints[at].sign_width, series);
+    full[at].col(ten + 1) = effect_columns(constant_effect().name, {}, model.joints[at].sign_width, series);
     rows.columns.push_back(
         log.decimate(log.filter_columns(at_other_times(full[at], model.filter.torque_lead_s / log.step_s))));
     full[at].resize(0, 0);
@@ -284,7 +281,7 @@ ConsistentFit possible_load(const Fit& fit, const std::array<bool, 10>& apart, I
 
 LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log, const LoadOptions& options) {
   for (const EffectFit& effect : model.body) {
-    if (effect.effect == Payload::name)
+    if (is_load(effect.effect))
       throw InputError("the model has a payload already: take the model that was identified without load");
   }
   if (log.tau.size() == 0) throw InputError(fmt::format("{}: no torque; a load shows in the torque only", log.name));
@@ -310,7 +307,7 @@ LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log, con
   const MatrixXd to_output = jacobian(out.body);
   const VectorXd std = (to_output * fit.covariance * to_output.transpose()).diagonal().cwiseMax(0).cwiseSqrt();
   out.parameters = parameters_of(out.body, std, apart);
-  out.effect.effect = Payload::name;
+  out.effect.effect = load_effect().name;
   out.effect.named = true;
   const Vector3d& com = out.body.centre;
   out.effect.linear = {out.body.mass, com.x(), com.y(), com.z()};

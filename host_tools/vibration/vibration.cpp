@@ -7,6 +7,7 @@
 #include <numbers>
 #include <utility>
 
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/identify/structure.hpp"
@@ -23,7 +24,6 @@
 #include "host_tools/vibration/moves.hpp"
 #include "host_tools/vibration/outcome.hpp"
 #include "host_tools/vibration/shaper.hpp"
-#include "model/effects/elasticity.hpp"
 
 namespace fxdyn {
 namespace {
@@ -226,7 +226,7 @@ class Experiment {
       if (entry.role != Role::train || !entry.scenario) continue;
       IdentifiedModel plant = read_scenario(*entry.scenario).plant;
       const bool bends = std::any_of(plant.joints.begin(), plant.joints.end(),
-                                     [](const JointFit& joint) { return joint.find(Elasticity::name) != nullptr; });
+                                     [](const JointFit& joint) { return compliance_of(joint) != nullptr; });
       if (!bends)
         fmt::print(stderr, "note: no gear of {} bends (effect \"elasticity\"): there is little to vibrate\n",
                    entry.scenario->string());
