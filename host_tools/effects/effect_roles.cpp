@@ -17,6 +17,13 @@ const EffectInfo& first_that(Plays&& plays, const char* role) {
   return *found;
 }
 
+template <class Plays>
+const EffectFit* first_of(const JointFit& joint, Plays&& plays) {
+  const auto found = std::find_if(joint.effects.begin(), joint.effects.end(),
+                                  [&](const EffectFit& fit) { return plays(*find_effect(fit.effect)); });
+  return found == joint.effects.end() ? nullptr : &*found;
+}
+
 bool adds_mass(const EffectInfo& info) {
   bool out = false;
   BodyEffects::for_each([&]<class E>() {
@@ -62,12 +69,10 @@ const EffectInfo& constant_effect() {
 
 bool is_compliance(const EffectInfo& info) { return info.bends() && info.linear[0].quantity == Quantity::torque; }
 
-const EffectFit* dry_friction_of(const JointFit& joint) { return joint.find(dry_friction_effect().name); }
-
-const EffectFit* compliance_of(const JointFit& joint) {
-  const auto found = std::find_if(joint.effects.begin(), joint.effects.end(),
-                                  [](const EffectFit& fit) { return is_compliance(*find_effect(fit.effect)); });
-  return found == joint.effects.end() ? nullptr : &*found;
+const EffectFit* dry_friction_of(const JointFit& joint) {
+  return first_of(joint, [](const EffectInfo& info) { return &info == &dry_friction_effect(); });
 }
+
+const EffectFit* compliance_of(const JointFit& joint) { return first_of(joint, is_compliance); }
 
 }  // namespace fxdyn
