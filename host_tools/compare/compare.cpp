@@ -105,6 +105,7 @@ class Comparison {
   }
 
   ComparisonResult run(const std::vector<std::string>& methods) {
+    const ThreadLimit limit(data_.threads);
     const auto wanted = [&](const char* name) {
       return std::find(methods.begin(), methods.end(), name) != methods.end();
     };

@@ -5,9 +5,9 @@
 #include <numeric>
 
 #include "host_tools/diagnose/models.hpp"
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/support/parallel.hpp"
-#include "model/effects/rotor_inertia.hpp"
 
 namespace fxdyn::diagnosis {
 
@@ -141,7 +141,7 @@ std::shared_ptr<const RobotColumns> LogColumns::robot_with(std::size_t log, cons
   IdentifiedModel model = models_->current;
   if (rotor) {
     EffectFit fit;
-    fit.effect = RotorInertia::name;
+    fit.effect = rotor_effect().name;
     fit.linear = {group.rotor_inertia};
     model.joints[group.candidate.joint].effects.push_back(std::move(fit));
     take_from_base(model, group.rotor->in_base, group.rotor_inertia);

@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include "host_tools/diagnose/models.hpp"
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/regression/gauss_newton.hpp"
 #include "host_tools/regression/solver.hpp"
-#include "model/effects/payload.hpp"
-#include "model/effects/rotor_inertia.hpp"
 
 namespace fxdyn::diagnosis {
 
@@ -41,45 +42,44 @@ double misfit(const Linearised& problem) {
 }  // namespace
 
 void refit(Models& models, const std::vector<SessionLog>& all, const std::vector<VectorXd>& given, int rounds) {
+  constexpr double converged_below = 1;  // one variance of one parameter
   std::vector<VectorXd> whitening = given;
   std::vector<SessionLog> logs;
   for (const SessionLog& log : all) {
     if (log.fits) logs.push_back(log);
   }
-  constexpr int most_halvings = 3;
-  constexpr double converged_below = 1;  // one variance of one parameter
-  Models best = models;
   std::unique_ptr<Linearised> around;  // the best so far
-  LinearFit step;
-  double least = 1e300, share = 1;
-  int halvings = 0;
-  for (int round = 0;; ++round) {
-    auto problem = std::make_unique<Linearised>(models, logs, whitening);
+  double least = 1e300;
+  int tried = 0;
+  const auto judge = [&](const Models& there) {
+    auto problem = std::make_unique<Linearised>(there, logs, whitening);
     whitening = problem->noise().whitening();  // one for all rounds, else their misfits can't be compared
     const double now = misfit(*problem);
-    if (now < least) {
-      const bool converged = least - now < converged_below;
-      best = models;
-      least = now;
-      if (converged || round >= rounds) return;
-      around = std::move(problem);
-      step = around->solver().solve(around->unknown_columns());
-      share = 1;
-      halvings = 0;
-    } else {
-      // Too far; or no figures at all, then the models stay as they are.
-      models = best;
-      if (!around) return;
-      if (++halvings > most_halvings || round >= rounds + most_halvings) return;
-      share *= 0.3;
-    }
-    update(models, around->unknowns(), step, share);
-  }
+    if (!(now < least)) return Trial::rejected;
+    const bool converged = least - now < converged_below;
+    least = now;
+    around = std::move(problem);
+    return converged ? Trial::converged : Trial::accepted;
+  };
+  if (judge(models) == Trial::rejected) return;  // no figures at all
+  const auto step = [&](const Models&, int) {
+    return tried < rounds ? std::optional(around->solver().solve(around->unknown_columns())) : std::nullopt;
+  };
+  const auto move = [&](const Models& from, const LinearFit& fit, double share) {
+    Models there = from;
+    update(there, around->unknowns(), fit, share);
+    return there;
+  };
+  const auto accept = [&](const Models&, const Models& there, int) {
+    ++tried;
+    return judge(there);
+  };
+  models = gauss_newton(models, {.most_rounds = rounds, .shrink = 0.3}, step, move, accept);
 }
 
 void bring_rotor(Models& models, const Rotor& rotor, double inertia) {
   EffectFit fit;
-  fit.effect = RotorInertia::name;
+  fit.effect = rotor_effect().name;
   fit.linear = {inertia};
   std::vector<IdentifiedModel*> of{&models.current};
   if (models.has_baseline) of.push_back(&models.healthy);
@@ -96,12 +96,13 @@ EffectId name(Models& models, const Group& group, const VectorXd& theta) {
   fit.shape = group.candidate.shape;
   fit.named = true;
   const EffectInfo& info = *find_effect(fit.effect);
+  const bool load = is_load(fit.effect);
   for (Index i = 0; i < theta.size(); ++i) {
     const ParameterInfo& p = info.linear[static_cast<std::size_t>(i)];
-    fit.linear.push_back(fit.effect == Payload::name ? theta[i] : std::clamp(theta[i], p.lower, p.upper));
+    fit.linear.push_back(load ? theta[i] : std::clamp(theta[i], p.lower, p.upper));
   }
   if (info.share) fit.linear[0] = 1;
-  if (fit.effect == Payload::name) {
+  if (load) {
     fit.linear[0] = std::max(fit.linear[0], least_mass);
     for (std::size_t i = 1; i < fit.linear.size(); ++i)
       fit.linear[i] = std::clamp(fit.linear[i] / fit.linear[0], -10.0, 10.0);

@@ -5,8 +5,9 @@
 namespace fxdyn::diagnosis {
 
 /// Least squares over everything that is not fixed (base parameters, friction, widths, named effects with their shapes)
-/// by Gauss and Newton, the model linearised again at every step: large delays, gaps, tilts and loads come out right.
+/// by gauss_newton(), the model linearised again at every step: large delays, gaps, tilts and loads come out right.
 /// Only logs that fit are looked at.
+/// @param rounds of step and judgement, shortened steps counted too
 void refit(Models& models, const std::vector<SessionLog>& logs, const std::vector<Eigen::VectorXd>& whitening,
            int rounds);
 

@@ -1,11 +1,8 @@
 #include "host_tools/diagnose/unknowns.hpp"
 #include "host_tools/diagnose/base_parameters.hpp"
 #include "host_tools/diagnose/models.hpp"
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/lugre_check.hpp"
-#include "model/effects/coulomb.hpp"
-#include "model/effects/lugre.hpp"
-#include "model/effects/offset.hpp"
-#include "model/effects/payload.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -18,7 +15,7 @@ using Eigen::Index;
 
 bool is_shape_free(const EffectInfo& info, std::size_t i) {
   // A time constant from one session's start is a guess by its end: the gate chooses it.
-  return info.shape[i].name != "joint" && info.shape[i].name != "ratio" && info.shape[i].name != "time_constant";
+  return info.shape[i].values.search != ShapeSearch::list && !info.drifts();
 }
 
 EffectFit& effect_of(IdentifiedModel& model, const Unknown& u) {
@@ -31,7 +28,7 @@ double& value_of(IdentifiedModel& model, const Unknown& u) {
 }
 
 bool is_moment(const EffectFit& fit, const Unknown& u) {
-  return fit.effect == Payload::name && u.kind == Unknown::Kind::linear && u.index > 0;
+  return is_load(fit.effect) && u.kind == Unknown::Kind::linear && u.index > 0;
 }
 
 /// Value of an unknown in a model: payload's centre counts as first moment.
@@ -144,12 +141,12 @@ class Builder {
   /// Standard deviation of a coefficient from one healthy session to the next.
   double usual_change(const Unknown& shared, const ParameterInfo& parameter) const {
     const JointFit& joint = now_.joints[shared.joint];
-    const EffectFit* coulomb = common_.joints[shared.joint].find(Coulomb::name);
+    const EffectFit* friction = dry_friction_of(common_.joints[shared.joint]);
     // Of motions of unit size: a coefficient's own scale.
     const PriorOptions& prior = models_.options.prior;
     double scale = prior.friction_change * std::fabs(shared.value);
-    if (joint.effects[shared.effect].effect == Offset::name && coulomb != nullptr)
-      scale += prior.offset_change * std::fabs(coulomb->linear[0]);
+    if (joint.effects[shared.effect].effect == constant_effect().name && friction != nullptr)
+      scale += prior.offset_change * std::fabs(friction->linear[0]);
     const double motion = parameter.quantity == Quantity::velocity ? joint.dq_limit : 1.0;
     return std::hypot(scale, prior.smallest_change * joint.rated_torque / std::max(motion, 1e-9));
   }
@@ -185,7 +182,7 @@ class Builder {
       u.kind = Unknown::Kind::linear;
       u.index = i;
       u.value = read(now_, u);
-      if (info.linear[i].name == "share") {
+      if (info.share) {
         u.prior = 1;
         u.prior_std = models_.options.prior.share;
       }
@@ -266,14 +263,7 @@ namespace {
 
 /// Bristles whose damping drives the joint are no friction, however well they fit.
 void keep_friction(IdentifiedModel& model) {
-  constexpr double within = 0.999;
-  for (JointFit& joint : model.joints) {
-    const auto most = most_lugre_damping(joint, joint.dq_limit);
-    if (!most) continue;
-    for (EffectFit& fit : joint.effects) {
-      if (fit.effect == Lugre::name) fit.linear[1] = std::min(fit.linear[1], within * *most);
-    }
-  }
+  for (JointFit& joint : model.joints) limit_lugre_damping(joint);
 }
 
 }  // namespace
@@ -288,7 +278,7 @@ void update(Models& models, const std::vector<Unknown>& unknowns, const LinearFi
     if (u.is_logarithm()) step = std::clamp(step, -longest_step, longest_step);
     // Payload's mass first: its centre is first moment over mass.
     if (!u.change && u.kind == Unknown::Kind::linear && u.body && u.index == 0 &&
-        effect_of(models.current, u).effect == Payload::name) {
+        is_load(effect_of(models.current, u).effect)) {
       EffectFit& load = models.current.body[u.effect];
       const double mass = std::max(least_mass, load.linear[0] + step);
       for (std::size_t k = 1; k < load.linear.size(); ++k) load.linear[k] *= load.linear[0] / mass;

@@ -4,10 +4,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/regression/encoder_noise.hpp"
-#include "model/effects/coulomb.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
@@ -46,7 +45,7 @@ struct VelocityError {
 VectorXd velocity_doubt(const ProcessedLog& log, std::size_t joint, const JointFit& friction,
                         const Eigen::Ref<const VectorXd>& velocity, const Eigen::Ref<const VectorXd>& load,
                         double sigma) {
-  const EffectFit* coulomb = friction.find(Coulomb::name);
+  const EffectFit* coulomb = dry_friction_of(friction);
   if (coulomb == nullptr || log.measured_dq.size() > 0 || !(position_noise(log.filter, joint) > 0))
     return VectorXd::Zero(log.rows());
   const VelocityError error{velocity_noise(log.filter, joint, log.step_s),

@@ -1,7 +1,7 @@
 #include "host_tools/effects/evaluator.hpp"
 
 #include "host_tools/effects/broad_learning_types.hpp"
-#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/robot/robot.hpp"
 #include "host_tools/support/error.hpp"
@@ -136,15 +136,19 @@ Evaluator<N>::Evaluator(const IdentifiedModel& model, double tick_s) {
   const std::size_t n = model.robot.size();
   Robot robot = model.robot;
   for (const EffectFit& fit : model.body) {
-    if (fit.effect != GravityTilt::name) continue;
-    const Eigen::Vector3d& g = robot.gravity;
-    const auto up = GravityTilt::turn({-g.x(), -g.y(), -g.z()}, fit.linear[0], fit.linear[1]);
-    robot.gravity = {-up.x, -up.y, -up.z};
+    BodyEffects::for_each([&]<class E>() {
+      if constexpr (requires { &E::turn; }) {
+        if (E::name != fit.effect) return;
+        const Eigen::Vector3d& g = robot.gravity;
+        const auto up = E::turn({-g.x(), -g.y(), -g.z()}, fit.linear[0], fit.linear[1]);
+        robot.gravity = {-up.x, -up.y, -up.z};
+      }
+    });
   }
   const DhChain chain = to_dh(robot);
   std::vector<LinkInertia<Real>> bodies = model.inertia;
   for (const EffectFit& fit : model.body) {
-    if (fit.effect != Payload::name) continue;
+    if (!is_load(fit.effect)) continue;
     bodies.back() = with_load(bodies.back(), fit.linear[0], {fit.linear[1], fit.linear[2], fit.linear[3]}, chain);
   }
   const auto up = [](double x) { return from_si<N, Quantity::linear_acceleration>(x); };

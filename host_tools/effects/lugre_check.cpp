@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
-#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/effect_roles.hpp"
 
 namespace fxdyn {
 namespace {
+
+constexpr std::string_view lugre = "lugre";
 
 /// The first of the effect's parameters that is out of the catalogue's range.
 std::optional<std::string> out_of_range(const EffectFit& fit, const EffectInfo& info) {
@@ -34,19 +37,28 @@ double judged_speed(const EffectFit& fit, double dq_limit) {
 }  // namespace
 
 std::optional<double> most_lugre_damping(const JointFit& joint, double dq_limit) {
-  const EffectFit* fit = joint.find("lugre");
+  const EffectFit* fit = joint.find(lugre);
   if (fit == nullptr) return std::nullopt;
   const double velocity = fit->shape[1], share = fit->shape[2], speed = judged_speed(*fit, dq_limit);
-  const EffectFit* viscous = joint.find("viscous");
+  const EffectFit* viscous = joint.find(viscous_friction_effect().name);
   const double n = share + (1 - share) * std::exp(-speed * speed / (velocity * velocity));
   // static + viscous v + damping v (1 - 1 / n) >= 0
   return (fit->linear[0] / speed + (viscous == nullptr ? 0 : std::max(0.0, viscous->linear[0]))) * n / (1 - n);
 }
 
+void limit_lugre_damping(JointFit& joint) {
+  constexpr double within = 0.999;
+  const auto most = most_lugre_damping(joint, joint.dq_limit);
+  if (!most) return;
+  for (EffectFit& fit : joint.effects) {
+    if (fit.effect == lugre) fit.linear[1] = std::min(fit.linear[1], within * *most);
+  }
+}
+
 std::optional<std::string> lugre_is_no_friction(const JointFit& joint, double dq_limit) {
-  const EffectFit* fit = joint.find("lugre");
+  const EffectFit* fit = joint.find(lugre);
   if (fit == nullptr) return std::nullopt;
-  if (auto why = out_of_range(*fit, *find_effect("lugre"))) return why;
+  if (auto why = out_of_range(*fit, *find_effect(lugre))) return why;
   const double damping = fit->linear[1], most = *most_lugre_damping(joint, dq_limit);
   if (damping <= most) return std::nullopt;
   return fmt::format(

@@ -22,4 +22,7 @@ std::optional<std::string> lugre_is_no_friction(const JointFit& joint, double dq
 /// there is none.
 std::optional<double> most_lugre_damping(const JointFit& joint, double dq_limit);
 
+/// Lowers the damping of the joint's `lugre` to just below that, at the joint's limit.
+void limit_lugre_damping(JointFit& joint);
+
 }  // namespace fxdyn

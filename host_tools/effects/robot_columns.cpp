@@ -4,11 +4,10 @@
 
 #include <algorithm>
 
-#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/error.hpp"
-#include "model/effects/payload.hpp"
 
 namespace fxdyn {
 namespace {
@@ -46,7 +45,7 @@ std::vector<ColumnName> column_names(std::string_view effect, JointType type) {
     names.push_back({std::string(parameter.name),
                      std::string(type == JointType::revolute ? parameter.unit : parameter.unit_prismatic)});
   }
-  if (effect == Payload::name) {
+  if (is_load(effect)) {
     for (std::size_t i = 1; i < names.size(); ++i) names[i] = {names[0].name + " " + names[i].name, "kg*m"};
   }
   return names;
@@ -165,7 +164,7 @@ EffectColumns RobotColumns::operator()(const EffectCandidate& candidate) const {
     (on_body ? changed.body : changed.joints[candidate.joint].effects).push_back(std::move(fit));
     return changed;
   };
-  if (candidate.effect == Payload::name) {
+  if (is_load(candidate.effect)) {
     slopes.push_back(slope(with({small_mass, 0, 0, 0}), small_mass));
     for (std::size_t axis = 1; axis < info.linear.size(); ++axis) {
       // Central: the second moments, the same at both sides, drop out.

@@ -10,6 +10,7 @@
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/link_parameters.hpp"
+#include "host_tools/regression/gauss_newton.hpp"
 #include "host_tools/simulate/closed_loop.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/parallel.hpp"
@@ -129,36 +130,41 @@ class SimulationFit {
     return start_ - h.ldlt().solve(columns_.transpose() * torque_);
   }
 
-  /// The minimum beside `x`.
+  /// The minimum beside `x`, by Levenberg's and Marquardt's damped steps.
   VectorXd minimum(VectorXd x, double weight) const {
     double damping = 1e-3;
     VectorXd e = simulated(x);
     double cost = e.squaredNorm() / size(e) + weight * torque_cost(x);
-    for (int iteration = 0; iteration < most_iterations; ++iteration) {
-      const MatrixXd slope = sensitivities(x, e);
+    struct Normal {
+      MatrixXd hessian;
+      VectorXd gradient;
+    };
+    const auto step = [&](const VectorXd& at, int) {
+      const MatrixXd slope = sensitivities(at, e);
       const double of_torque = weight / size(torque_);
-      MatrixXd h = slope.transpose() * slope / size(e) + of_torque * columns_.transpose() * columns_;
-      const VectorXd g =
-          slope.transpose() * e / size(e) + of_torque * columns_.transpose() * (torque_ + columns_ * (x - start_));
-      bool better = false, done = false;
-      for (int attempt = 0; attempt < 8 && !better; ++attempt) {
-        MatrixXd damped = h;
-        damped.diagonal() += damping * (h.diagonal().array() + 1e-12 * h.diagonal().maxCoeff()).matrix();
-        const VectorXd next = x - damped.ldlt().solve(g);
-        const auto moved = attempt_at(next);
-        const double then = moved ? moved->squaredNorm() / size(*moved) + weight * torque_cost(next)
-                                  : std::numeric_limits<double>::infinity();
-        better = then < cost;
-        damping *= better ? 0.3 : 5;
-        if (!better) continue;
-        done = then > (1 - converged) * cost;
-        x = next;
-        e = *moved;
-        cost = then;
-      }
-      if (!better || done) break;
-    }
-    return x;
+      return std::optional(Normal{
+          slope.transpose() * slope / size(e) + of_torque * columns_.transpose() * columns_,
+          slope.transpose() * e / size(e) + of_torque * columns_.transpose() * (torque_ + columns_ * (at - start_))});
+    };
+    const auto move = [&](const VectorXd& from, const Normal& normal, double) {
+      MatrixXd damped = normal.hessian;
+      const auto diagonal = normal.hessian.diagonal().array();
+      damped.diagonal() += damping * (diagonal + 1e-12 * diagonal.maxCoeff()).matrix();
+      return VectorXd(from - damped.ldlt().solve(normal.gradient));
+    };
+    const auto accept = [&](const VectorXd&, const VectorXd& next, int) {
+      auto moved = attempt_at(next);
+      const double then = moved ? moved->squaredNorm() / size(*moved) + weight * torque_cost(next)
+                                : std::numeric_limits<double>::infinity();
+      const bool better = then < cost;
+      damping *= better ? 0.3 : 5;
+      if (!better) return Trial::rejected;
+      const bool done = then > (1 - converged) * cost;
+      e = std::move(*moved);
+      cost = then;
+      return done ? Trial::converged : Trial::accepted;
+    };
+    return gauss_newton(std::move(x), {.most_rounds = most_iterations, .most_tries = 8}, step, move, accept);
   }
 
   /// Per joint, of the position [rad | m]; empty: it ran away.

@@ -8,7 +8,6 @@
 #include "host_tools/simulate/recordings.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
-#include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {
 namespace {
@@ -81,7 +80,7 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
   settings.shortest_interval_s = seconds / options.most_rows;
   Eigen::Index samples = 0;
   for (const Log& log : logs) samples += log.samples();
-  most_threads = static_cast<double>(samples) > options.long_logs ? 1 : threads_allowed();
+  if (static_cast<double>(samples) > options.long_logs) data.threads = 1;
   for (Log& log : logs) {
     if (log.resampled) {
       data.notes.push_back(

@@ -11,6 +11,7 @@
 #include "host_tools/identify/options.hpp"
 #include "host_tools/project/project.hpp"
 #include "host_tools/regression/dataset.hpp"
+#include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {
 
@@ -22,6 +23,8 @@ struct GateData {
   std::vector<std::string> notes;             ///< what a reader should know of the data
   Eigen::VectorXd largest_torque;             ///< raw, over the train and validate logs [N*m | N]
   Eigen::VectorXd q_lower, q_upper, dq, ddq;  ///< largest of the filtered motion
+  /// So many may work on them: each thread takes memory for columns of its own.
+  std::size_t threads = threads_allowed();
 };
 /// @throws InputError where the project names no train log.
 GateData read_gate_data(const Project& project, const std::filesystem::path& directory,

@@ -3,10 +3,9 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/effects/link_parameters.hpp"
@@ -14,9 +13,6 @@
 #include "host_tools/regression/sandwich.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/error.hpp"
-#include "model/effects/coulomb.hpp"
-#include "model/effects/offset.hpp"
-#include "model/effects/payload.hpp"
 
 namespace fxdyn {
 namespace {
@@ -74,8 +70,8 @@ Rows build_rows(const IdentifiedModel& model, const DhChain& chain, const Proces
   for (Index j = 0; j < n; ++j) {
     const auto at = static_cast<std::size_t>(j);
     const JointSeries series{motion.q.col(j), motion.dq.col(j), motion.ddq.col(j), {}, log.step_s};
-    full[at].col(ten) = effect_columns(Coulomb::name, {}, model.joints[at].sign_width, series);
-    full[at].col(ten + 1) = effect_columns(Offset::name, {}, model.joints[at].sign_width, series);
+    full[at].col(ten) = effect_columns(dry_friction_effect().name, {}, model.joints[at].sign_width, series);
+    full[at].col(ten + 1) = effect_columns(constant_effect().name, {}, model.joints[at].sign_width, series);
     rows.columns.push_back(
         log.decimate(log.filter_columns(at_other_times(full[at], model.filter.torque_lead_s / log.step_s))));
     full[at].resize(0, 0);
@@ -285,7 +281,7 @@ ConsistentFit possible_load(const Fit& fit, const std::array<bool, 10>& apart, I
 
 LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log, const LoadOptions& options) {
   for (const EffectFit& effect : model.body) {
-    if (effect.effect == Payload::name)
+    if (is_load(effect.effect))
       throw InputError("the model has a payload already: take the model that was identified without load");
   }
   if (log.tau.size() == 0) throw InputError(fmt::format("{}: no torque; a load shows in the torque only", log.name));
@@ -311,7 +307,7 @@ LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log, con
   const MatrixXd to_output = jacobian(out.body);
   const VectorXd std = (to_output * fit.covariance * to_output.transpose()).diagonal().cwiseMax(0).cwiseSqrt();
   out.parameters = parameters_of(out.body, std, apart);
-  out.effect.effect = Payload::name;
+  out.effect.effect = load_effect().name;
   out.effect.named = true;
   const Vector3d& com = out.body.centre;
   out.effect.linear = {out.body.mass, com.x(), com.y(), com.z()};
@@ -320,40 +316,6 @@ LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log, con
 
   add_residuals(rows, fit, possible.theta, out);
   return out;
-}
-
-nlohmann::json load_json(const LoadFit& fit, const Robot& robot) {
-  using nlohmann::json;
-  const auto& p = fit.parameters;
-  const auto entry = [](const LoadParameter& parameter) {
-    return json{{"value", parameter.value},
-                {"std", parameter.std},
-                {"unit", parameter.unit},
-                {"identifiable", parameter.identifiable}};
-  };
-  json com, tensor, joints = json::array();
-  for (std::size_t k = 1; k < 4; ++k) com[p[k].name] = entry(p[k]);
-  for (std::size_t k = 4; k < 10; ++k) tensor[p[k].name] = entry(p[k]);
-  for (std::size_t j = 0; j < robot.size(); ++j) {
-    const auto k = static_cast<Index>(j);
-    joints.push_back({{"joint", robot.joints[j].name},
-                      {"index", j + 1},
-                      {"unit", robot.joints[j].torque_unit()},
-                      {"residual_before", fit.before[k]},
-                      {"residual_after", fit.after[k]},
-                      {"residual_with_model", fit.with_effect[k]},
-                      {"coulomb_change", fit.coulomb[k]},
-                      {"coulomb_change_std", fit.coulomb_std[k]},
-                      {"offset_change", fit.offset[k]}});
-  }
-  return {{"schema", "fxdyn.payload/1"},
-          {"link", robot.joints.back().link},
-          {"frame", "URDF frame of the link"},
-          {"mass", entry(p[0])},
-          {"com", com},
-          {"inertia_about_com", tensor},
-          {"constrained", fit.constrained},
-          {"joints", joints}};
 }
 
 }  // namespace fxdyn

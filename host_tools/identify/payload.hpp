@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <nlohmann/json_fwd.hpp>
 
 #include "host_tools/effects/forward.hpp"
 #include "host_tools/effects/joint_fit.hpp"
@@ -36,8 +35,5 @@ struct LoadFit {
 /// @throws DataError: the motion does not determine the mass, or there is none to be seen. InputError: the model has a
 /// payload already, or the log has no torque.
 LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log, const LoadOptions& options = {});
-
-/// Content of payload.json.
-nlohmann::json load_json(const LoadFit& fit, const Robot& robot);
 
 }  // namespace fxdyn

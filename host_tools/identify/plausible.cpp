@@ -5,14 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/link_parameters.hpp"
 #include "host_tools/regression/physical.hpp"
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/regression/solver.hpp"
-#include "model/effects/coulomb.hpp"
-#include "model/effects/rotor_inertia.hpp"
-#include "model/effects/viscous.hpp"
 
 namespace fxdyn {
 namespace {
@@ -28,8 +25,8 @@ Index column_of(std::string_view effect) {
   const std::vector<std::string>& all = nominal_effects();
   return std::find(all.begin(), all.end(), effect) - all.begin();
 }
-const Index coulomb = column_of(Coulomb::name), viscous = column_of(Viscous::name),
-            rotor = column_of(RotorInertia::name);
+const Index coulomb = column_of(dry_friction_effect().name), viscous = column_of(viscous_friction_effect().name),
+            rotor = column_of(rotor_effect().name);
 
 struct Estimate {
   double value = 0, std = 0;

@@ -3,54 +3,38 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "host_tools/identify/fit_figures.hpp"
+
 namespace fxdyn {
-
-using nlohmann::json;
-
 namespace {
 
-/// Estimates on the way through the logs: one row a moment, base parameters first, then each joint's coefficients.
-json recursion_json(const Fitter::Recursion& recursion, double forgetting) {
-  json trace = json::array();
-  for (Eigen::Index k = 0; k < recursion.trace.rows(); ++k) {
-    const Eigen::VectorXd row = recursion.trace.row(k);
-    trace.push_back(std::vector<double>(row.begin(), row.end()));
-  }
-  return {{"forgetting", forgetting},
-          {"t", std::vector<double>(recursion.t.begin(), recursion.t.end())},
-          {"estimates", trace}};
+FitResult::Recursion recursion_of(const Fitter::Recursion& recursion, double forgetting) {
+  FitResult::Recursion out{forgetting, {recursion.t.begin(), recursion.t.end()}, {}};
+  for (const auto& row : recursion.trace.rowwise()) out.estimates.emplace_back(row.begin(), row.end());
+  return out;
 }
 
 }  // namespace
 
-json fit_metrics(const Project& project, const Fitter& fitter, const FitFigures& estimate,
-                 const std::vector<std::string>& notes, const std::vector<StageErrors>& stages) {
-  json metrics = {{"schema", "fxdyn.metrics/1"},
-                  {"gate", fitter.gate()},
-                  {"base_parameters", fitter.base().columns.size()},
-                  {"notes", notes},
-                  {"logs", to_json(stages.back().logs)},
-                  {"stages", to_json(stages)}};
-  metrics["method"] = project.identify.method;
-  metrics["condition_number"] = std::isfinite(estimate.condition) ? json(estimate.condition) : json(nullptr);
-  metrics["weak_parameters"] = json::array();
-  for (const WeakParameter& one : estimate.weak) {
-    metrics["weak_parameters"].push_back(
-        {{"parameter", one.name},
-         {"share_of_rated", one.error},
-         {"joint_to_move", project.robot.joints[static_cast<std::size_t>(one.joint)].name}});
-  }
+MetricsResult fit_metrics(const Project& project, const Fitter& fitter, const FitFigures& estimate,
+                          const std::vector<std::string>& notes, const std::vector<StageErrors>& stages) {
+  FitResult fit;
+  fit.method = project.identify.method;
+  fit.condition_number = estimate.condition;
+  for (const WeakParameter& one : estimate.weak)
+    fit.weak.push_back({one.name, one.error, project.robot.joints[static_cast<std::size_t>(one.joint)].name});
   const std::vector<Eigen::Index> saturated = fitter.saturated_rows();
-  metrics["saturated_rows"] = std::vector<std::int64_t>(saturated.begin(), saturated.end());
-  if (estimate.physical) {
-    metrics["physical"] = physical_json(project.robot, to_dh(project.robot), *estimate.physical);
-  }
-  if (estimate.recursion) metrics["recursive"] = recursion_json(*estimate.recursion, project.identify.forgetting);
-  return metrics;
+  fit.saturated_rows.assign(saturated.begin(), saturated.end());
+  if (estimate.physical) fit.physical = physical_result(project.robot, to_dh(project.robot), *estimate.physical);
+  if (estimate.recursion) fit.recursion = recursion_of(*estimate.recursion, project.identify.forgetting);
+  MetricsResult out{stages.back().logs};
+  out.gate = fitter.gate();
+  out.base_parameters = fitter.base().columns.size();
+  out.notes = notes;
+  out.stages = stages;
+  out.fit = std::move(fit);
+  return out;
 }
 
 std::string weak_note(const std::vector<WeakParameter>& weak, const Robot& robot) {

@@ -1,22 +1,21 @@
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
 #include "host_tools/project/project.hpp"
 #include "host_tools/regression/fitter.hpp"
-#include "host_tools/regression/metrics.hpp"
+#include "host_tools/regression/metrics_result.hpp"
 
 namespace fxdyn {
 
 struct FitFigures;
 struct WeakParameter;
 
-/// Content of metrics.json but for the logs' errors: what a fit decided, and how well it knows its parameters.
+/// Errors, what a fit decided, and how well it knows its parameters.
 /// `stages`: from the rigid body to the model itself.
-nlohmann::json fit_metrics(const Project& project, const Fitter& fitter, const FitFigures& estimate,
-                           const std::vector<std::string>& notes, const std::vector<StageErrors>& stages);
+MetricsResult fit_metrics(const Project& project, const Fitter& fitter, const FitFigures& estimate,
+                          const std::vector<std::string>& notes, const std::vector<StageErrors>& stages);
 
 /// For people: which parameters these logs determine poorly and what to move; empty: none.
 std::string weak_note(const std::vector<WeakParameter>& weak, const Robot& robot);

@@ -6,6 +6,7 @@
 
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/forward/forward.hpp"
+#include "host_tools/forward/forward_result.hpp"
 #include "host_tools/page/plot.hpp"
 #include "host_tools/pipeline/one_log.hpp"
 #include "host_tools/support/error.hpp"
@@ -17,52 +18,7 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-using nlohmann::json;
 namespace fs = std::filesystem;
-
-json rmse_of(const ForwardRun& run, Index joint) {
-  return run.why_failed.empty() ? json(run.rmse[joint]) : json(nullptr);
-}
-
-json forward_json(const Forward& forward, const Robot& robot, const Log& log, Index given) {
-  json joints = json::array();
-  for (Index j = 0; j < log.joints(); ++j) {
-    const Joint& joint = robot.joints[static_cast<std::size_t>(j)];
-    joints.push_back({{"joint", joint.name},
-                      {"index", j + 1},
-                      {"unit", joint.position_unit()},
-                      {"range", log.q.col(j).maxCoeff() - log.q.col(j).minCoeff()},
-                      {"open_rmse", rmse_of(forward.open, j)},
-                      {"closed_rmse", rmse_of(forward.closed, j)}});
-  }
-  json out = {{"schema", "fxdyn.forward/1"},
-              {"log", log.file.filename().string()},
-              {"given", given},
-              {"simulated_s", log.step_s * static_cast<double>(log.samples() - given)},
-              {"joints", joints}};
-  if (!forward.open.why_failed.empty()) out["failed"]["open"] = forward.open.why_failed;
-  if (!forward.closed.why_failed.empty()) out["failed"]["closed"] = forward.closed.why_failed;
-  return out;
-}
-
-std::string table(const json& result) {
-  std::string out =
-      fmt::format("{}: {:.3g} s simulated, the first {} samples given\n{:<24} {:>12} {:>12} {:>12}\n",
-                  result.at("log").get<std::string>(), result.at("simulated_s").get<double>(),
-                  result.at("given").get<Index>(), "RMSE of the position", "open loop", "closed loop", "range");
-  const auto number = [](const json& value) {
-    return value.is_null() ? std::string("failed") : fmt::format("{:.4g}", value.get<double>());
-  };
-  for (const json& joint : result.at("joints")) {
-    out += fmt::format("{:<24} {:>12} {:>12} {:>12} {}\n", joint.at("joint").get<std::string>(),
-                       number(joint.at("open_rmse")), number(joint.at("closed_rmse")), number(joint.at("range")),
-                       joint.at("unit").get<std::string>());
-  }
-  if (const auto failed = result.find("failed"); failed != result.end()) {
-    for (const auto& [loop, why] : failed->items()) out += fmt::format("{} loop: {}\n", loop, why.get<std::string>());
-  }
-  return out;
-}
 
 /// A panel a joint: measured and simulated positions over time.
 std::string picture(const Forward& forward, const Robot& robot, const Log& log) {
@@ -97,7 +53,7 @@ std::string forward_log(const fs::path& model_file, const fs::path& log_file, In
   const Forward forward = simulate_forward(model, log, process(log, model.filter), given);
   progress.step();
   progress.done();
-  const json result = forward_json(forward, model.robot, log, given);
+  const ForwardResult result = forward_result(forward, model.robot, log, given);
   const std::string svg = picture(forward, model.robot, log);
   const auto write = [&](const ForwardRun& run, const char* name) {
     if (!run.why_failed.empty()) return;
@@ -109,8 +65,8 @@ std::string forward_log(const fs::path& model_file, const fs::path& log_file, In
   write(forward.open, "open.csv");
   write(forward.closed, "closed.csv");
   write_file(directory / "forward.svg", svg);
-  write_file(directory / "forward.json", result.dump(1) + "\n");
-  return table(result);
+  write_file(directory / "forward.json", to_json(result).dump(1) + "\n");
+  return forward_table(result);
 }
 
 }  // namespace fxdyn

@@ -7,13 +7,13 @@
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/identify/payload.hpp"
-#include "host_tools/regression/metrics.hpp"
+#include "host_tools/identify/payload_result.hpp"
+#include "host_tools/regression/metrics_result.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
 
 namespace fxdyn {
 
-using nlohmann::json;
 namespace fs = std::filesystem;
 
 Log read_log_for(const IdentifiedModel& model, const fs::path& file, std::optional<double> from_s,
@@ -40,9 +40,9 @@ void identify_payload(const fs::path& model_file, const fs::path& log_file, cons
   const LoadFit fit = identify_load(model, process(log, model.filter));
   model.body.push_back(fit.effect);
   model.drop_tables();  // they are another model's now
-  const json report = load_json(fit, model.robot);
+  const PayloadResult report = payload_result(fit, model.robot);
   write_file(directory / "model.json", to_json(model).dump(1) + "\n");
-  write_file(directory / "payload.json", report.dump(1) + "\n");
+  write_file(directory / "payload.json", to_json(report).dump(1) + "\n");
 }
 
 void predict_log(const fs::path& model_file, const fs::path& log_file, const Prediction& how,
@@ -82,11 +82,8 @@ void predict_log(const fs::path& model_file, const fs::path& log_file, const Pre
   write_log(out, result);
   std::vector<LogErrors> errors;
   if (processed.tau.size() > 0) errors.push_back(errors_of(processed, model.robot, torque));
-  write_file(
-      directory / "metrics.json",
-      json{{"schema", "fxdyn.metrics/1"}, {"numbers", how.fixed ? "fixed" : "real"}, {"logs", to_json(errors)}}.dump(
-          1) +
-          "\n");
+  const MetricsResult metrics{.logs = errors, .numbers = how.fixed ? "fixed" : "real"};
+  write_file(directory / "metrics.json", to_json(metrics).dump(1) + "\n");
 }
 
 }  // namespace fxdyn

@@ -16,12 +16,12 @@
 #include "host_tools/pipeline/tables_export.hpp"
 #include "host_tools/pipeline/training.hpp"
 #include "host_tools/project/provenance.hpp"
-#include "host_tools/regression/metrics.hpp"
 #include "host_tools/report/report.hpp"
 #include "host_tools/robot/write_urdf.hpp"
 #include "host_tools/simulate/recordings.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
+#include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {
 
@@ -132,6 +132,7 @@ void Pipeline::write_possible_bodies(const Estimate& estimate) const {
 }
 
 void Pipeline::identify() {
+  const ThreadLimit limit(data().threads);
   data().notes = data_notes_;
   const auto fitter = fxdyn::identify(project_, data(), progress_);
   progress_.stage("fit, standard deviations, possible bodies", 1);
@@ -146,15 +147,16 @@ void Pipeline::identify() {
   stages.push_back(stage_errors(model, "friction"));
   progress_.step();
   progress_.done();
-  const json metrics = fit_metrics(project_, *fitter, estimate, data().notes, stages);
+  const MetricsResult metrics = fit_metrics(project_, *fitter, estimate, data().notes, stages);
   write_possible_bodies(estimate);
   write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
-  write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
+  write_file(directory_ / "metrics.json", to_json(metrics).dump(1) + "\n");
   for (const std::string& note : data().notes) fmt::print(stderr, "note: {}\n", note);
 }
 
 void Pipeline::diagnose() {
   const auto start = Clock::now();
+  const ThreadLimit limit(data().threads);
   data().notes = data_notes_;
   std::vector<ProcessedLog> baseline;
   for (Log& log : read_logs(project_, Role::baseline, directory_)) {
@@ -178,11 +180,13 @@ void Pipeline::diagnose() {
   DiagnosisResult report = diagnosis.report;
   report.evidence = evidence_json(nominal, model, held_out, diagnosis.still);
   progress_.step();
-  const json metrics = {{"schema", "fxdyn.metrics/1"},          {"gate", report.gate},
-                        {"base_parameters", model.base.size()}, {"notes", data().notes},
-                        {"logs", to_json(stages.back().logs)},  {"stages", to_json(stages)}};
+  const MetricsResult metrics{.logs = stages.back().logs,
+                              .gate = report.gate,
+                              .base_parameters = model.base.size(),
+                              .notes = data().notes,
+                              .stages = stages};
   write_file(directory_ / "nominal.json", to_json(nominal).dump(1) + "\n");
-  write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
+  write_file(directory_ / "metrics.json", to_json(metrics).dump(1) + "\n");
   write_file(directory_ / "diagnosis.json", to_json(report).dump(1) + "\n");
   write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
   std::string no_plots;
@@ -202,7 +206,7 @@ std::vector<StageErrors> Pipeline::diagnosed_stages() const {
   std::vector<StageErrors> out;
   const fs::path file = directory_ / "metrics.json";
   if (!fs::exists(file)) return out;
-  for (StageErrors& stage : stages_of(json::parse(read_file(file)))) {
+  for (StageErrors& stage : metrics_of(json::parse(read_file(file))).stages) {
     if (stage.stage == "friction" || stage.stage == "diagnosed") out.push_back(std::move(stage));
   }
   return out;
@@ -210,6 +214,7 @@ std::vector<StageErrors> Pipeline::diagnosed_stages() const {
 
 void Pipeline::train() {
   const TrainSettings& settings = project_.train;
+  const ThreadLimit limit(data().threads);
   check_motion();
   std::string inputs = project_hash(project_);
   for (const LogReference& log : data().references) inputs += log.hash;
@@ -230,10 +235,10 @@ void Pipeline::train() {
   const Training training = trainer.run(resume);
   stages.insert(stages.begin(), training.rigid);
   stages.push_back(training.trained);
-  json metrics = fit_metrics(project_, trainer.fitter(), training.estimate, data().notes, stages);
-  metrics["training"] = outcomes_json(training.outcomes, project_.robot);
+  MetricsResult metrics = fit_metrics(project_, trainer.fitter(), training.estimate, data().notes, stages);
+  metrics.training = trained_joints(training.outcomes, project_.robot);
   write_possible_bodies(training.estimate);
-  write_file(directory_ / "metrics.json", metrics.dump(1) + "\n");
+  write_file(directory_ / "metrics.json", to_json(metrics).dump(1) + "\n");
   write_file(directory_ / "model.json", to_json(training.model).dump(1) + "\n");
   write_information(training.stored, read_model(directory_ / "model.json"), directory_);
   fs::remove(resume.path);  // a search can take hours: not before its outcome is written

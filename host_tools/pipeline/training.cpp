@@ -127,17 +127,12 @@ StageErrors rigid_errors(Fitter fitter, const Project& project, const FilterFit&
   return errors(rigid, "rigid");
 }
 
-nlohmann::json outcomes_json(const std::vector<TrainOutcome>& outcomes, const Robot& robot) {
-  nlohmann::json out = nlohmann::json::array();
+std::vector<TrainedJoint> trained_joints(const std::vector<TrainOutcome>& outcomes, const Robot& robot) {
+  std::vector<TrainedJoint> out;
   for (std::size_t j = 0; j < outcomes.size(); ++j) {
-    out.push_back({{"joint", robot.joints[j].name},
-                   {"index", j + 1},
-                   {"unit", robot.joints[j].torque_unit()},
-                   {"held_out_without", outcomes[j].error_without},
-                   {"held_out_with", outcomes[j].error_with},
-                   {"kept", outcomes[j].kept},
-                   {"evaluations", outcomes[j].evaluations},
-                   {"choice", choice_json(outcomes[j])}});
+    const TrainOutcome& one = outcomes[j];
+    out.push_back({robot.joints[j].name, robot.joints[j].torque_unit(), one.error_without, one.error_with, one.kept,
+                   one.evaluations, choice_of(one)});
   }
   return out;
 }

@@ -61,7 +61,7 @@ class Trainer {
 StageErrors rigid_errors(Fitter fitter, const Project& project, const FilterFit& filter,
                          const Trainer::ErrorsOf& errors);
 
-/// For metrics.json.
-nlohmann::json outcomes_json(const std::vector<TrainOutcome>& outcomes, const Robot& robot);
+/// For MetricsResult.
+std::vector<TrainedJoint> trained_joints(const std::vector<TrainOutcome>& outcomes, const Robot& robot);
 
 }  // namespace fxdyn

@@ -7,6 +7,7 @@
 #include <complex>
 #include <numbers>
 
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
@@ -14,7 +15,6 @@
 #include "host_tools/signals/spectrum.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/parallel.hpp"
-#include "model/effects/payload.hpp"
 
 namespace fxdyn {
 namespace {
@@ -315,7 +315,7 @@ IdentifiedModel with_load_of(const ProcessedLog& log, IdentifiedModel model) {
   if (!log.load) return model;
   const Eigen::Vector3d& com = log.load->com;
   EffectFit payload;
-  payload.effect = Payload::name;
+  payload.effect = load_effect().name;
   payload.linear = {log.load->mass, com.x(), com.y(), com.z()};
   model.body.push_back(payload);
   return model;

@@ -88,12 +88,16 @@ LogErrors read_log_errors(const nlohmann::json& json) {
 
 }  // namespace
 
+std::vector<LogErrors> log_errors_of(const nlohmann::json& logs) {
+  std::vector<LogErrors> out;
+  for (const nlohmann::json& log : logs) out.push_back(read_log_errors(log));
+  return out;
+}
+
 std::vector<StageErrors> stages_of(const nlohmann::json& metrics) {
   std::vector<StageErrors> out;
-  for (const nlohmann::json& stage : metrics.at("stages")) {
-    out.push_back({stage.at("stage"), {}});
-    for (const nlohmann::json& log : stage.at("logs")) out.back().logs.push_back(read_log_errors(log));
-  }
+  for (const nlohmann::json& stage : metrics.at("stages"))
+    out.push_back({stage.at("stage"), log_errors_of(stage.at("logs"))});
   return out;
 }
 

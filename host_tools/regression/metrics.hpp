@@ -38,6 +38,7 @@ struct StageErrors {
 };
 nlohmann::json to_json(const StageErrors& stage);
 nlohmann::json to_json(const std::vector<LogErrors>& logs);
+std::vector<LogErrors> log_errors_of(const nlohmann::json& logs);
 /// The stages in the order of metrics.json.
 nlohmann::json to_json(const std::vector<StageErrors>& stages);
 std::vector<StageErrors> stages_of(const nlohmann::json& metrics);

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "host_tools/effects/effects.hpp"
@@ -215,42 +214,6 @@ MassCheck mass_check(const Robot& robot, const DhChain& chain, const PhysicalFit
       check.urdf_mass.reset();
   }
   return check;
-}
-
-nlohmann::json physical_json(const Robot& robot, const DhChain& chain, const PhysicalFit& fit) {
-  using nlohmann::json;
-  const MassCheck check = mass_check(robot, chain, fit);
-  const auto entry = [](double value, const char* unit, double share) {
-    return json{{"value", value}, {"unit", unit}, {"data_share", share}, {"determined", share >= determined_share}};
-  };
-  json links = json::array();
-  for (std::size_t i = 0; i < check.links.size(); ++i) {
-    const LinkMass& link = check.links[i];
-    const Vector3d moment = link.identified.mass * link.identified.centre;
-    json centre = json::array(), first_moment = json::array();
-    for (int k = 0; k < 3; ++k) {
-      centre.push_back(entry(link.identified.centre[k], "m", link.share.centre[k]));
-      first_moment.push_back(entry(moment[k], "kg m", link.share.first_moment[k]));
-    }
-    links.push_back({{"link", link.link},
-                     {"index", i + 1},
-                     {"mass", entry(link.identified.mass, "kg", link.share.mass)},
-                     {"centre", centre},
-                     {"first_moment", first_moment},
-                     {"smallest_eigenvalue", fit.smallest_eigenvalue[i]}});
-    if (link.urdf) {
-      const Vector3d given = link.urdf->mass * link.urdf->centre;
-      links.back()["urdf"] = {{"mass", link.urdf->mass},
-                              {"centre", std::vector<double>(link.urdf->centre.begin(), link.urdf->centre.end())},
-                              {"first_moment", std::vector<double>(given.begin(), given.end())}};
-    }
-  }
-  json out = {{"constrained", fit.constrained},
-              {"prior", fit.prior},
-              {"mass", entry(check.mass, "kg", check.mass_share)},
-              {"links", links}};
-  if (check.urdf_mass) out["urdf_mass"] = *check.urdf_mass;
-  return out;
 }
 
 }  // namespace fxdyn

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Dense>
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -74,9 +73,5 @@ struct MassCheck {
   std::optional<double> urdf_mass;  ///< where all links have an inertia there
 };
 MassCheck mass_check(const Robot& robot, const DhChain& chain, const PhysicalFit& fit);
-
-/// The same with the prior and what the data decided of it, for metrics and report: every mass, centre and first moment
-/// m c (what gravity acts on) with its share, the URDF's beside it.
-nlohmann::json physical_json(const Robot& robot, const DhChain& chain, const PhysicalFit& fit);
 
 }  // namespace fxdyn

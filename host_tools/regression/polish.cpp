@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/regression/fitter.hpp"
+#include "host_tools/regression/gauss_newton.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/regression/tie.hpp"
 #include "host_tools/regression/unknown_shapes.hpp"
@@ -112,49 +114,58 @@ VectorXd Fitter::shape_step(const Solution& solution, double square, std::vector
 }
 
 void Fitter::polish() {
-  constexpr int most_rounds = 30;
+  constexpr int most_tried = 30;
   constexpr double least_reach = 1.0 / 64, least_gain = 1e-5;
+  using Designs = std::vector<JointFit>;
   Solution solution = solve(normal_equations());
   double square = weighted_square(solution);
-  // A joint that becomes worse stays where it was, and goes less far the next time.
+  // The share of a step that each joint takes, from step to step: one that becomes worse goes less far the next time.
   std::vector<double> reach(joints(), 1.0);
-  for (int round = 0; round < most_rounds; ++round) {
-    std::vector<Index> offset;
-    const VectorXd step = shape_step(solution, square, offset);
-    if (step.size() == 0) return;
-    const std::vector<double> old = weighted_squares(solution);
-    const std::vector<JointFit> before = design_;
-    std::vector<JointFit> designs = before;
+  std::vector<Index> offset;
+  std::vector<double> squares;
+  int tried = 0;
+  const auto step_of = [&](const Designs&, int) -> std::optional<VectorXd> {
+    if (tried == most_tried) return {};
+    VectorXd step = shape_step(solution, square, offset);
+    if (step.size() == 0) return {};
+    squares = weighted_squares(solution);
+    return step;
+  };
+  const auto move = [&](const Designs& from, const VectorXd& step, double) {
+    Designs there = from;
     for (std::size_t j = 0; j < joints(); ++j) {
-      if (designs[j].bls) continue;
-      const auto shapes = unknown_shapes(designs[j]);
+      if (there[j].bls) continue;
+      const auto shapes = unknown_shapes(there[j]);
       for (std::size_t s = 0; s < shapes.size(); ++s)
         shapes[s].set(*shapes[s].value * std::exp(reach[j] * step[offset[j] + static_cast<Index>(s)]));
     }
-    set_designs(designs);
+    return there;
+  };
+  const auto accept = [&](const Designs& from, Designs& there, int) {
+    ++tried;
+    set_designs(there);
     const std::vector<double> now = weighted_squares(solve(normal_equations()));
     bool all = true;
     for (std::size_t j = 0; j < joints(); ++j) {
-      const bool worse = now[j] > old[j];
+      const bool worse = now[j] > squares[j];
       reach[j] = worse ? reach[j] / 4 : std::min(1.0, 2 * reach[j]);
-      if (worse) designs[j] = before[j];
+      if (worse) there[j] = from[j];
       all = all && !worse;
     }
-    if (!all) set_designs(designs);
-    const Solution after = solve(normal_equations());
-    const double left = weighted_square(after);
+    if (!all) set_designs(there);
+    Solution after = solve(normal_equations());
+    const double left = weighted_square(after), gain = 1 - left / square;
     const bool going = *std::max_element(reach.begin(), reach.end()) > least_reach;
     if (!(left < square)) {
-      set_designs(before);
+      set_designs(from);
       for (double& r : reach) r /= 4;
-      if (!going) return;
-      continue;
+      return going && tried < most_tried ? Trial::rejected : Trial::given_up;
     }
-    const double gain = 1 - left / square;
-    solution = after;
+    solution = std::move(after);
     square = left;
-    if (gain < least_gain && (all || !going)) return;
-  }
+    return gain < least_gain && (all || !going) ? Trial::converged : Trial::accepted;
+  };
+  gauss_newton(design_, {.most_rounds = most_tried, .most_tries = most_tried}, step_of, move, accept);
 }
 
 }  // namespace fxdyn

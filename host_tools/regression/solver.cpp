@@ -8,6 +8,23 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+SymmetricSolver::SymmetricSolver(const MatrixXd& a) : scale_(a.diagonal().cwiseSqrt()) {
+  for (double& s : scale_) s = s > 0 ? 1 / s : 0;
+  scaled_ = scale_.asDiagonal() * a * scale_.asDiagonal();
+  ldlt_.compute(scaled_ + 1e-12 * MatrixXd::Identity(a.rows(), a.cols()));
+}
+
+VectorXd SymmetricSolver::solve(const VectorXd& b) const {
+  const VectorXd rhs = scale_.cwiseProduct(b);
+  VectorXd x = ldlt_.solve(rhs);
+  for (int round = 0; round < 2; ++round) x += ldlt_.solve(rhs - scaled_ * x);
+  return scale_.cwiseProduct(x);
+}
+
+MatrixXd SymmetricSolver::inverse() const {
+  return scale_.asDiagonal() * ldlt_.solve(MatrixXd::Identity(scaled_.rows(), scaled_.cols())) * scale_.asDiagonal();
+}
+
 namespace {
 
 /// Squared share of a column that the ones before it leave: less is rounding.

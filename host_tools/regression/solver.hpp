@@ -8,21 +8,9 @@ namespace fxdyn {
 /// the data does not excite finite, and refinement takes its effect out of all others.
 class SymmetricSolver {
  public:
-  explicit SymmetricSolver(const Eigen::MatrixXd& a) : scale_(a.diagonal().cwiseSqrt()) {
-    for (double& s : scale_) s = s > 0 ? 1 / s : 0;
-    scaled_ = scale_.asDiagonal() * a * scale_.asDiagonal();
-    ldlt_.compute(scaled_ + 1e-12 * Eigen::MatrixXd::Identity(a.rows(), a.cols()));
-  }
-  Eigen::VectorXd solve(const Eigen::VectorXd& b) const {
-    const Eigen::VectorXd rhs = scale_.cwiseProduct(b);
-    Eigen::VectorXd x = ldlt_.solve(rhs);
-    for (int round = 0; round < 2; ++round) x += ldlt_.solve(rhs - scaled_ * x);
-    return scale_.cwiseProduct(x);
-  }
-  Eigen::MatrixXd inverse() const {
-    return scale_.asDiagonal() * ldlt_.solve(Eigen::MatrixXd::Identity(scaled_.rows(), scaled_.cols())) *
-           scale_.asDiagonal();
-  }
+  explicit SymmetricSolver(const Eigen::MatrixXd& a);
+  Eigen::VectorXd solve(const Eigen::VectorXd& b) const;
+  Eigen::MatrixXd inverse() const;
 
  private:
   Eigen::VectorXd scale_;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "host_tools/effects/broad_learning_types.hpp"
 #include "host_tools/support/parallel.hpp"
@@ -125,23 +124,25 @@ std::vector<Choice> by_swarm(const Fitter& fitter, const TrainSettings& settings
 
 }  // namespace
 
-nlohmann::json choice_json(const TrainOutcome& outcome) {
-  if (!outcome.bls) return nullptr;
-  nlohmann::json out = {{"by", outcome.by},
-                        {"nodes", outcome.shape.nodes},
-                        {"windows", outcome.shape.windows},
-                        {"activation", outcome.shape.activation},
-                        {"inputs", outcome.bls->inputs},
-                        {"ridge", outcome.shape.ridge},
-                        {"scale", outcome.shape.scale},
-                        {"reference_velocity", outcome.bls->reference_velocity},
-                        {"J", outcome.value}};
-  if (outcome.bls->inputs != StateInputs::name) out["distances"] = outcome.bls->distances;
-  if (outcome.bls->inputs == BristlesInputs::name) {
-    out["stribeck_velocity"] = outcome.bls->stribeck;
-    out["share"] = outcome.bls->share;
+std::optional<TrainedJoint::Choice> choice_of(const TrainOutcome& outcome) {
+  if (!outcome.bls) return {};
+  const BroadLearningFit& bls = *outcome.bls;
+  TrainedJoint::Choice out;
+  out.by = outcome.by;
+  out.nodes = outcome.shape.nodes;
+  out.windows = outcome.shape.windows;
+  out.activation = outcome.shape.activation;
+  out.inputs = bls.inputs;
+  out.ridge = outcome.shape.ridge;
+  out.scale = outcome.shape.scale;
+  out.reference_velocity = bls.reference_velocity;
+  out.value = outcome.value;
+  if (bls.inputs != StateInputs::name) out.distances = {bls.distances.begin(), bls.distances.end()};
+  if (bls.inputs == BristlesInputs::name) {
+    out.stribeck_velocity = bls.stribeck;
+    out.share = bls.share;
   }
-  if (outcome.by == "pso") out["generations"] = outcome.generations;
+  if (outcome.by == "pso") out.generations = outcome.generations;
   return out;
 }
 

@@ -1,11 +1,11 @@
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "host_tools/regression/fitter.hpp"
+#include "host_tools/regression/metrics_result.hpp"
 #include "host_tools/support/progress.hpp"
 #include "host_tools/train/options.hpp"
 #include "host_tools/train/search.hpp"
@@ -25,8 +25,8 @@ struct TrainOutcome {
   std::optional<BroadLearningFit> bls;  ///< the same as scales and weights; none: no candidate was quiet enough
 };
 
-/// The choice for metrics.json; null where there is none.
-nlohmann::json choice_json(const TrainOutcome& outcome);
+/// The choice for metrics.json; none where there is none.
+std::optional<TrainedJoint::Choice> choice_of(const TrainOutcome& outcome);
 
 /// Fits a BLS on every joint together with the structure (joint least squares, ridge on the BLS's coefficients),
 /// chooses its hyperparameters by the held-out error, and keeps it only where that falls by at least 5 %, and where the

@@ -6,10 +6,9 @@
 #include <numbers>
 
 #include "host_tools/effects/broad_learning_types.hpp"
-#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/support/random.hpp"
 #include "host_tools/train/sparse_features.hpp"
-#include "model/effects/offset.hpp"
 
 namespace fxdyn {
 namespace {
@@ -100,7 +99,7 @@ JointFit BlsDesigner::operator()(const BlsShape& shape) const {
   // The constant half of every sigmoid.
   if (sigmoid && std::none_of(design.effects.begin(), design.effects.end(), is_constant)) {
     EffectFit offset;
-    offset.effect = Offset::name;
+    offset.effect = constant_effect().name;
     design.effects.push_back(offset);
   }
   bls.ridge = shape.ridge;

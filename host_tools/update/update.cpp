@@ -12,7 +12,7 @@
 #include "host_tools/identify/plausible.hpp"
 #include "host_tools/pipeline/one_log.hpp"
 #include "host_tools/project/provenance.hpp"
-#include "host_tools/regression/metrics.hpp"
+#include "host_tools/regression/metrics_result.hpp"
 #include "host_tools/regression/physical.hpp"
 #include "host_tools/simulate/recordings.hpp"
 #include "host_tools/support/error.hpp"
@@ -343,10 +343,10 @@ Update update(Pipeline& pipeline, const UpdateSettings& settings, const UpdateOp
   write_file(staging.path() / "model.json", to_json(updated).dump(1) + "\n");
   write_information(known, read_model(staging.path() / "model.json"), staging.path());
   if (const fs::path file = directory / "metrics.json"; fs::exists(file)) {
-    json metrics = json::parse(read_file(file));
-    metrics["logs"] = to_json(pipeline.stage_errors(updated, "update").logs);
-    metrics["notes"].push_back(updated.notes.back());
-    write_file(staging.path() / "metrics.json", metrics.dump(1) + "\n");
+    MetricsResult metrics = metrics_of(json::parse(read_file(file)));
+    metrics.logs = pipeline.stage_errors(updated, "update").logs;
+    metrics.notes.push_back(updated.notes.back());
+    write_file(staging.path() / "metrics.json", to_json(metrics).dump(1) + "\n");
   }
   result.accepted = true;
   result.tables_crc.after = updated.tables_crc;

@@ -6,10 +6,9 @@
 #include <complex>
 #include <numbers>
 
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
-#include "model/effects/elasticity.hpp"
-#include "model/effects/rotor_inertia.hpp"
 
 namespace fxdyn {
 namespace {
@@ -25,12 +24,12 @@ constexpr double rounding = 1e-9;  ///< of a mode without damping
 const JointFit& joint_of(const IdentifiedModel& model, Index j) { return model.joints[static_cast<std::size_t>(j)]; }
 
 double rotor(const IdentifiedModel& model, Index j) {
-  const EffectFit* fit = joint_of(model, j).find(RotorInertia::name);
+  const EffectFit* fit = rotor_of(joint_of(model, j));
   return fit == nullptr ? 0 : fit->linear[0];
 }
 
 const EffectFit* gear(const IdentifiedModel& model, Index j) {
-  const EffectFit* fit = joint_of(model, j).find(Elasticity::name);
+  const EffectFit* fit = compliance_of(joint_of(model, j));
   return fit != nullptr && fit->linear[0] > 0 ? fit : nullptr;
 }
 

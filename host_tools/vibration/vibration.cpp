@@ -7,6 +7,7 @@
 #include <numbers>
 #include <utility>
 
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/identify/structure.hpp"
@@ -23,7 +24,6 @@
 #include "host_tools/vibration/moves.hpp"
 #include "host_tools/vibration/outcome.hpp"
 #include "host_tools/vibration/shaper.hpp"
-#include "model/effects/elasticity.hpp"
 
 namespace fxdyn {
 namespace {
@@ -109,6 +109,7 @@ class Experiment {
     const std::vector<Move> moves = make_moves(model_, model_.tick_s, judged_moves);
     const bool bent = bends(model_);
     GateData data = read_gate_data(pipeline_.project(), pipeline_.directory());
+    const ThreadLimit limit(data.threads);
     Progress quiet;
     const IdentifiedModel friction = identify_structure(pipeline_.project(), data, coulomb_and_viscous, "wls", quiet);
     const IdentifiedModel rigid = rigid_part(friction);
@@ -225,7 +226,7 @@ class Experiment {
       if (entry.role != Role::train || !entry.scenario) continue;
       IdentifiedModel plant = read_scenario(*entry.scenario).plant;
       const bool bends = std::any_of(plant.joints.begin(), plant.joints.end(),
-                                     [](const JointFit& joint) { return joint.find(Elasticity::name) != nullptr; });
+                                     [](const JointFit& joint) { return compliance_of(joint) != nullptr; });
       if (!bends)
         fmt::print(stderr, "note: no gear of {} bends (effect \"elasticity\"): there is little to vibrate\n",
                    entry.scenario->string());
@@ -370,12 +371,27 @@ VibrationResult vibration(const fs::path& project, const fs::path& directory, co
   return result;
 }
 
+namespace {
+
+/// What `vibration` found before, if that is of the files that are there now.
+std::optional<VibrationResult> known_result(const fs::path& directory) {
+  const fs::path file = directory / "vibration.json";
+  if (!fs::exists(file)) return {};
+  const json content = json::parse(read_file(file));
+  try {
+    VibrationResult known = vibration_of(content);
+    if (is_unchanged(known.made_from, directory)) return known;
+  } catch (const json::exception&) {  // another version wrote it
+  }
+  return {};
+}
+
+}  // namespace
+
 VibrationResult vibration_with(const fs::path& project, const fs::path& directory, const Feedforward& drive,
                                const VibrationOptions& options) {
-  const fs::path file = directory / "vibration.json";
-  const json known = fs::exists(file) ? json::parse(read_file(file)) : json();
-  const bool current = !known.is_null() && is_unchanged(known.value("made_from", json()), directory);
-  const VibrationResult host = current ? vibration_of(known) : vibration(project, directory, options);
+  const std::optional<VibrationResult> known = known_result(directory);
+  const VibrationResult host = known ? *known : vibration(project, directory, options);
   return Experiment(project, directory, options).with_drive(host, drive);
 }
 

@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "tests/support/small_project.hpp"
 
@@ -99,10 +98,11 @@ TEST(Training, ABlsLearnsWhatNoEffectExplains) {
   EXPECT_TRUE(training.outcomes[0].kept);
   EXPECT_LT(training.outcomes[0].error_with, 0.5 * training.outcomes[0].error_without);
   EXPECT_TRUE(training.model.joints[0].bls);
-  const nlohmann::json file = outcomes_json(training.outcomes, plant.robot);
-  EXPECT_EQ(file.at(0).at("joint"), "joint_1");
-  EXPECT_EQ(file.at(0).at("held_out_with"), training.outcomes[0].error_with);
-  EXPECT_EQ(file.at(0).at("kept"), true);
+  const TrainedJoint joint = trained_joints(training.outcomes, plant.robot).at(0);
+  EXPECT_EQ(joint.joint, "joint_1");
+  EXPECT_EQ(joint.held_out_with, training.outcomes[0].error_with);
+  EXPECT_TRUE(joint.kept);
+  EXPECT_EQ(joint.choice->nodes, training.outcomes[0].shape.nodes);
 }
 
 TEST(Training, RigidErrorsAreOfTheBodiesAlone) {

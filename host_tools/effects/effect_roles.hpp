@@ -1,0 +1,30 @@
+#pragma once
+
+#include <string_view>
+
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/joint_fit.hpp"
+
+// Effects that some part of the host needs, found by what they declare rather than by their names.
+
+namespace fxdyn {
+
+/// A mass [kg] at a centre [m], fixed to the last link.
+const EffectInfo& load_effect();
+bool is_load(std::string_view effect);
+/// Rotor and gears in front of the load: base parameters may hold it.
+const EffectInfo& rotor_effect();
+/// The nominal friction that turns with the sign of the velocity: amplitude s.
+const EffectInfo& dry_friction_effect();
+/// The nominal friction in proportion to the velocity.
+const EffectInfo& viscous_friction_effect();
+/// The nominal torque that never changes.
+const EffectInfo& constant_effect();
+/// Whether it bends the gear in proportion to the load.
+bool is_compliance(const EffectInfo& info);
+
+/// The joint's own; null: it has none.
+const EffectFit* dry_friction_of(const JointFit& joint);
+const EffectFit* compliance_of(const JointFit& joint);
+
+}  // namespace fxdyn
