@@ -4,10 +4,10 @@
 #include <cmath>
 
 #include "host_tools/diagnose/models.hpp"
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/solver.hpp"
-#include "model/effects/payload.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
@@ -83,7 +83,7 @@ void add_deviations(Models& models, const Linearised& problem) {
           const auto i = static_cast<Index>(c);
           place = std::sqrt(std::max(0.0, variance + covariance(i - 1, i - 1) + 2 * covariance(i - 1, i)));
         }
-        if (effect.effect == Payload::name && u.index > 0) place = std / std::max(effect.linear[0], 1e-9);
+        if (is_load(effect.effect) && u.index > 0) place = std / std::max(effect.linear[0], 1e-9);
       }
     }
   }

@@ -21,7 +21,6 @@
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/error.hpp"
-#include "model/effects/payload.hpp"
 
 namespace fxdyn {
 namespace {

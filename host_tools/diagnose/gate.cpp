@@ -6,12 +6,12 @@
 
 #include "host_tools/diagnose/deviations.hpp"
 #include "host_tools/diagnose/refit.hpp"
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/parallel.hpp"
-#include "model/effects/payload.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
@@ -150,7 +150,7 @@ bool holds(const Outcome& outcome, const Group& group, const HeldOut& held, std:
   const double brings = held.alone[i].sum();
   if (brings <= options.least_gain) return false;
   // At its bound a load is what would weigh less than nothing.
-  if (group.candidate.effect == Payload::name && outcome.models.current.body[group.id.effect].linear[0] <= least_mass)
+  if (is_load(group.candidate.effect) && outcome.models.current.body[group.id.effect].linear[0] <= least_mass)
     return false;
   if (group.on_body) return true;
   const std::size_t j = group.candidate.joint;

@@ -176,7 +176,7 @@ int run(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : 2;
   }
   // Cases side by side: each diagnosis keeps to its core.
-  most_threads = 1;
+  const ThreadLimit alone(1);
   setenv("FXDYN_THREADS", "1", 1);
   std::vector<Case> cases = threshold_cases();
   std::vector<Threshold> thresholds = deciding_thresholds();
