@@ -170,6 +170,47 @@ class Judge(unittest.TestCase):
             self.assertNotIn('constexpr int doubled = 3 * limit;', passed | set(killed))
         together.LEAST_TIME_S = short
 
+    # The switch makes a double of what was an int: the compiler complains of the caller, where no mutant is.
+    TYPES = '''#pragma once
+namespace toy {
+struct Coins {
+  int n;
+};
+constexpr int operator+(Coins a, Coins b) { return a.n + b.n; }
+constexpr double operator-(Coins a, Coins b) { return a.n - b.n; }
+constexpr auto together(Coins a, Coins b) { return a + b; }
+}  // namespace toy
+'''
+
+    def test_a_switch_that_breaks_the_build_is_taken_out(self):
+        test = ('#include "model/toy.hpp"\nint main(int n, char**) {\n'
+                '  return toy::together({n}, {5}) % 7 == 6 ? 0 : 1;\n}\n')
+        with self.project(test) as (judge, _):
+            judge.tree._write('model/toy.hpp', self.TYPES)
+            listed = mutate.mutants_of('model/toy.hpp', self.TYPES)
+            breaking = next(n for n, m in enumerate(listed) if 'together' in m.line and 'a - b' in m.becomes)
+            told = []
+            judging = together.Together(judge.tree, listed, told.append)
+            killed = {n for n, _, _ in judging.judge(judge.settings.programs)}
+            self.assertEqual(judging.out, {breaking})
+            self.assertIn('by halving', told[0])
+            self.assertIn('constexpr int operator+(Coins a, Coins b) { return a.n - b.n; }',
+                          {listed[n].becomes for n in killed})
+
+    def test_a_program_that_fails_with_all_switches_off_is_left_to_the_ordinary_way(self):
+        for test in (TEST.replace('n == 3', 'n == 4'), TEST.replace('n == 3', 'm == 3')):
+            with self.project(test) as (judge, _):
+                listed, told = mutate.mutants_of('model/toy.hpp', HEADER), []
+                judging = together.Together(judge.tree, listed, told.append)
+                self.assertEqual(list(judging.judge(judge.settings.programs)), [])
+                self.assertIn('with all switches off', told[-1])
+                self.assertEqual(set(judging.not_asked), set(range(len(listed))) - judging.out)
+
+    def test_the_first_of_many_messages_is_kept_where_asked_for(self):
+        command = [sys.executable, '-c', 'print("first"); print("x" * 30_000)']
+        self.assertIn('first', programs.run_limited(command, '.', 10, kept=together.KEPT_OUTPUT)[1])
+        self.assertEqual(len(programs.run_limited(command, '.', 10)[1]), programs.KEPT_OUTPUT)
+
     def test_in_switched_text_every_line_stays_where_it_was(self):
         text = ('int f(int a, int b) {\n  if (a < b) return a;\n  while (a > b)\n    a -= b;\n'
                 '  return g(a ? 1 : b + 2);\n}\n')
