@@ -210,6 +210,7 @@ class Together:
         self.passed = collections.defaultdict(set)      # number: programs that reach it and pass all the same
         self.not_asked = collections.defaultdict(set)   # number: programs that see its file and have not been run with it
         self.lines = {}                                 # file: {line: numbers}
+        self.seen = {}                                  # program's name: files; a change leaves #include alone
         self.original = {f: tree.text(f) for f in {m.file for m in mutants}}
         (tree.root / 'fxdyn_switch.hpp').write_text(HEADER % len(mutants))
         for file in self.original:
@@ -259,7 +260,7 @@ class Together:
         again and again. False where the source is not compiled without any either."""
         before = set(self.out)
         every = [n for n, m in enumerate(self.mutants)
-                 if n not in before and m.file in self.tree._files_of(program, source)]
+                 if n not in before and self._sees(program, m.file)]
         files = {self.mutants[n].file for n in every}
 
         def write(without):
@@ -315,7 +316,7 @@ class Together:
         while waiting:
             program = max(waiting, key=lambda p: self._worth(p, left - self.out))
             waiting.remove(program)
-            seen = {n for n in left - self.out if self.tree.program_sees(program, self.mutants[n].file)}
+            seen = {n for n in left - self.out if self._sees(program, self.mutants[n].file)}
             if not seen:
                 continue
             if time.monotonic() > deadline:
@@ -351,8 +352,13 @@ class Together:
         for number in seen:
             self.not_asked[number].add(program.name)
 
+    def _sees(self, program, file):
+        if program.name not in self.seen:
+            self.seen[program.name] = set().union(*(self.tree._files_of(program, s) for s in program.sources))
+        return file in self.seen[program.name]
+
     def _worth(self, program, left):
         """What it may kill for its time: more where it tests the mutant's own folder."""
-        seen = [self.mutants[n] for n in left if self.tree.program_sees(program, self.mutants[n].file)]
+        seen = [self.mutants[n] for n in left if self._sees(program, self.mutants[n].file)]
         hope = sum(1 if any(s.startswith(f'tests/{m.file.split("/")[0]}/') for s in program.sources) else 0.4 for m in seen)
         return hope / program.seconds
