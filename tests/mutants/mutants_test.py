@@ -222,6 +222,14 @@ constexpr auto together(Coins a, Coins b) { return a + b; }
             self.assertIn(number, lines[mutant.line_number])
         self.assertIn('{ if (!(', switched)
 
+    def test_switches_that_are_off_change_nothing(self):
+        text = 'void f() {\n  a += b *= c / d;\n}\n'
+        listed = [(n, m) for n, m in enumerate(mutate.mutants_of('toy.hpp', text)) if m.operator == 'assignment']
+        self.assertEqual([m.becomes for _, m in listed], ['a -= b *= c / d;', 'a += b += c / d;'])
+        line = together.switched(text, listed)[0].split('\n')[1].strip()
+        self.assertEqual(line.replace('fxdyn_mutants::', ''),
+                         '(on(1) ? (a -= b *= c / d) : (a += (on(2) ? (b += c / d) : (b *= c / d))));')
+
     def test_after_the_deadline_nothing_more_is_asked(self):
         with self.project() as (judge, _):
             listed = mutate.mutants_of('model/toy.hpp', HEADER)

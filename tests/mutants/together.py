@@ -122,9 +122,12 @@ def _rightmost(source, i, asks):
         i = source.partner[i]
     depth = 1 if asks else 0
     depth += tokens[i].text == '?'
+    assigns = tokens[i].text in ASSIGNMENTS  # a += b *= c is a += (b *= c)
     while i + 1 < len(tokens):
         after = tokens[i + 1]
-        if after.text in (',', ';') or after.text in mutate.CLOSING or after.text in ASSIGNMENTS or after.text == ']]':
+        if after.text in (',', ';') or after.text in mutate.CLOSING or after.text == ']]':
+            break
+        if after.text in ASSIGNMENTS and not assigns:
             break
         if after.text == ':':
             if depth == 0:
