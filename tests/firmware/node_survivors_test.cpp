@@ -233,6 +233,14 @@ TEST(NodeSurvivors, WhatCameBeforeOperationWasLeftIsNoCostOfTheNextTick) {
   EXPECT_EQ(cost_after_a_pause(20), cost_after_a_pause(0));
 }
 
+// CiA 301, 7.2.4.3: expedited, e = 1 and s = 0, the four bytes of the frame; more of them it does not have.
+TEST(NodeSurvivors, AnExpeditedTextWithoutASizeHasFourBytes) {
+  Bench<> bench;
+  bench.poll();
+  ASSERT_EQ(abort_of(bench.request({0x22, 0x03, 0x20, 0, 'a', 'r', 'm', '1'})), Abort::none);
+  EXPECT_EQ(bench.text(0x2003), "arm1");
+}
+
 // CiA 301, 7.2.4.3: 0504 0001h, command specifier not valid. The last segment ended the transfer.
 TEST(NodeSurvivors, ASegmentAfterTheLastOneIsRefused) {
   Bench<> bench;

@@ -56,6 +56,17 @@ TEST(SerialProtocol, BytesOnTheWire) {
   EXPECT_EQ(detail::load(std::span{bytes}.subspan(8, 4)), 0xB5C203B5U);
 }
 
+// An answer has the number of its request and bit 7; a refusal answers any.
+TEST(SerialProtocol, NumbersOfTheTypes) {
+  EXPECT_EQ(frame(Type::hello, {})[2], 0x01);
+  EXPECT_EQ(frame(Type::tick, {})[2], 0x02);
+  EXPECT_EQ(frame(Type::reset, {})[2], 0x03);
+  EXPECT_EQ(frame(Type::identity, {})[2], 0x81);
+  EXPECT_EQ(frame(Type::torque, {})[2], 0x82);
+  EXPECT_EQ(frame(Type::reset_done, {})[2], 0x83);
+  EXPECT_EQ(frame(Type::refused, {})[2], 0x84);
+}
+
 TEST(SerialProtocol, RoundTripInPiecesOfAnySize) {
   Bytes stream;
   std::vector<std::vector<std::uint32_t>> sent;
@@ -99,6 +110,20 @@ TEST(SerialProtocol, TruncatedFrameCostsNoOtherFrame) {
     const auto frames = read(reader, stream, 11);
     EXPECT_EQ(frames.size(), 3U) << kept << " bytes kept";
     EXPECT_EQ(reader.corrupt_frames(), 1U) << kept << " bytes kept";
+  }
+}
+
+// Whatever else is right: another protocol may have the same check sum.
+TEST(SerialProtocol, AFrameBeginsWithBothSyncBytes) {
+  for (const std::size_t at : {0U, 1U}) {
+    Bytes bytes = frame(Type::tick, {0x04030201U});
+    bytes[at] ^= 0x10;
+    Crc32 crc;
+    for (const std::size_t word : {0U, 4U}) crc.add(detail::load(std::span{bytes}.subspan(word, 4)));
+    detail::store(std::span{bytes}.subspan(8, 4), crc.value());
+    Reader reader;
+    EXPECT_EQ(read(reader, bytes).size(), 0U) << at;
+    EXPECT_EQ(reader.corrupt_frames(), 1U) << at;
   }
 }
 

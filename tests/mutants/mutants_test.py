@@ -141,6 +141,14 @@ class Judge(unittest.TestCase):
             self.assertEqual((root / 'model/toy.hpp').read_text(), HEADER)
         programs.LEAST_TIME_S = short
 
+    def test_a_loop_without_an_end_in_the_compiler_is_a_failed_check(self):
+        header = 'constexpr int sum() {\n  int s = 0;\n  for (int i = 0; i < 3; ++i) s += i;\n  return s;\n}\n'
+        with self.project('#include "model/toy.hpp"\nstatic_assert(sum() == 3);\nint main() {}\n') as (judge, _):
+            judge.tree._write('model/toy.hpp', header)
+            endless = self.verdict(judge, 'for (int i = 0; i < 3; ++i) s += i;', 'for (int i = 0; i < 3; --i) s += i;')
+            self.assertEqual(endless['result'], 'killed')
+            self.assertIn('loop iteration', endless['why'])
+
     def test_what_no_quick_program_sees_is_undecided_in_a_quick_run(self):
         change = ('if (x < limit) return limit;', 'if (x >= limit) return limit;')
         with self.project() as (judge, _):

@@ -16,7 +16,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"', re.MULTILINE)
 # What the compiler says where a check at compile time fails: a test like any other. Every other error only says that
 # the change makes no program.
 FAILED_CHECK = re.compile(r'static assertion failed|non-constant condition|not a constant expression|in a constant expr|'
-                          r'overflow in constant|outside the bounds|non-.?constexpr.? function|constexpr loop iteration|'
+                          r'overflow in constant|outside the bounds|non-.?constexpr.? function|constexpr\W? loop iteration|'
                           r'constexpr evaluation|call to consteval|accessing uninitialized member|constraints not satisfied')
 SANITIZERS = ['-fsanitize=address,undefined', '-fno-sanitize-recover=all']
 OUT_OF_TIME = 'out of time'
