@@ -551,6 +551,7 @@ TYPED_TEST(Iwdg, ItsTimeHoldsOverTheWholeRangeOfItsOscillator) {
 
 // What the guide says.
 static_assert(stm32g4::Watchdog::longest_ms(50) == 62 && stm32f4::Watchdog::longest_ms(50) == 142);
+static_assert(stm32::BasicWatchdog<stm32::LsiRange{4'000, 4'000}>::longest_ms(50) == 51, "51 counts of 1 ms each");
 static_assert(stm32g4::lsi.lowest_hz <= 29'500 && stm32g4::lsi.highest_hz >= 34'000, "DS12288");
 static_assert(stm32f4::lsi.lowest_hz <= 17'000 && stm32f4::lsi.highest_hz >= 47'000, "DS8626");
 
