@@ -56,17 +56,6 @@ TEST(SerialProtocol, BytesOnTheWire) {
   EXPECT_EQ(detail::load(std::span{bytes}.subspan(8, 4)), 0xB5C203B5U);
 }
 
-// An answer has the number of its request and bit 7; a refusal answers any.
-TEST(SerialProtocol, NumbersOfTheTypes) {
-  EXPECT_EQ(frame(Type::hello, {})[2], 0x01);
-  EXPECT_EQ(frame(Type::tick, {})[2], 0x02);
-  EXPECT_EQ(frame(Type::reset, {})[2], 0x03);
-  EXPECT_EQ(frame(Type::identity, {})[2], 0x81);
-  EXPECT_EQ(frame(Type::torque, {})[2], 0x82);
-  EXPECT_EQ(frame(Type::reset_done, {})[2], 0x83);
-  EXPECT_EQ(frame(Type::refused, {})[2], 0x84);
-}
-
 TEST(SerialProtocol, RoundTripInPiecesOfAnySize) {
   Bytes stream;
   std::vector<std::vector<std::uint32_t>> sent;
