@@ -331,6 +331,7 @@ TEST_F(XcanTest, FramesStandAsInTheManual) {
 TEST_F(XcanInQemu, FramesStandAsInItsModel) {
   ASSERT_EQ(can.start(xcan_timing, 1000), Status::ok);
   sends_and_receives({.id = 0x181, .size = 5, .data = {1, 2, 3, 4, 5}}, {0x181, 5U << 28, 0x04030201, 0x00000005});
+  sends_and_receives({.id = 0x182}, {0x182, 0, 0, 0});  // an identifier whose lowest bit is 0
   sends_and_receives({.id = 0x1fffffff, .extended = true, .remote = true}, {0xdfffffffU, 0, 0, 0});
 }
 
