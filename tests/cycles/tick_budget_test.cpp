@@ -52,6 +52,8 @@ TEST(TickBudget, CountsCyclesAndInstructions) {
   constexpr TickBudget budget{.clock_hz = 100'000'000, .tick_us = 1000};  // 100 000 cycles
   EXPECT_EQ(budget.load_percent(Cycles{50'000}), 50);
   EXPECT_EQ(budget.load_percent(Cycles{50'001}), 51);
+  EXPECT_EQ(budget.load_percent(Cycles{}), 0) << "nothing takes no time";
+  EXPECT_TRUE(budget.allows(Instructions{}, CyclesPerInstruction{10'000'000'000}));
   EXPECT_TRUE(budget.allows(Cycles{50'000}));
   EXPECT_FALSE(budget.allows(Cycles{50'001}));
   EXPECT_TRUE(budget.allows(Instructions{25'000}, CyclesPerInstruction{200}));

@@ -79,19 +79,21 @@ TEST(ErrorLog, TellsAnErrorOnceAndThatItIsGone) {
   EXPECT_FALSE(log.next(message));
 }
 
+// 100 ms after it last happened (decision 6).
 TEST(ErrorLog, EventsEndByThemselves) {
+  constexpr std::uint32_t event_us = 100'000;
   ErrorLog log;
   const std::uint32_t start = 0xFFFF'FF00;  // the clock wraps on the way
   log.raise(Error::overrun, 0, start);
-  log.serve(start + ErrorLog::event_us - 1);
+  log.serve(start + event_us - 1);
   EXPECT_TRUE(log.any());
   log.raise(Error::overrun, 0, start + 50'000);
-  log.serve(start + ErrorLog::event_us);
+  log.serve(start + event_us);
   EXPECT_TRUE(log.any());
-  log.serve(start + 50'000 + ErrorLog::event_us);
+  log.serve(start + 50'000 + event_us);
   EXPECT_FALSE(log.any());
   log.raise(Error::tables, 0, start);
-  log.serve(start + 10 * ErrorLog::event_us);
+  log.serve(start + 10 * event_us);
   EXPECT_TRUE(log.any());
 }
 

@@ -183,6 +183,76 @@ TEST(NodeSurvivors, EveryStretchIsMeasuredOnce) {
   EXPECT_EQ(cost_in_thousands(bench, 3), all) << m << ' ' << n;
 }
 
+// A tick and a half after the last SYNC, when the next one is overdue, and not before.
+TEST(NodeSurvivors, OutOfOperationTheTorqueIsReleasedATickAndAHalfAfterTheLastOne) {
+  Bench<> bench;
+  bench.start();
+  std::size_t k = 0;
+  while (k < 60) bench.tick(test::motion(k++));
+  bench.send_setpoints(test::motion(k));
+  bench.sync();
+  const std::int32_t held = bench.node.torque(1);
+  ASSERT_NE(held, 0);
+  bench.nmt(canopen::NmtCommand::enter_pre_operational);
+  bench.pass(2999);
+  EXPECT_EQ(bench.node.torque(1), held);
+  bench.pass(1);
+  EXPECT_LT(std::abs(bench.node.torque(1)), std::abs(held));
+}
+
+TEST(NodeSurvivors, TheTickCountIsOfAllTicksSinceTheStart) {
+  Bench<> bench;
+  bench.start();
+  std::uint32_t ticks = 0;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const auto torques = k == 2 ? bench.tick_without_setpoints() : bench.tick(test::motion(k));
+    ++ticks;
+    ASSERT_EQ(torques.size(), 6U);
+    for (const auto& torque : torques) EXPECT_EQ(torque.tick, ticks);
+    EXPECT_EQ(bench.counted(dictionary::Counter::ticks) + bench.counted(dictionary::Counter::stale_ticks), ticks);
+  }
+}
+
+/// What all of the first tick costs after `frames` foreign ones that came before operation was left, and a start anew.
+std::uint32_t cost_after_a_pause(int frames) {
+  Bench<> bench;
+  bench.start();
+  bench.tick(test::motion(0));
+  for (int i = 0; i < frames; ++i) {
+    bench.send(0x7E5, {});
+    bench.poll();
+  }
+  bench.on_wire.counter.start_over();
+  bench.nmt(canopen::NmtCommand::enter_pre_operational);
+  bench.nmt(canopen::NmtCommand::start);
+  bench.tick(test::motion(1));
+  return cost_in_thousands(bench, 3);
+}
+
+TEST(NodeSurvivors, WhatCameBeforeOperationWasLeftIsNoCostOfTheNextTick) {
+  EXPECT_EQ(cost_after_a_pause(20), cost_after_a_pause(0));
+}
+
+// CiA 301, 7.2.4.3: expedited, e = 1 and s = 0, the four bytes of the frame; more of them it does not have.
+TEST(NodeSurvivors, AnExpeditedTextWithoutASizeHasFourBytes) {
+  Bench<> bench;
+  bench.poll();
+  ASSERT_EQ(abort_of(bench.request({0x22, 0x03, 0x20, 0, 'a', 'r', 'm', '1'})), Abort::none);
+  EXPECT_EQ(bench.text(0x2003), "arm1");
+}
+
+// CiA 301, 7.2.4.3: 0504 0001h, command specifier not valid. The last segment ended the transfer.
+TEST(NodeSurvivors, ASegmentAfterTheLastOneIsRefused) {
+  Bench<> bench;
+  bench.poll();
+  ASSERT_EQ(bench.write_segments(0x2003, 0, {'1', '2', '3', '4', '5', '6', '7'}), Abort::none);
+  bench.request(Bench<>::initiate(0x40, 0x2003, 0));
+  const Bytes only = bench.request({0x60, 0, 0, 0, 0, 0, 0, 0});
+  ASSERT_EQ(only.size(), 8U);
+  EXPECT_EQ(only[0], 0x01) << "seven bytes, and no more";
+  EXPECT_EQ(abort_of(bench.request({0x70, 0, 0, 0, 0, 0, 0, 0})), Abort::unknown_command);
+}
+
 // Object 0x2000:8 and the detail of an EMCY: numbers on the wire, which no version may change.
 TEST(NodeSurvivors, TheNumbersOfAnUpdatesStateAreThoseOfTheGuide) {
   EXPECT_EQ(static_cast<int>(UpdateSlot::empty), 0);

@@ -102,6 +102,20 @@ TEST(SerialProtocol, TruncatedFrameCostsNoOtherFrame) {
   }
 }
 
+// Whatever else is right: another protocol may have the same check sum.
+TEST(SerialProtocol, AFrameBeginsWithBothSyncBytes) {
+  for (const std::size_t at : {0U, 1U}) {
+    Bytes bytes = frame(Type::tick, {0x04030201U});
+    bytes[at] ^= 0x10;
+    Crc32 crc;
+    for (const std::size_t word : {0U, 4U}) crc.add(detail::load(std::span{bytes}.subspan(word, 4)));
+    detail::store(std::span{bytes}.subspan(8, 4), crc.value());
+    Reader reader;
+    EXPECT_EQ(read(reader, bytes).size(), 0U) << at;
+    EXPECT_EQ(reader.corrupt_frames(), 1U) << at;
+  }
+}
+
 TEST(SerialProtocol, RandomBytesGiveNoFrame) {
   Random random(1);
   Reader reader;

@@ -60,6 +60,10 @@ static_assert(is(bit_timing(coarse, 8, {1, 750, 25, 4}), 1, 5, 2), "as 2 quanta 
 static_assert(is(bit_timing(coarse, 8, {1, 687, 100}), 1, 4, 3) && is(bit_timing(coarse, 8, {1, 688, 100}), 1, 5, 2));
 static_assert(bit_timing(tiny, 8, {1, 500, 25}).jump_width == 2 && bit_timing(tiny, 8, {1, 875}).jump_width == 1);
 
+// The fields of XCAN's BTR hold one less (UG1085, "Baud rate and bit timing"): 0 is a segment of one quantum.
+static_assert(is(bit_timing(zynqmp_r5::can_limits, 8, {1, 250}), 1, 1, 6), "the shortest segment 1");
+static_assert(is(bit_timing(zynqmp_r5::can_limits, 8, {1, 875}), 1, 6, 1), "the shortest segment 2");
+
 // What there is no timing for does not compile.
 template <BitTimingLimits limits, std::uint32_t clock_hz, BitRate wanted>
 concept Possible = requires {

@@ -331,6 +331,7 @@ TEST_F(XcanTest, FramesStandAsInTheManual) {
 TEST_F(XcanInQemu, FramesStandAsInItsModel) {
   ASSERT_EQ(can.start(xcan_timing, 1000), Status::ok);
   sends_and_receives({.id = 0x181, .size = 5, .data = {1, 2, 3, 4, 5}}, {0x181, 5U << 28, 0x04030201, 0x00000005});
+  sends_and_receives({.id = 0x182}, {0x182, 0, 0, 0});  // an identifier whose lowest bit is 0
   sends_and_receives({.id = 0x1fffffff, .extended = true, .remote = true}, {0xdfffffffU, 0, 0, 0});
 }
 
@@ -551,6 +552,7 @@ TYPED_TEST(Iwdg, ItsTimeHoldsOverTheWholeRangeOfItsOscillator) {
 
 // What the guide says.
 static_assert(stm32g4::Watchdog::longest_ms(50) == 62 && stm32f4::Watchdog::longest_ms(50) == 142);
+static_assert(stm32::BasicWatchdog<stm32::LsiRange{4'000, 4'000}>::longest_ms(50) == 51, "51 counts of 1 ms each");
 static_assert(stm32g4::lsi.lowest_hz <= 29'500 && stm32g4::lsi.highest_hz >= 34'000, "DS12288");
 static_assert(stm32f4::lsi.lowest_hz <= 17'000 && stm32f4::lsi.highest_hz >= 47'000, "DS8626");
 

@@ -265,5 +265,12 @@ TEST(ByHand, ANumberInAnotherFormatIsTheSameNumber) {
   EXPECT_EQ(N::convert<Fixed<16>>(Fixed<20>{-40}).raw, -2);
 }
 
+TEST(ByHand, ACrossProduct) {
+  const auto c = cross(Vector3<double>{1, 2, 3}, Vector3<double>{4, 5, 6});
+  EXPECT_EQ(c.x, -3);
+  EXPECT_EQ(c.y, 6);
+  EXPECT_EQ(c.z, -3);
+}
+
 }  // namespace
 }  // namespace fxdyn

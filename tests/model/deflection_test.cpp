@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "model/effects/elasticity.hpp"
 #include "model/joint_model.hpp"
 
 namespace fxdyn {
@@ -64,6 +65,16 @@ TEST(Deflection, AtTheStartThereIsNothingToGoOnWith) {
   state.step({}, 1e-3, 1 / tick, wide(), saturations);
   state.skip(1, 1 / tick, saturations);
   EXPECT_EQ(state.step({}, 2e-3, 1 / tick, wide(), saturations).dq, 0);
+}
+
+// Decision 6: over ticks that had no setpoints an elastic load goes on as it went.
+TEST(Deflection, AnElasticLoadGoesOnAsItWent) {
+  for (const std::uint32_t times : {0U, 1U, 2U, 3U}) {
+    Elasticity::State<Real> state{.load = 2, .change = -0.75, .ticks = 1};
+    Saturations saturations;
+    Elasticity::skip<Real>(state, times, saturations);
+    EXPECT_EQ(state.load, 2 - 0.75 * times) << times;
+  }
 }
 
 }  // namespace

@@ -35,6 +35,10 @@ TEST(EffectDeclarations, ListsAreThoseOfTheTraits) {
   EXPECT_EQ(named([](const EffectInfo& info) { return info.several; }), (Names{"ripple", "joint_coupling"}));
   EXPECT_EQ(named([](const EffectInfo& info) { return info.share; }), (Names{"saturation", "delay"}));
   EXPECT_EQ(named([](const EffectInfo& info) { return info.unites_others(); }), (Names{"lugre"}));
+  EXPECT_EQ(named([](const EffectInfo& info) { return info.friction; }),
+            (Names{"viscous", "coulomb", "offset", "stribeck", "presliding", "asymmetric_friction", "viscous_quadratic",
+                   "viscous_cubic", "load_friction", "friction_drift", "lugre"}))
+      << "differs from day to day";
 }
 
 TEST(EffectDeclarations, WhatIsNamedElsewhereIsInTheCatalogue) {
@@ -196,6 +200,13 @@ TEST(Shapes, VelocitiesBeginAboveTheSign) {
   EXPECT_NEAR(values[4], std::sqrt(0.015 * 0.4), 1e-12) << "equal ratios";
   s.sign_width = 1;
   EXPECT_DOUBLE_EQ(shapes::velocity.tried(s)[0], 0.2) << "however wide the sign is";
+}
+
+TEST(Shapes, ARobotOfOneJointHasNoOthers) {
+  const MotionScales alone;
+  EXPECT_EQ(list(shapes::other_joint.tried(alone)), std::vector<double>{});
+  EXPECT_EQ(list(shapes::other_joint.judged(alone)), std::vector<double>{});
+  EXPECT_EQ(list(shapes::neighbour.judged(alone)), std::vector<double>{});
 }
 
 TEST(Shapes, OtherJointsAndMates) {

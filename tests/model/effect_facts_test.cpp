@@ -3,11 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "model/broad_learning.hpp"
 #include "model/broad_learning_inputs.hpp"
 #include "model/catalogue.hpp"
 
@@ -116,6 +119,30 @@ TEST(EffectFacts, APayloadIsAPointMass) {
   EXPECT_EQ((std::array{link.h.x, link.h.y, link.h.z}), (std::array{5.0, 12.0, 18.0}));
   EXPECT_EQ((std::array{link.xx, link.yy, link.zz}), (std::array{19.0, 54.0, 114.0}));
   EXPECT_EQ((std::array{link.xy, link.xz, link.yz}), (std::array{28.0, 38.0, 78.0}));
+}
+
+// up <- Ry(b) Rx(a) up, its matrices written out.
+TEST(EffectFacts, ATiltTurnsUpAboutXAndThenAboutY) {
+  const double a = 0.3, b = -0.2;
+  const Vector3<double> up{0.2, -0.5, 0.7};
+  const Vector3<double> after_x{up.x, std::cos(a) * up.y - std::sin(a) * up.z, std::sin(a) * up.y + std::cos(a) * up.z};
+  const Vector3<double> turned = GravityTilt::turn(up, a, b);
+  EXPECT_NEAR(turned.x, std::cos(b) * after_x.x + std::sin(b) * after_x.z, 1e-15);
+  EXPECT_NEAR(turned.y, after_x.y, 1e-15);
+  EXPECT_NEAR(turned.z, std::cos(b) * after_x.z - std::sin(b) * after_x.x, 1e-15);
+}
+
+template <class Nodes>
+void expect_the_largest_slope() {
+  for (double from = 0; from <= 3; from += 0.25) {
+    double largest = 0;
+    for (double x = from; x < 4; x += 1e-4) largest = std::max(largest, (Nodes::of(x + 1e-4) - Nodes::of(x)) / 1e-4);
+    EXPECT_NEAR(Nodes::steepest(from), largest, 1e-4) << Nodes::name << " beyond " << from;
+  }
+}
+TEST(EffectFacts, TheSteepestSlopesAreThoseOfTheCurves) {
+  expect_the_largest_slope<TanhNodes>();
+  expect_the_largest_slope<RampNodes>();
 }
 
 TEST(EffectFacts, ScalesOfBroadLearningAreStoredAsTheirReciprocals) {

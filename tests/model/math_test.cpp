@@ -121,6 +121,8 @@ TEST(Math, HalfOfASumIsExact) {
   static_assert(std::is_same_v<decltype(half_of(a + b)), Wide<29>>);
   EXPECT_EQ(signed_as(Fixed<30>{7}, Wide<28>{std::int64_t{-1} << 40}).raw, -7);
   EXPECT_EQ(signed_as(Fixed<30>{7}, Wide<28>{0}).raw, 7);
+  EXPECT_EQ(signed_as(7.0, -1e-9), -7);
+  EXPECT_EQ(signed_as(7.0, 0.0), 7) << "as in fixed point";
 }
 
 TEST(Math, MagnitudeAndSignAreTotal) {

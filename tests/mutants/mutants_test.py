@@ -141,6 +141,14 @@ class Judge(unittest.TestCase):
             self.assertEqual((root / 'model/toy.hpp').read_text(), HEADER)
         programs.LEAST_TIME_S = short
 
+    def test_a_loop_without_an_end_in_the_compiler_is_a_failed_check(self):
+        header = 'constexpr int count() {\n  int n = 0;\n  while (n < 3) n += 1;\n  return n;\n}\n'
+        with self.project('#include "model/toy.hpp"\nconstexpr int n = count();\nint main() { return n - 3; }\n') as (judge, _):
+            judge.tree._write('model/toy.hpp', header)
+            endless = self.verdict(judge, 'while (n < 3) n += 1;', 'while (n < 3) n += 0;')
+            self.assertEqual(endless['result'], 'killed')
+            self.assertIn('loop iteration', endless['why'])
+
     def test_what_no_quick_program_sees_is_undecided_in_a_quick_run(self):
         change = ('if (x < limit) return limit;', 'if (x >= limit) return limit;')
         with self.project() as (judge, _):
@@ -170,6 +178,47 @@ class Judge(unittest.TestCase):
             self.assertNotIn('constexpr int doubled = 3 * limit;', passed | set(killed))
         together.LEAST_TIME_S = short
 
+    # The switch makes a double of what was an int: the compiler complains of the caller, where no mutant is.
+    TYPES = '''#pragma once
+namespace toy {
+struct Coins {
+  int n;
+};
+constexpr int operator+(Coins a, Coins b) { return a.n + b.n; }
+constexpr double operator-(Coins a, Coins b) { return a.n - b.n; }
+constexpr auto together(Coins a, Coins b) { return a + b; }
+}  // namespace toy
+'''
+
+    def test_a_switch_that_breaks_the_build_is_taken_out(self):
+        test = ('#include "model/toy.hpp"\nint main(int n, char**) {\n'
+                '  return toy::together({n}, {5}) % 7 == 6 ? 0 : 1;\n}\n')
+        with self.project(test) as (judge, _):
+            judge.tree._write('model/toy.hpp', self.TYPES)
+            listed = mutate.mutants_of('model/toy.hpp', self.TYPES)
+            breaking = next(n for n, m in enumerate(listed) if 'together' in m.line and 'a - b' in m.becomes)
+            told = []
+            judging = together.Together(judge.tree, listed, told.append)
+            killed = {n for n, _, _ in judging.judge(judge.settings.programs)}
+            self.assertEqual(judging.out, {breaking})
+            self.assertIn('by halving', told[0])
+            self.assertIn('constexpr int operator+(Coins a, Coins b) { return a.n - b.n; }',
+                          {listed[n].becomes for n in killed})
+
+    def test_a_program_that_fails_with_all_switches_off_is_left_to_the_ordinary_way(self):
+        for test in (TEST.replace('n == 3', 'n == 4'), TEST.replace('n == 3', 'm == 3')):
+            with self.project(test) as (judge, _):
+                listed, told = mutate.mutants_of('model/toy.hpp', HEADER), []
+                judging = together.Together(judge.tree, listed, told.append)
+                self.assertEqual(list(judging.judge(judge.settings.programs)), [])
+                self.assertIn('with all switches off', told[-1])
+                self.assertEqual(set(judging.not_asked), set(range(len(listed))) - judging.out)
+
+    def test_the_first_of_many_messages_is_kept_where_asked_for(self):
+        command = [sys.executable, '-c', 'print("first"); print("x" * 30_000)']
+        self.assertIn('first', programs.run_limited(command, '.', 10, kept=together.KEPT_OUTPUT)[1])
+        self.assertEqual(len(programs.run_limited(command, '.', 10)[1]), programs.KEPT_OUTPUT)
+
     def test_in_switched_text_every_line_stays_where_it_was(self):
         text = ('int f(int a, int b) {\n  if (a < b) return a;\n  while (a > b)\n    a -= b;\n'
                 '  return g(a ? 1 : b + 2);\n}\n')
@@ -180,6 +229,14 @@ class Judge(unittest.TestCase):
         for number, mutant in listed:
             self.assertIn(number, lines[mutant.line_number])
         self.assertIn('{ if (!(', switched)
+
+    def test_switches_that_are_off_change_nothing(self):
+        text = 'void f() {\n  a += b *= c / d;\n}\n'
+        listed = [(n, m) for n, m in enumerate(mutate.mutants_of('toy.hpp', text)) if m.operator == 'assignment']
+        self.assertEqual([m.becomes for _, m in listed], ['a -= b *= c / d;', 'a += b += c / d;'])
+        line = together.switched(text, listed)[0].split('\n')[1].strip()
+        self.assertEqual(line.replace('fxdyn_mutants::', ''),
+                         '(on(1) ? (a -= b *= c / d) : (a += (on(2) ? (b += c / d) : (b *= c / d))));')
 
     def test_after_the_deadline_nothing_more_is_asked(self):
         with self.project() as (judge, _):

@@ -16,12 +16,13 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"', re.MULTILINE)
 # What the compiler says where a check at compile time fails: a test like any other. Every other error only says that
 # the change makes no program.
 FAILED_CHECK = re.compile(r'static assertion failed|non-constant condition|not a constant expression|in a constant expr|'
-                          r'overflow in constant|outside the bounds|non-.?constexpr.? function|constexpr loop iteration|'
+                          r'overflow in constant|outside the bounds|non-.?constexpr.? function|constexpr\W? loop iteration|'
                           r'constexpr evaluation|call to consteval|accessing uninitialized member|constraints not satisfied')
 SANITIZERS = ['-fsanitize=address,undefined', '-fno-sanitize-recover=all']
 OUT_OF_TIME = 'out of time'
 LONGEST_COMPILATION_S = 600  # of processor time; a change that keeps the compiler longer computes without end
 LONGEST_TEST_S = 120         # where it is not known yet
+KEPT_OUTPUT = 20_000         # characters of what a test says, from its end
 LEAST_TIME_S = 10            # of processor time for a test, however quick it is
 TIMES_AS_LONG = 10           # a test that takes so many times as long as without the change does not end
 MEMORY_BYTES = 4 << 30
@@ -58,9 +59,9 @@ def _limits(cpu_s, memory):
     return set_limits
 
 
-def run_limited(command, cwd, cpu_s, memory=True, environment=None):
-    """(status, output, processor seconds); status None: out of time. Counts processor time, for others use the machine
-    too; a test that sleeps for ever ends by the clock."""
+def run_limited(command, cwd, cpu_s, memory=True, environment=None, kept=KEPT_OUTPUT):
+    """(status, the last `kept` characters of the output, processor seconds); status None: out of time. Counts processor
+    time, for others use the machine too; a test that sleeps for ever ends by the clock."""
     with tempfile.TemporaryFile() as out:
         process = subprocess.Popen(command, cwd=cwd, stdout=out, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
                                    preexec_fn=_limits(cpu_s, memory), env={**os.environ, **(environment or {})},
@@ -71,7 +72,7 @@ def run_limited(command, cwd, cpu_s, memory=True, environment=None):
         slept.cancel()
         process.returncode = status = os.waitstatus_to_exitcode(status)
         out.seek(0)
-        text = out.read()[-20000:].decode(errors='replace')
+        text = out.read()[-kept:].decode(errors='replace')
     if status in (-signal.SIGKILL, -signal.SIGXCPU) or status != 0 and 'CPU time limit exceeded' in text:
         status = None
     return status, text, usage.ru_utime + usage.ru_stime

@@ -37,6 +37,7 @@ constexpr bool on(int i) {
 }
 }  // namespace fxdyn_mutants
 '''
+KEPT_OUTPUT = 4_000_000  # characters of the compiler's messages: the first of them tells the place
 LEAST_TIME_S = 4  # of processor time for a test, however quick it is
 STOP_WORDS = ('return', 'else', 'case', 'do', 'throw', 'co_return', 'co_yield')
 ASSIGNMENTS = {'=', *mutate.ASSIGNMENTS, '/=', '%='}
@@ -121,9 +122,12 @@ def _rightmost(source, i, asks):
         i = source.partner[i]
     depth = 1 if asks else 0
     depth += tokens[i].text == '?'
+    assigns = tokens[i].text in ASSIGNMENTS  # a += b *= c is a += (b *= c)
     while i + 1 < len(tokens):
         after = tokens[i + 1]
-        if after.text in (',', ';') or after.text in mutate.CLOSING or after.text in ASSIGNMENTS or after.text == ']]':
+        if after.text in (',', ';') or after.text in mutate.CLOSING or after.text == ']]':
+            break
+        if after.text in ASSIGNMENTS and not assigns:
             break
         if after.text == ':':
             if depth == 0:
@@ -207,8 +211,9 @@ class Together:
         self.tree, self.mutants, self.log = tree, mutants, log
         self.out = set()                                # no switch shows these
         self.passed = collections.defaultdict(set)      # number: programs that reach it and pass all the same
-        self.not_asked = collections.defaultdict(set)   # number: programs that see its file, and no time was left
+        self.not_asked = collections.defaultdict(set)   # number: programs that see its file and have not been run with it
         self.lines = {}                                 # file: {line: numbers}
+        self.seen = {}                                  # program's name: files; a change leaves #include alone
         self.original = {f: tree.text(f) for f in {m.file for m in mutants}}
         (tree.root / 'fxdyn_switch.hpp').write_text(HEADER % len(mutants))
         for file in self.original:
@@ -243,21 +248,52 @@ class Together:
             self._write(file)
         return True
 
+    def _compile(self, program, source, target):
+        """(status, output)"""
+        flags = self.tree._flags(program, False)
+        command = ['g++', *[f for f in flags if not f.startswith('-fmax-errors')], '-fmax-errors=60',
+                   *(f'-D{d}'.replace('@ROOT@', str(self.tree.root)) for d in program.definitions),
+                   *self.tree._precompiled(flags), '-include', 'fxdyn_switch.hpp', '-c', source, '-o', target]
+        status, output, _ = programs.run_limited(command, self.tree.root, programs.LONGEST_COMPILATION_S, memory=False,
+                                                 kept=KEPT_OUTPUT)
+        return status, output
+
+    def _halve(self, program, source, target):
+        """Where the messages name no switch: takes out one that breaks the source, found by compiling it with half of them
+        again and again. False where the source is not compiled without any either."""
+        before = set(self.out)
+        every = [n for n, m in enumerate(self.mutants)
+                 if n not in before and self._sees(program, m.file)]
+        files = {self.mutants[n].file for n in every}
+
+        def write(without):
+            self.out = before.union(without)
+            for file in files:
+                self._write(file)
+
+        def compiles(only):
+            write(set(every) - set(only))
+            return self._compile(program, source, target)[0] == 0
+
+        suspects = every if every and compiles([]) else []
+        while len(suspects) > 1:
+            half = suspects[:len(suspects) // 2]
+            suspects = suspects[len(half):] if compiles(half) else half
+        write(suspects)
+        if suspects:
+            self.log(f'no switch for {self.mutants[suspects[0]].key}, found by halving')
+        return bool(suspects)
+
     def _build(self, program):
         """(executable, error)"""
         objects = []
         for place, source in enumerate(program.sources):
+            target = self.tree.changed / f'{program.name}-{place}.o'
             while True:
-                target = self.tree.changed / f'{program.name}-{place}.o'
-                flags = self.tree._flags(program, False)
-                command = ['g++', *[f for f in flags if not f.startswith('-fmax-errors')], '-fmax-errors=60',
-                           *(f'-D{d}'.replace('@ROOT@', str(self.tree.root)) for d in program.definitions),
-                           *self.tree._precompiled(flags), '-include', 'fxdyn_switch.hpp', '-c', source, '-o', target]
-                status, output, _ = programs.run_limited(command, self.tree.root, programs.LONGEST_COMPILATION_S,
-                                                         memory=False)
+                status, output = self._compile(program, source, target)
                 if status == 0:
                     break
-                if not self._leave_out(output):
+                if not self._leave_out(output) and not self._halve(program, source, target):
                     return None, output[-1500:]
             objects.append(target)
         executable = self.tree.changed / f'{program.name}.together'
@@ -277,27 +313,29 @@ class Together:
 
     def judge(self, listed, deadline=float('inf')):
         """Yields (number, program's name, why) of what is killed. No program begins after the deadline, by the monotonic
-        clock."""
+        clock. A program that does not build or pass with all switches off is left to the ordinary way."""
         left = set(range(len(self.mutants)))
         waiting = [p for p in listed if not p.command]
         while waiting:
             program = max(waiting, key=lambda p: self._worth(p, left - self.out))
             waiting.remove(program)
-            seen = {n for n in left - self.out if self.tree.program_sees(program, self.mutants[n].file)}
+            seen = {n for n in left - self.out if self._sees(program, self.mutants[n].file)}
             if not seen:
                 continue
             if time.monotonic() > deadline:
-                for number in seen:
-                    self.not_asked[number].add(program.name)
+                self._give_up(program, seen, 'is not asked: no time left')
                 continue
             executable, error = self._build(program)
             if executable is None:
-                raise RuntimeError(f'{program.name} is not built with all switches off: {error}')
+                self._give_up(program, seen, f'is not built with all switches off: {error}')
+                continue
             reached_file = self.tree.changed / 'reached'
             reached_file.unlink(missing_ok=True)
             plain = self._run(executable, -1, programs.LONGEST_TEST_S, reached_file)
             if plain.result != 'passed':
-                raise RuntimeError(f'{program.name} fails with all switches off: {plain.why}')
+                executable.unlink()
+                self._give_up(program, seen, f'fails with all switches off: {plain.why}')
+                continue
             reached = sorted({int(n) for n in reached_file.read_text().split()} & (left - self.out))
             self.log(f'{program.name}: {plain.seconds:.1f} s, reaches {len(reached)} of {len(left - self.out)} left')
             for number in reached:
@@ -312,8 +350,18 @@ class Together:
                     self.passed[number].add(program.name)
             executable.unlink()
 
+    def _give_up(self, program, seen, why):
+        self.log(f'{program.name} {why}')
+        for number in seen:
+            self.not_asked[number].add(program.name)
+
+    def _sees(self, program, file):
+        if program.name not in self.seen:
+            self.seen[program.name] = set().union(*(self.tree._files_of(program, s) for s in program.sources))
+        return file in self.seen[program.name]
+
     def _worth(self, program, left):
         """What it may kill for its time: more where it tests the mutant's own folder."""
-        seen = [self.mutants[n] for n in left if self.tree.program_sees(program, self.mutants[n].file)]
+        seen = [self.mutants[n] for n in left if self._sees(program, self.mutants[n].file)]
         hope = sum(1 if any(s.startswith(f'tests/{m.file.split("/")[0]}/') for s in program.sources) else 0.4 for m in seen)
         return hope / program.seconds
