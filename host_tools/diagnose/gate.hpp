@@ -62,7 +62,8 @@ bool is_worse(const GateOptions& options, const Eigen::VectorXd& before, const E
 /// Judges each fold by a fit of the others; time constants of drift are chosen by that, and names that do not hold are
 /// taken out of the outcome one by one: those that bring nothing; those at joints whose plain error on the validate
 /// logs is larger than that of `nominal` (rows near standstill, of which the search believes little, count there too),
-/// and those that spoil a joint at which nothing was found; and those not believed at joints that show no more structure than their background.
+/// and those that spoil a joint at which nothing was found; and those not believed at joints that show no more
+/// structure than their background.
 Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs,
           const std::vector<bool>& still);
 

@@ -452,12 +452,12 @@ std::vector<Found> Search::explain(const Choice& choice, std::optional<Choice>& 
       if (instead.impossible > choice.impossible) continue;
       if (instead.score > choice.score - options().alternative)
         found.alternatives.push_back({problem_.groups()[groups.back()].candidate, choice.score - instead.score});
-      double gain = held_out(instead, weights) - own;
+      // What has the effect as a special case is no rival that data refute: unite() chose between the two.
+      if (contains(group.candidate, mine.candidate)) continue;
       // The set won where it was fitted, prices paid: a rival that bends more has its further price to pay here, too.
-      gain += std::max(0.0, penalty(groups.back()) - penalty(found.group));
-      // Whether it is more than a part of what unites it is asked by unite().
-      const bool whole = contains(group.candidate, mine.candidate);
-      if (!whole && gain < least && instead.score - without.score >= threshold(groups.back())) {
+      const double gain =
+          held_out(instead, weights) - own + std::max(0.0, penalty(groups.back()) - penalty(found.group));
+      if (gain < least && instead.score - without.score >= threshold(groups.back())) {
         least = gain;
         better = instead;
       }

@@ -165,8 +165,8 @@ std::vector<TrainOutcome> train(Fitter& fitter, const TrainSettings& settings, P
   for (std::size_t j = 0; j < n; ++j) {
     const Choice& choice = chosen[j];
     const bool carries_over = without[j].rmse <= options.carries_over * fitted[j];
-    const bool kept = choice.design.bls && choice.quiet && carries_over &&
-                      choice.judgement.beats(without[j], options.worth_keeping);
+    const bool kept =
+        choice.design.bls && choice.quiet && carries_over && choice.judgement.beats(without[j], options.worth_keeping);
     outcomes[j] = {.error_without = without[j].rmse,
                    .error_with = choice.judgement.rmse,
                    .kept = kept,

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <vector>
+
+#include "host_tools/diagnose/diagnosis_result.hpp"
+
+namespace fxdyn::diagnosis {
+
+/// What was found at a joint, and what is left there.
+struct JointState {
+  bool structured = false;   ///< the model misses something, on the data that fit
+  bool remains = false;      ///< .. and it counts on the data that judge
+  bool established = false;  ///< an effect of its own
+  bool reached = false;      ///< an established effect on the robot is felt here
+  bool there = false;        ///< an effect is there for sure, and its name is not established
+  bool likely = false;       ///< effects that are not sure enough for the model
+  bool impacts = false;      ///< shorter than the torque's band shows
+  bool bends = false;        ///< a link encoder shows a deflection without a name
+};
+Verdict verdict_of(const JointState& state);
+/// Of a robot: the first of unexplained, partly_explained, explained, not_excited, nothing_missing that a joint has.
+Verdict worst(const std::vector<Verdict>& verdicts);
+
+}  // namespace fxdyn::diagnosis
