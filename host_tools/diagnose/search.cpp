@@ -40,6 +40,18 @@ bool contains(const EffectCandidate& whole, const EffectCandidate& part) {
   return std::find(unites.begin(), unites.end(), part.effect) != unites.end();
 }
 
+/// Whether no log that judges fits as well.
+bool other_logs_judge(const Blocks& blocks) {
+  for (const Fold& fold : blocks.folds) {
+    for (const std::size_t judge : fold.judge) {
+      for (const std::size_t fit : fold.fit) {
+        if (blocks.all[fit].log == blocks.all[judge].log) return false;
+      }
+    }
+  }
+  return true;
+}
+
 bool of_spectrum(const Group& group) { return find_effect(group.candidate.effect)->of_spectrum(); }
 
 }  // namespace
@@ -426,6 +438,8 @@ std::vector<Found> Search::explain(Choice& choice) {
 }
 
 std::vector<Found> Search::explain(const Choice& choice, std::optional<Choice>& better) {
+  // Parts of a motion that was fitted like whatever bends to that motion.
+  const bool others_judge = other_logs_judge(problem_.blocks());
   const double clear = -2 * std::numbers::ln10 * problem_.models().options.gate.likely;
   double least = clear;
   std::vector<Found> out;
@@ -457,7 +471,9 @@ std::vector<Found> Search::explain(const Choice& choice, std::optional<Choice>& 
       // The set won where it was fitted, prices paid: a rival that bends more has its further price to pay here, too.
       const double gain =
           held_out(instead, weights) - own + std::max(0.0, penalty(groups.back()) - penalty(found.group));
-      if (gain < least && instead.score - without.score >= threshold(groups.back())) {
+      // Several effects give way to one on the robot in trade().
+      const bool same_place = group.on_body == mine.on_body && group.candidate.joint == mine.candidate.joint;
+      if (others_judge && same_place && gain < least && instead.score - without.score >= threshold(groups.back())) {
         least = gain;
         better = instead;
       }
