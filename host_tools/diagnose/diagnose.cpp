@@ -17,6 +17,7 @@
 #include "host_tools/diagnose/verdict.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/lugre_check.hpp"
 #include "host_tools/identify/estimate.hpp"
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/regression/solver.hpp"
@@ -168,6 +169,7 @@ class Diagnoser {
       add_deviations(found, *outcome.problem);
     }
     mark_named(found.current, outcome);
+    for (JointFit& joint : found.current.joints) limit_lugre_damping(joint);
     result.model = found.current;
     if (models_.has_baseline) add_notes(changed_parameters(*outcome.problem));
     const auto impacts = find_impacts(result.model, data_.logs, found.healthy, baseline_, options().impact);

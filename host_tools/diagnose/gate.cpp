@@ -26,6 +26,7 @@ std::unique_ptr<Linearised> without(const Outcome& outcome, const std::vector<Se
                                     const Linearised& problem, const std::vector<std::size_t>& groups) {
   Models models = outcome.models;
   std::vector<EffectId> ids;
+  ids.reserve(groups.size());
   for (const std::size_t g : groups) ids.push_back(problem.groups()[g].id);
   while (!ids.empty()) {
     const EffectId gone = ids.back();

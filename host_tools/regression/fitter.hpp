@@ -62,6 +62,8 @@ class Fitter {
   const JointFit& design(std::size_t joint) const { return design_[joint]; }
   /// What judges, in words.
   const std::string& gate() const { return data_->split.kind; }
+  /// Whether logs judge that fit nothing.
+  bool has_validation() const { return data_->split.has_validation; }
 
   void set_design(std::size_t joint, JointFit design);
   /// Of all joints, in parallel.

@@ -7,8 +7,8 @@ namespace fxdyn {
 struct TrainOptions {
   /// share of the held-out error; what a BLS must take away; hand
   double worth_keeping = 0.05;
-  /// times the error of what was fitted; beyond, the structure alone does not carry over to the logs that judge, and
-  /// nor does what is learned beside it; hand
+  /// times the error of what was fitted; where train logs judge one another and the structure alone does worse, none of
+  /// them tells enough of the others to judge what is learned beside it; hand
   double carries_over = 3;
   /// times the least held-out error; candidates below are as good, and the quietest of them is taken; hand
   double nearly_as_good = 1.05;

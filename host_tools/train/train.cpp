@@ -164,7 +164,8 @@ std::vector<TrainOutcome> train(Fitter& fitter, const TrainSettings& settings, P
   std::vector<TrainOutcome> outcomes(n);
   for (std::size_t j = 0; j < n; ++j) {
     const Choice& choice = chosen[j];
-    const bool carries_over = without[j].rmse <= options.carries_over * fitted[j];
+    // A fold's structure knows less than that of all logs: its BLS may make up for what the log left out would tell.
+    const bool carries_over = fitter.has_validation() || without[j].rmse <= options.carries_over * fitted[j];
     const bool kept =
         choice.design.bls && choice.quiet && carries_over && choice.judgement.beats(without[j], options.worth_keeping);
     outcomes[j] = {.error_without = without[j].rmse,

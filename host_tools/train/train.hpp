@@ -29,9 +29,9 @@ struct TrainOutcome {
 std::optional<TrainedJoint::Choice> choice_of(const TrainOutcome& outcome);
 
 /// Fits a BLS on every joint together with the structure (joint least squares, ridge on the BLS's coefficients),
-/// chooses its hyperparameters by the held-out error, and keeps it only where that falls by at least 5 %, and where the
-/// structure alone carries over to the logs that judge: to within three times its error on those that fit. The fitter
-/// holds the chosen designs afterwards.
+/// chooses its hyperparameters by the held-out error, and keeps it only where that falls by at least 5 %, and, where
+/// train logs judge one another, the structure alone carries over: to within three times its error on those that fit.
+/// The fitter holds the chosen designs afterwards.
 ///
 /// Without settings.pso a small grid: presliding distance first, then weight scale, nodes and ridge. With it a particle
 /// swarm a joint, all generation by generation together, over windows, nodes, ridge, weight scale, presliding distance
