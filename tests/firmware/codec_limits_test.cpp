@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <iterator>
@@ -97,6 +98,84 @@ TEST(NumbersOnTheWire, EmergenciesHaveTheirCodesAndBits) {
     EXPECT_EQ(kind.event, e.event) << std::hex << e.code;
   }
   EXPECT_EQ(ErrorLog::history_size, 8U) << "of object 0x1003";
+}
+
+// CiA 301, 7.5.2: a master finds them by their numbers.
+TEST(NumbersOnTheWire, ObjectsOfTheStandardHaveItsPlaces) {
+  using enum dictionary::Variable;
+  struct Place {
+    dictionary::Variable variable;
+    std::uint16_t index;
+    std::uint8_t sub_index;
+  };
+  const Place places[] = {{device_type, 0x1000, 0},
+                          {error_register, 0x1001, 0},
+                          {error_count, 0x1003, 0},
+                          {error_field, 0x1003, 1},
+                          {sync_id, 0x1005, 0},
+                          {cycle_period, 0x1006, 0},
+                          {device_name, 0x1008, 0},
+                          {hardware_version, 0x1009, 0},
+                          {software_version, 0x100A, 0},
+                          {emergency_id, 0x1014, 0},
+                          {emergency_inhibit, 0x1015, 0},
+                          {consumer_heartbeat, 0x1016, 1},
+                          {producer_heartbeat, 0x1017, 0},
+                          {vendor, 0x1018, 1},
+                          {product, 0x1018, 2},
+                          {revision, 0x1018, 3},
+                          {serial_number, 0x1018, 4},
+                          {error_behaviour, 0x1029, 1},
+                          {sdo_request_id, 0x1200, 1},
+                          {sdo_answer_id, 0x1200, 2},
+                          {setpoint_id, 0x1400, 1},
+                          {pdo_type, 0x1400, 2},
+                          {setpoint_mapping, 0x1600, 1},
+                          {setpoint_mapping, 0x1600, 2},
+                          {setpoint_mapping, 0x1600, 3},
+                          {torque_id, 0x1800, 1},
+                          {pdo_type, 0x1800, 2},
+                          {torque_mapping, 0x1A00, 1},
+                          {torque_mapping, 0x1A00, 2},
+                          {torque_mapping, 0x1A00, 3},
+                          {torque_mapping, 0x1A00, 4}};
+  const auto count = [](auto&& is) {
+    return std::count_if(dictionary::entries.begin(), dictionary::entries.end(), is);
+  };
+  for (const Place& place : places) {
+    EXPECT_EQ(count([&](const dictionary::Entry& entry) {
+                return entry.variable == place.variable && entry.index == place.index &&
+                       entry.sub_index == place.sub_index;
+              }),
+              1)
+        << std::hex << place.index << " " << int{place.sub_index};
+  }
+  EXPECT_EQ(count([](const dictionary::Entry& entry) { return entry.index < 0x2000; }), std::ssize(places));
+}
+
+TEST(NumbersOnTheWire, WhatMayBeWrittenIsBounded) {
+  struct Bounds {
+    std::uint16_t index;
+    std::int64_t lowest, highest;
+  };
+  const Bounds bounds[] = {{0x1003, 0, 0},      {0x1015, 0, 65535},      {0x1017, 0, 65535}, {0x1029, 0, 2},
+                           {0x2010, 0, 65535},  {0x2011, 1, 2147483647}, {0x2012, 0, 255},   {0x2013, 0, 1},
+                           {0x2014, 1, 60'000}, {0x2030, 0, 1}};
+  for (const Bounds& expected : bounds) {
+    const auto* entry = std::find_if(dictionary::entries.begin(), dictionary::entries.end(), [&](const auto& e) {
+      return e.index == expected.index && e.access == dictionary::Access::read_write;
+    });
+    ASSERT_NE(entry, dictionary::entries.end()) << std::hex << expected.index;
+    EXPECT_EQ(entry->lowest, expected.lowest) << std::hex << expected.index;
+    EXPECT_EQ(entry->highest, expected.highest) << std::hex << expected.index;
+  }
+}
+
+TEST(NumbersOnTheWire, IdentifiersHaveTheirBits) {
+  EXPECT_EQ(canopen::cob_invalid, 0x8000'0000U);
+  EXPECT_EQ(canopen::cob_no_remote, 0x4000'0000U);
+  EXPECT_EQ(canopen::cob_extended, 0x2000'0000U);
+  EXPECT_EQ(canopen::cob_identifier, 0x7FFU);
 }
 
 TEST(NumbersOnTheWire, AreThoseOfTheSerialProtocol) {

@@ -222,6 +222,28 @@ TEST(ByHand, TheBasisOfABroadLearningSystem) {
   for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_NEAR(out[i], expected[i], 1e-9) << i;
 }
 
+// The same inputs; the torque is 2 q' - dq' + 4 ddq' + 8 curved + 16 h_1 + 32 h_2.
+TEST(ByHand, TheTorqueOfABroadLearningSystem) {
+  const double curved = 0.881373587019543;
+  const std::vector<double> words{0.5, 0.5, 0.25, 0.25, 0.5, 0.5,  //
+                                  4,   1,   2,    -4,   0,         // bias, weights
+                                  1,   2,   4,    0,    0,         //
+                                  2,   -1,  4,    8,    16,  32};
+  JointInput<Real> input{};
+  input.q = 1;
+  input.dq = 2;
+  input.ddq = -3;
+  NoState state;
+  Saturations saturations;
+  std::array<double, 2> scratch{};
+  const double torque = broad_learning_sum<StateInputs, RampNodes, Real>(2, 0, input, Words<Real>{words.data()}, state,
+                                                                         saturations, scratch);
+  EXPECT_NEAR(torque, 2 * 0.25 - 0.5 - 4 * 0.75 + 8 * curved / 2 + 16 * 1 + 32 * 3.5 / 8, 1e-9);
+}
+
+static_assert(PhysicalInputs::size == 4 && BristlesInputs::size == 6 && ExtendedInputs::size == 8 &&
+              StateInputs::size == 4);
+
 // From rest, one tick at dq = 2 rad/s: the mean is 1 rad/s. Bell e^-1 at a Stribeck velocity of 2 rad/s.
 TEST(ByHand, TheBristlesThatABroadLearningSystemSees) {
   const BroadLearningScales scales{
