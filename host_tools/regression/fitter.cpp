@@ -9,6 +9,7 @@
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/effects/link_parameters.hpp"
+#include "host_tools/effects/lugre_check.hpp"
 #include "host_tools/regression/bls_rows.hpp"
 #include "host_tools/regression/own_columns.hpp"
 #include "host_tools/regression/solver.hpp"
@@ -443,6 +444,8 @@ IdentifiedModel Fitter::to_model(const Solution& solution) const {
       }
     }
     if (joint.bls) joint.bls->coefficients = solution.theta[j].tail(solution.theta[j].size() - at);
+    // Bristles that would drive the joint fit noise: nobody could read such a model.
+    limit_lugre_damping(joint);
     model.joints.push_back(joint);
   }
   return model;
