@@ -169,7 +169,6 @@ class Diagnoser {
       add_deviations(found, *outcome.problem);
     }
     mark_named(found.current, outcome);
-    for (JointFit& joint : found.current.joints) limit_lugre_damping(joint);
     result.model = found.current;
     if (models_.has_baseline) add_notes(changed_parameters(*outcome.problem));
     const auto impacts = find_impacts(result.model, data_.logs, found.healthy, baseline_, options().impact);
@@ -389,6 +388,7 @@ class Diagnoser {
       EffectFit& fit = id.body ? model.body[id.effect] : model.joints[id.joint].effects[id.effect];
       fit.named = finding.evidence.certainty == Certainty::established;
     }
+    for (JointFit& joint : model.joints) limit_lugre_damping(joint);  // around less than it was fitted beside
   }
 
   const Project& project_;
