@@ -12,6 +12,7 @@
 #include "model/effects/joint_coupling.hpp"
 #include "model/effects/load_friction.hpp"
 #include "model/effects/lugre.hpp"
+#include "model/effects/maxwell_slip.hpp"
 #include "model/effects/motor_coupling.hpp"
 #include "model/effects/offset.hpp"
 #include "model/effects/payload.hpp"
@@ -45,7 +46,7 @@ namespace fxdyn {
 using Catalogue = Joined<
     EffectList<Viscous, Coulomb, Offset, RotorInertia, Stribeck, Presliding, AsymmetricFriction, ViscousQuadratic,
                ViscousCubic, LoadFriction, TorqueGain, Ripple, Spring, GravityCompensator, FrictionDrift, Saturation,
-               JointCoupling, Delay, Elasticity, Backlash, Eccentricity, MotorCoupling, Lugre>,
+               JointCoupling, Delay, Elasticity, Backlash, Eccentricity, MotorCoupling, Lugre, MaxwellSlip>,
     UserEffects>;
 
 /// Effects on the rigid body itself: they change its parameters and have no basis.

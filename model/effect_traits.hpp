@@ -125,6 +125,17 @@ enum class TurnsWithSign : std::uint8_t {
   load,       ///< theta |load| s: by 2 theta |load|
 };
 
+/// When an effect of friction brakes, as friction has to: some parameters would make it drive the joint.
+struct Braking {
+  unsigned coefficient = 0;  ///< of its linear parameters: the one that may be too large
+  /// Speed at which it is asked [rad/s | m/s]: of the shape parameters and the joint's limit (0: not known).
+  double (*speed)(const double* shape, double limit) = nullptr;
+  /// Largest value of the coefficient that still brakes at that speed: of the shape parameters, the first linear
+  /// parameter and the joint's viscous friction [N*m*s/rad | N*s/m].
+  double (*most)(const double* shape, double speed, double first, double viscous) = nullptr;
+  bool given = false;
+};
+
 /// A motion that shows effects and tells those apart that name it. Of several in common the one of lowest order counts.
 struct NamedExperiment {
   unsigned order = 0;
@@ -163,12 +174,15 @@ struct EffectTraits {
   /// Of inertia that base parameters may hold: then it can't be told from them.
   bool in_base = false;
   bool has_sign_width = false;  ///< the joint's sign width is reported with it
-  bool share = false;           ///< its only coefficient is 1 by definition
-  unsigned identified = 0;      ///< place among the effects that `identify` adds by itself; 0: it does not
+  /// Like masses about the joint's axis: a turned gravity shows those of an upright first joint, where no name is due.
+  bool as_masses_about_axis = false;
+  bool share = false;       ///< its only coefficient is 1 by definition
+  unsigned identified = 0;  ///< place among the effects that `identify` adds by itself; 0: it does not
   double shortest_session_s = 0;
   std::uint32_t most_ticks = 0;  ///< a time shape is at most so many ticks; 0: any
   OfTotal of_total = OfTotal::nothing;
   TurnsWithSign turns_with_sign = TurnsWithSign::no;
+  Braking brakes{};
   /// Takes the place of this effect: its first coefficient is about as large.
   std::string_view replaces{};
   /// One law for these effects together: it is tried where one of them was found, and takes their place if it explains

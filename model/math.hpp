@@ -43,6 +43,14 @@ constexpr double reciprocal_of(double x) { return 1 / (x < 0.25 ? 0.25 : x > 1 ?
 constexpr double magnitude(double x) { return x < 0 ? -x : x; }
 /// sign(x): -1, 0 or 1
 constexpr double sign_of(double x) { return static_cast<double>((x > 0) - (x < 0)); }
+/// A spring in parts of the most that it can bend, |z| <= 1, after its ends moved against each other: where it is full,
+/// the contact behind it slips.
+constexpr double slip(double z, double moved) {
+  const double bent = z + moved;
+  return bent > 1 ? 1 : (bent < -1 ? -1 : bent);
+}
+/// 2 x; saturates, so only for what has no effect beyond a size of 2.
+constexpr double doubled(double x) { return 2 * x; }
 /// What a limiter to [-limit, limit] adds to x.
 constexpr double clipping(double x, double limit) { return x > limit ? limit - x : (x < -limit ? -limit - x : 0.0); }
 /// Negative and absurd counts are limited as the fixed-point format limits them.
@@ -282,6 +290,23 @@ constexpr std::int32_t clipping(std::int32_t x, std::int32_t limit) {
   return saturate(-((over & ~(over >> 63)) + (under & (under >> 63))), ignored);
 }
 
+/// a + b, saturated.
+constexpr std::int32_t add_saturated(std::int32_t a, std::int32_t b) {
+#ifdef __ARM_FEATURE_DSP
+  if (!std::is_constant_evaluated()) return __qadd(a, b);
+#endif
+  std::uint32_t ignored = 0;
+  return saturate(std::int64_t{a} + b, ignored);
+}
+
+/// slip() with unit_bits: 1 is the most, though the format holds twice that.
+constexpr std::int32_t slip(std::int32_t z, std::int32_t moved) {
+  constexpr std::int32_t most = std::int32_t{1} << unit_bits;
+  const std::int32_t bent = add_saturated(z, moved);
+  const std::int32_t raised = bent > -most ? bent : -most;
+  return raised < most ? raised : most;
+}
+
 /// A count (count_bits) in parts, the rest with 30 bits; negative ones count as 0.
 constexpr WholeAndRest<std::int32_t> split_count(std::int32_t x) {
   x &= ~(x >> 31);
@@ -327,6 +352,8 @@ template <int bits>
 constexpr Fixed<bits> clipping(Fixed<bits> x, Fixed<bits> limit) {
   return {raw::clipping(x.raw, limit.raw)};
 }
+constexpr Fixed<unit_bits> slip(Fixed<unit_bits> z, Fixed<unit_bits> moved) { return {raw::slip(z.raw, moved.raw)}; }
+constexpr Fixed<unit_bits> doubled(Fixed<unit_bits> x) { return {raw::add_saturated(x.raw, x.raw)}; }
 constexpr WholeAndRest<Fixed<unit_bits>> split_count(Fixed<count_bits> x) {
   const auto parts = raw::split_count(x.raw);
   return {parts.whole, {parts.rest}};

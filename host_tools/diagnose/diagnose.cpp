@@ -12,12 +12,13 @@
 #include "host_tools/diagnose/deflection.hpp"
 #include "host_tools/diagnose/deviations.hpp"
 #include "host_tools/diagnose/gate.hpp"
+#include "host_tools/diagnose/recording_faults.hpp"
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/diagnose/sessions.hpp"
 #include "host_tools/diagnose/verdict.hpp"
+#include "host_tools/effects/braking.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
-#include "host_tools/effects/lugre_check.hpp"
 #include "host_tools/identify/estimate.hpp"
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/regression/solver.hpp"
@@ -106,11 +107,7 @@ class Diagnoser {
 
   Diagnosis run() {
     check_lengths(logs_, options().session);
-    const auto judges = [](const ProcessedLog& log) { return log.role == Role::validate; };
-    if (data_.logs.size() > 1 && std::none_of(data_.logs.begin(), data_.logs.end(), judges)) {
-      notes_.push_back("no log has role = \"validate\": names are accepted on the " + gate_of(data_.logs) +
-                       "; other trajectories would judge better");
-    }
+    note_who_judges();
     if (models_.has_baseline) {
       learn_baseline();
     } else {
@@ -145,6 +142,7 @@ class Diagnoser {
     result.nominal = before.current;
 
     Outcome outcome = explore(models_, logs_, settings_, never_, 2, progress_);
+    refuse_faulty_recordings(before, outcome);
     Gate gate = pass(outcome, models_.current, logs_, still_);
     if (refit_links(outcome)) gate = pass(outcome, models_.current, logs_, still_);
     weigh_evidence(outcome, gate);
@@ -187,6 +185,17 @@ class Diagnoser {
   const std::vector<std::string>& notes() const { return notes_; }
 
  private:
+  void note_who_judges() {
+    const auto judges = [](const ProcessedLog& log) { return log.role == Role::validate; };
+    if (data_.logs.size() > 1 && std::none_of(data_.logs.begin(), data_.logs.end(), judges)) {
+      notes_.push_back("no log has role = \"validate\": names are accepted on the " + gate_of(data_.logs) +
+                       "; other trajectories would judge better");
+    }
+  }
+  /// A fault of the recording would get the name of an effect.
+  void refuse_faulty_recordings(const Models& nominal, const Outcome& outcome) const {
+    if (const auto fault = likely_recording_fault(nominal, logs_, outcome)) throw DataError(fault->complaint);
+  }
   std::size_t joints() const { return project_.robot.size(); }
   /// On the logs that judge, by more than a name may raise the error.
   bool is_worse_anywhere(const IdentifiedModel& before, const IdentifiedModel& after) const {
@@ -388,7 +397,7 @@ class Diagnoser {
       EffectFit& fit = id.body ? model.body[id.effect] : model.joints[id.joint].effects[id.effect];
       fit.named = finding.evidence.certainty == Certainty::established;
     }
-    for (JointFit& joint : model.joints) limit_lugre_damping(joint);  // around less than it was fitted beside
+    for (JointFit& joint : model.joints) let_it_brake(joint);  // around less than it was fitted beside
   }
 
   const Project& project_;

@@ -195,6 +195,20 @@ struct ReportOptions {
   double region_chance = 0.02;
 };
 
+/// Faults of a recording, that compete with the robot's effects.
+struct RecordingOptions {
+  /// score; more than what the search found explains; theory: 2 ln of odds of 1000 to 1
+  double least_score = 14;
+  /// share of what any function of the state explains of today's logs; hand: as a name's
+  double least_closure = 0.8;
+  /// rad | m; shift of a joint's zero that is tried first; hand: any, the next ones are where the last one led
+  double first_shift = 1e-2;
+  /// rad | m; a shift that is worth a complaint; hand: less is an encoder's mounting
+  double least_shift = 1e-3;
+  /// samples; lag that two clocks gather over a log; theory: less is within the step of the samples
+  double least_drift = 1;
+};
+
 struct Options {
   NoiseOptions noise;
   PriorOptions prior;
@@ -205,6 +219,7 @@ struct Options {
   ImpactOptions impact;
   DeflectionOptions deflection;
   ReportOptions report;
+  RecordingOptions recording;
 };
 
 }  // namespace fxdyn::diagnosis

@@ -6,10 +6,10 @@
 #include <optional>
 
 #include "host_tools/diagnose/models.hpp"
+#include "host_tools/effects/braking.hpp"
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
-#include "host_tools/effects/lugre_check.hpp"
 #include "host_tools/regression/gauss_newton.hpp"
 #include "host_tools/regression/solver.hpp"
 
@@ -135,7 +135,7 @@ void take_back(Models& models, std::vector<EffectId>& ids, const EffectId& id) {
   remove(models, ids, id);
   if (id.body) return;
   // Beside less friction bristles may have less damping.
-  limit_lugre_damping(models.current.joints[id.joint]);
+  let_it_brake(models.current.joints[id.joint]);
   const auto& left = models.current.joints[id.joint].effects;
   if (std::none_of(left.begin(), left.end(), [](const EffectFit& fit) { return separates_rotor(fit.effect); }))
     forget_rotor(models, ids, id.joint);

@@ -1,8 +1,8 @@
 #include "host_tools/diagnose/unknowns.hpp"
 #include "host_tools/diagnose/base_parameters.hpp"
 #include "host_tools/diagnose/models.hpp"
+#include "host_tools/effects/braking.hpp"
 #include "host_tools/effects/effect_roles.hpp"
-#include "host_tools/effects/lugre_check.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -263,7 +263,7 @@ namespace {
 
 /// Bristles whose damping drives the joint are no friction, however well they fit.
 void keep_friction(IdentifiedModel& model) {
-  for (JointFit& joint : model.joints) limit_lugre_damping(joint);
+  for (JointFit& joint : model.joints) let_it_brake(joint);
 }
 
 }  // namespace

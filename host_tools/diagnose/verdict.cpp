@@ -7,12 +7,11 @@
 #include <numbers>
 
 #include "host_tools/diagnose/where.hpp"
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/parallel.hpp"
-#include "model/effects/gravity_compensator.hpp"
-#include "model/effects/gravity_tilt.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
@@ -167,12 +166,12 @@ class ReportWriter {
   /// A tilted base makes the masses about a first joint that stood upright felt, as a balancer there would be: with a
   /// tilt they are its own.
   bool part_of_tilt(std::size_t j, const EffectFit& fit) const {
-    if (j != 0 || fit.effect != GravityCompensator::name) return false;
+    if (j != 0 || !find_effect(fit.effect)->as_masses_about_axis) return false;
     const Robot& robot = conclusion_.model.robot;
     const Eigen::Vector3d axis = robot.joints[0].origin.linear() * robot.joints[0].axis;
     const bool upright = axis.cross(robot.gravity).norm() < report_.upright * robot.gravity.norm();
     return upright && std::any_of(conclusion_.model.body.begin(), conclusion_.model.body.end(),
-                                  [](const EffectFit& body) { return body.named && body.effect == GravityTilt::name; });
+                                  [](const EffectFit& body) { return body.named && turns_gravity(body.effect); });
   }
 
   NamedEffect named(const EffectFit& fit, const Finding& finding) {
@@ -272,8 +271,8 @@ class ReportWriter {
       if (part_of_tilt(j, fits[e])) {
         notes_.push_back(fmt::format(
             "{}: the tilt makes masses about this axis felt, which no upright robot shows: the model carries them as "
-            "gravity_compensator",
-            joint_of(j).name));
+            "{}",
+            joint_of(j).name, fits[e].effect));
         continue;
       }
       out.push_back(named(fits[e], *finding));

@@ -40,6 +40,14 @@ const EffectInfo& load_effect() {
 }
 bool is_load(std::string_view effect) { return effect == load_effect().name; }
 
+bool turns_gravity(std::string_view effect) {
+  bool out = false;
+  BodyEffects::for_each([&]<class E>() {
+    if constexpr (requires { &E::turn; }) out |= E::name == effect;
+  });
+  return out;
+}
+
 const EffectInfo& rotor_effect() {
   static const EffectInfo& found = first_that([](const EffectInfo& info) { return info.in_base; }, "a rotor");
   return found;

@@ -12,6 +12,8 @@ namespace fxdyn {
 /// A mass [kg] at a centre [m], fixed to the last link.
 const EffectInfo& load_effect();
 bool is_load(std::string_view effect);
+/// Whether it turns gravity against the base.
+bool turns_gravity(std::string_view effect);
 /// Rotor and gears in front of the load: base parameters may hold it.
 const EffectInfo& rotor_effect();
 /// The nominal friction that turns with the sign of the velocity: amplitude s.

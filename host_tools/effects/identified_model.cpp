@@ -4,10 +4,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "host_tools/effects/braking.hpp"
 #include "host_tools/effects/broad_learning_types.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/link_parameters.hpp"
-#include "host_tools/effects/lugre_check.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
 #include "model/version.hpp"
@@ -254,7 +254,7 @@ JointFit to_joint(const json& j) {
 
 void check_friction(const IdentifiedModel& model) {
   for (std::size_t j = 0; j < model.joints.size(); ++j) {
-    if (const auto why = lugre_is_no_friction(model.joints[j], model.joints[j].dq_limit))
+    if (const auto why = why_it_does_not_brake(model.joints[j], model.joints[j].dq_limit))
       throw InputError(fmt::format("joint {} ({}): {}", j + 1, model.robot.joints[j].name, *why));
   }
 }

@@ -11,6 +11,7 @@
 #include "host_tools/excite/sight.hpp"
 #include "host_tools/page/plot.hpp"
 #include "host_tools/signals/log.hpp"
+#include "host_tools/signals/planned_series.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
 
@@ -52,9 +53,9 @@ json trajectory_json(const PlannedTrajectory& trajectory, const Robot& robot) {
   out["periods"] = trajectory.periods;
   out["series"] = json::array();
   for (std::size_t j = 0; j < robot.size(); ++j) {
-    const FourierJoint& series = trajectory.series[j];
-    out["series"].push_back(
-        {{"joint", robot.joints[j].name}, {"centre", series.centre}, {"a", list(series.a)}, {"b", list(series.b)}});
+    json series = series_json(trajectory.series[j]);
+    series["joint"] = robot.joints[j].name;
+    out["series"].push_back(std::move(series));
   }
   return out;
 }

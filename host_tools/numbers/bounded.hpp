@@ -381,6 +381,25 @@ Bounded<kind> clipping(Bounded<kind> x, Bounded<kind> limit) {
   return {{clipping(x.value.high, limit.value.low), clipping(x.value.low, limit.value.low),
            x.value.error + limit.value.error}};
 }
+/// A spring adds up the errors of its way until it is full, which both springs are then: at most 2 / |moved| ticks. One
+/// that creeps is full after creeping_ticks at the latest.
+inline BoundedNumbers::Of<Quantity::unit> slip(BoundedNumbers::Of<Quantity::unit> z,
+                                               BoundedNumbers::Of<Quantity::unit> moved) {
+  const Bound &state = z.value, &way = moved.value;
+  Bound out = Bound{state.low + way.low, state.high + way.high, 0}.cut(-1, 1);
+  if (!detail::rounding()) return {out};
+  const bool turns = way.low <= 0 && way.high >= 0;
+  const double slowest = turns ? 0 : std::fmin(std::fabs(way.low), std::fabs(way.high));
+  const bool creeps = slowest < 2 / creeping_ticks;
+  out.error = std::fmax(state.error, way.error * (creeps ? creeping_ticks : 2 / slowest + 1));
+  if (creeps && current_bounding.creeps) out.error = state.error + way.error * creeping_ticks;
+  out.error = std::fmin(out.error, 2.0);
+  return {out};
+}
+/// Fixed point saturates at 2, where any spring is full.
+inline BoundedNumbers::Of<Quantity::unit> doubled(BoundedNumbers::Of<Quantity::unit> x) {
+  return {{2 * x.value.low, 2 * x.value.high, 2 * x.value.error}};
+}
 inline WholeAndRest<BoundedNumbers::Of<Quantity::unit>> split_count(BoundedNumbers::Of<Quantity::count> x) {
   const auto parts = split_count(x.value.low);  // a parameter: one value
   return {parts.whole, {{parts.rest, parts.rest, x.value.error}}};

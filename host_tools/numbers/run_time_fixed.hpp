@@ -203,6 +203,13 @@ template <Kind kind>
 RunTimeFixed<kind> clipping(RunTimeFixed<kind> x, RunTimeFixed<kind> limit) {
   return {raw::clipping(x.raw, limit.raw)};
 }
+inline RunTimeNumbers::Of<Quantity::unit> slip(RunTimeNumbers::Of<Quantity::unit> z,
+                                               RunTimeNumbers::Of<Quantity::unit> moved) {
+  return {raw::slip(z.raw, moved.raw)};
+}
+inline RunTimeNumbers::Of<Quantity::unit> doubled(RunTimeNumbers::Of<Quantity::unit> x) {
+  return {raw::add_saturated(x.raw, x.raw)};
+}
 inline WholeAndRest<RunTimeNumbers::Of<Quantity::unit>> split_count(RunTimeNumbers::Of<Quantity::count> x) {
   const auto parts = raw::split_count(x.raw);
   return {parts.whole, {parts.rest}};

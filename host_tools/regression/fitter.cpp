@@ -5,11 +5,11 @@
 #include <cmath>
 #include <optional>
 
+#include "host_tools/effects/braking.hpp"
 #include "host_tools/effects/broad_learning_types.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/effects/link_parameters.hpp"
-#include "host_tools/effects/lugre_check.hpp"
 #include "host_tools/regression/bls_rows.hpp"
 #include "host_tools/regression/own_columns.hpp"
 #include "host_tools/regression/solver.hpp"
@@ -445,7 +445,7 @@ IdentifiedModel Fitter::to_model(const Solution& solution) const {
     }
     if (joint.bls) joint.bls->coefficients = solution.theta[j].tail(solution.theta[j].size() - at);
     // Bristles that would drive the joint fit noise: nobody could read such a model.
-    limit_lugre_damping(joint);
+    let_it_brake(joint);
     model.joints.push_back(joint);
   }
   return model;

@@ -21,9 +21,9 @@ using Eigen::VectorXd;
 double soft_sign(double v, double width) { return v / std::sqrt(v * v + width * width); }
 
 /// Effects that are no torque of force(): MuJoCo's own, those of the body, of the gears and of the sensors.
-constexpr std::array<std::string_view, 13> elsewhere{
-    "lugre",        "viscous", "coulomb",      "rotor_inertia", "elasticity", "backlash", "presliding",
-    "eccentricity", "payload", "gravity_tilt", "torque_gain",   "saturation", "delay"};
+constexpr std::array<std::string_view, 14> elsewhere{
+    "lugre",      "maxwell_slip", "viscous", "coulomb",      "rotor_inertia", "elasticity", "backlash",
+    "presliding", "eccentricity", "payload", "gravity_tilt", "torque_gain",   "saturation", "delay"};
 
 /// Torque of an effect with no memory on joint j [N*m | N].
 /// @throws InputError: an effect that this plant has no formula for
@@ -79,8 +79,21 @@ VectorXd relaxed(const Eigen::Ref<const VectorXd>& torque, double r, double step
 
 }  // namespace
 
+double SlippingContacts::advance(const EffectFit& fit, double way) {
+  bent_.resize(fit.linear.size(), 0.0);
+  double sum = 0, room = fit.shape[0];  // of a spring: how far it bends before it slips
+  for (std::size_t i = 0; i < bent_.size(); ++i, room /= 2) {
+    bent_[i] = std::min(room, std::max(-room, bent_[i] + way));
+    sum += fit.linear[i] * bent_[i] / room;
+  }
+  return sum;
+}
+
 DriveForces::DriveForces(const IdentifiedModel& plant)
-    : plant_(plant), bristle_(joints_of(plant).size(), 0.0), bristle_q_(joints_of(plant).size(), 0.0) {
+    : plant_(plant),
+      bristle_(joints_of(plant).size(), 0.0),
+      bristle_q_(joints_of(plant).size(), 0.0),
+      slips_(joints_of(plant).size()) {
   for (const JointFit& joint : joints_of(plant)) {
     const EffectFit* fit = joint.find("lugre");
     lugre_.push_back(fit != nullptr ? std::optional<LuGreBristles>(*fit) : std::nullopt);
@@ -97,16 +110,20 @@ VectorXd DriveForces::operator()(const DriveState& now) {
       const double v0 = started_ ? last_dq_[j] : now.dq[j], seconds = started_ ? now.time_s - last_s_ : 0;
       sum[j] += lugre_[i]->advance(v0, now.dq[j], seconds);
     }
+    const double stretch = started_ ? now.q[j] - bristle_q_[i] : 0;
+    bristle_q_[i] = now.q[j];
     for (const EffectFit& fit : joint.effects) {
+      if (fit.effect == "maxwell_slip") {
+        sum[j] += slips_[i].advance(fit, stretch);
+        continue;
+      }
       if (fit.effect != "presliding") {
         sum[j] += force(fit, joint, j, now, plant_);
         continue;
       }
       // Dahl, dz/dq = (1 - sign z) / distance: over a stretch z decays to the direction's sign
-      const double stretch = started_ ? now.q[j] - bristle_q_[i] : 0;
       const double end = stretch < 0 ? -1 : 1;
       bristle_[i] = end + (bristle_[i] - end) * std::exp(-std::fabs(stretch) / fit.shape[0]);
-      bristle_q_[i] = now.q[j];
       sum[j] += fit.linear[0] * bristle_[i];
     }
   }

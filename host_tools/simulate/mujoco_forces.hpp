@@ -19,6 +19,18 @@ struct DriveState {
   double time_s = 0;     ///< since the robot was switched on
 };
 
+/// Contacts in parallel, each a spring that slips at half the way of the one before (effect `maxwell_slip`), by the
+/// joint's way.
+class SlippingContacts {
+ public:
+  /// @param way of the joint since the last call [rad | m]
+  /// @return their force [N*m | N]
+  double advance(const EffectFit& fit, double way);
+
+ private:
+  std::vector<double> bent_;  ///< [rad | m]
+};
+
 /// Steps with the motion: friction that builds up over a distance remembers it.
 class DriveForces {
  public:
@@ -30,6 +42,7 @@ class DriveForces {
  private:
   const IdentifiedModel& plant_;
   std::vector<double> bristle_, bristle_q_;  ///< deflected share of the presliding friction, and where
+  std::vector<SlippingContacts> slips_;
   std::vector<std::optional<LuGreBristles>> lugre_;
   Eigen::VectorXd last_dq_;
   double last_s_ = 0;

@@ -115,7 +115,11 @@ CoulombShare coulomb_share(const JointFit& joint) {
   // where friction builds up over a distance, that share of it is no Coulomb friction
   const EffectFit* lugre = joint.find("lugre");
   const double of_lugre = lugre != nullptr ? lugre->shape[2] * lugre->linear[0] : 0;
-  const double left = linear(joint, "coulomb", 0) - linear(joint, "presliding", 0) - of_lugre;
+  double of_slip = 0;
+  if (const EffectFit* slip = joint.find("maxwell_slip")) {
+    for (const double force : slip->linear) of_slip += force;
+  }
+  const double left = linear(joint, "coulomb", 0) - linear(joint, "presliding", 0) - of_lugre - of_slip;
   return {std::max(left, 0.0), std::min(left, 0.0)};
 }
 

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "host_tools/effects/braking.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
-#include "host_tools/effects/lugre_check.hpp"
+#include "host_tools/signals/planned_series.hpp"
 #include "host_tools/simulate/mujoco_plant.hpp"
 #include "host_tools/support/files.hpp"
 #include "host_tools/support/toml.hpp"
@@ -133,8 +133,8 @@ void check_plant(const Value& effects, const Scenario& scenario) {
     for (const std::size_t j : joints_of(*joint, scenario)) {
       const JointFit& fit = scenario.plant.joints[j];
       const EffectFit& effect = *fit.find(table.need("name", "").string());
-      if (effect.effect == "lugre") {
-        if (const auto why = lugre_is_no_friction(fit, scenario.bounds[j].velocity)) value.place().fail(*why);
+      if (find_effect(effect.effect)->brakes.given) {
+        if (const auto why = why_it_does_not_brake(fit, scenario.bounds[j].velocity)) value.place().fail(*why);
       }
       const double longest = longest_memory(*find_effect(effect.effect), plant_step(scenario));
       if (!mujoco && longest > 0 && effect.shape[0] > longest) {
@@ -155,29 +155,22 @@ void read_plan(const Value& file, const Value& name, const fs::path& directory, 
                ScenarioLog& log) {
   const fs::path path = directory / file.string();
   if (!fs::is_regular_file(path)) file.place().fail(fmt::format("no file {}: make one by fxdyn excite", path.string()));
-  std::string known;
+  std::vector<PlannedSeries> plan;
   try {
-    const auto plan = nlohmann::json::parse(read_file(path));
-    for (const auto& trajectory : plan.at("trajectories")) {
-      known += " " + trajectory.at("name").get<std::string>();
-      if (trajectory.at("name") != name.string()) continue;
-      const auto& series = trajectory.at("series");
-      if (series.size() != scenario.plant.robot.size())
-        file.place().fail(fmt::format("{} is of a robot with {} joints", path.string(), series.size()));
-      log.period_s = trajectory.at("period_s");
-      for (const auto& joint : series) {
-        const auto a = joint.at("a").get<std::vector<double>>(), b = joint.at("b").get<std::vector<double>>();
-        const auto vector = [](const std::vector<double>& v) {
-          return Eigen::VectorXd(Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size())));
-        };
-        if (a.empty() || a.size() != b.size())
-          file.place().fail(path.string() + ": a and b of a series differ in length");
-        log.series.push_back({joint.at("centre"), vector(a), vector(b)});
-      }
-      return;
-    }
-  } catch (const nlohmann::json::exception&) {
-    file.place().fail(path.string() + " is no excite.json: make one by fxdyn excite");
+    plan = read_planned_series(path);
+  } catch (const InputError& error) {
+    file.place().fail(error.what());
+  }
+  std::string known;
+  for (PlannedSeries& one : plan) {
+    known += " " + one.name;
+    if (one.name != name.string()) continue;
+    if (one.joints.empty()) name.place().fail(fmt::format("'{}' is a walk through poses, without a series", one.name));
+    if (one.joints.size() != scenario.plant.robot.size())
+      file.place().fail(fmt::format("{} is of a robot with {} joints", path.string(), one.joints.size()));
+    log.period_s = one.period_s;
+    log.series = std::move(one.joints);
+    return;
   }
   name.place().fail(fmt::format("'{}' is not in {} (there:{})", name.string(), path.string(), known));
 }

@@ -12,7 +12,8 @@ struct GravityCompensator {
   static constexpr EffectTraits traits{.words = "a balancer, or a mass on the joint that the model does not have",
                                        .experiments = {experiments::wide_range},
                                        .needs_revolute = true,
-                                       .changes_by_one_more = true};
+                                       .changes_by_one_more = true,
+                                       .as_masses_about_axis = true};
   static constexpr std::array<ParameterInfo, 0> shape{};
   static constexpr std::array linear{ParameterInfo{"cos", "N*m", "N", -unbounded, unbounded, Quantity::unit,
                                                    "Klimchik, Wu, Dumas, Caro, Furet, Pashkevich 2013"},

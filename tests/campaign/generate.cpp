@@ -278,10 +278,11 @@ json truth_json(const Case& wanted, const Ground& ground) {
            {"rated_torque", robot.rated_torque}};
   for (const auto& [joint, fit] : ground.background) out["background"].push_back(effect_json(joint, fit));
   // What every joint of such a robot has: with a baseline it is no change, without one a name for it is right.
-  const std::vector<std::string> dry = wanted.friction == Friction::catalogue ? std::vector<std::string>{}
-                                       : wanted.friction == Friction::smooth_sign
-                                           ? names_of_form("exponential_stribeck")
-                                           : std::vector<std::string>{"presliding", "stribeck", "lugre"};
+  const std::vector<std::string> dry =
+      wanted.friction == Friction::catalogue ? std::vector<std::string>{}
+      : wanted.friction == Friction::smooth_sign
+          ? names_of_form("exponential_stribeck")
+          : std::vector<std::string>{"presliding", "stribeck", "lugre", "maxwell_slip"};
   for (std::size_t j = 0; !dry.empty() && j < ground.plan.joints(); ++j)
     out["background"].push_back({{"effect", to_string(wanted.friction)}, {"joint", j + 1}, {"names", dry}});
   const NoiseLevel noise{.white = wanted.recording.noise,

@@ -2,8 +2,8 @@
 
 #include "host_tools/diagnose/unknowns.hpp"
 #include "host_tools/diagnose/models.hpp"
+#include "host_tools/effects/braking.hpp"
 #include "host_tools/effects/link_parameters.hpp"
-#include "host_tools/effects/lugre_check.hpp"
 
 #include <gtest/gtest.h>
 
@@ -74,8 +74,8 @@ TEST_F(UnknownsOfAModel, LuGreStaysFriction) {
   ASSERT_NE(damping, unknowns.all.end());
   update(models_, unknowns.all, only(unknowns, static_cast<std::size_t>(damping - unknowns.all.begin()), 1e5), 1);
   const JointFit& joint = models_.current.joints[1];
-  EXPECT_EQ(lugre_is_no_friction(joint, joint.dq_limit), std::nullopt);
-  EXPECT_NEAR(joint.find("lugre")->linear[1], *most_lugre_damping(joint, joint.dq_limit), 1);
+  EXPECT_EQ(why_it_does_not_brake(joint, joint.dq_limit), std::nullopt);
+  EXPECT_NEAR(joint.find("lugre")->linear[1], *most_that_brakes(joint, *joint.find("lugre"), joint.dq_limit), 1);
 }
 
 TEST_F(UnknownsOfAModel, HowMuchIsAThreshold) {

@@ -34,10 +34,10 @@ TEST(EffectDeclarations, ListsAreThoseOfTheTraits) {
   EXPECT_EQ(named([](const EffectInfo& info) { return info.drifts(); }), (Names{"friction_drift"}));
   EXPECT_EQ(named([](const EffectInfo& info) { return info.several; }), (Names{"ripple", "joint_coupling"}));
   EXPECT_EQ(named([](const EffectInfo& info) { return info.share; }), (Names{"saturation", "delay"}));
-  EXPECT_EQ(named([](const EffectInfo& info) { return info.unites_others(); }), (Names{"lugre"}));
+  EXPECT_EQ(named([](const EffectInfo& info) { return info.unites_others(); }), (Names{"lugre", "maxwell_slip"}));
   EXPECT_EQ(named([](const EffectInfo& info) { return info.friction; }),
             (Names{"viscous", "coulomb", "offset", "stribeck", "presliding", "asymmetric_friction", "viscous_quadratic",
-                   "viscous_cubic", "load_friction", "friction_drift", "lugre"}))
+                   "viscous_cubic", "load_friction", "friction_drift", "lugre", "maxwell_slip"}))
       << "differs from day to day";
 }
 
@@ -138,6 +138,12 @@ constexpr std::array promises = std::to_array<Promise>({
     {"lugre", "share", "1", 0.25, 0.99},
     {"lugre", "static", "N*m", 0, unbounded},
     {"lugre", "damping", "N*m*s/rad", 0, unbounded},
+    {"maxwell_slip", "distance", "rad", 1e-07, 0.1},
+    {"maxwell_slip", "force_1", "N*m", 0, unbounded},
+    {"maxwell_slip", "force_2", "N*m", 0, unbounded},
+    {"maxwell_slip", "force_3", "N*m", 0, unbounded},
+    {"maxwell_slip", "force_4", "N*m", 0, unbounded},
+    {"maxwell_slip", "force_5", "N*m", 0, unbounded},
     {"payload", "mass", "kg", 0, unbounded},
     {"payload", "com_x", "m", -10, 10},
     {"payload", "com_y", "m", -10, 10},

@@ -66,6 +66,20 @@ std::vector<double> expected(std::string_view effect, const JointSeries& s, int 
     z = to - (to - z) * std::exp(-std::fabs(mean) * step_s / 0.003 / n);
     return {z - 0.7 * sign, dq - std::fabs(dq) * z / n};
   }
+  if (effect == "maxwell_slip") {
+    // what a spring has of the way since its last reversal, by the whole way back to the start
+    std::vector<double> out;
+    for (int i = 0; i < 5; ++i) {
+      const double most = 0.003 / std::pow(2, i);
+      double spring = 0;
+      for (int m = 0; m <= k; ++m) {
+        spring += step_s * (s.dq[m] + (m > 0 ? s.dq[m - 1] : 0)) / 2;
+        spring = std::copysign(std::min(std::fabs(spring), most), spring);
+      }
+      out.push_back(spring / most - sign);
+    }
+    return out;
+  }
   if (effect == "asymmetric_friction") return {std::fabs(sign), std::fabs(dq)};
   if (effect == "viscous_quadratic") return {std::copysign(dq * dq, dq)};
   if (effect == "viscous_cubic") return {std::pow(dq, 3)};
@@ -107,6 +121,7 @@ std::vector<double> shape_of(std::string_view effect) {
   if (effect == "stribeck") return {0.1};
   if (effect == "presliding") return {0.003};
   if (effect == "lugre") return {0.003, 0.2, 0.7};
+  if (effect == "maxwell_slip") return {0.003};
   if (effect == "ripple") return {7};
   if (effect == "friction_drift") return {2};
   if (effect == "saturation") return {20};

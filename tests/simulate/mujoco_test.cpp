@@ -76,6 +76,7 @@ INSTANTIATE_TEST_SUITE_P(
         Hidden{{test::effect("coulomb", {}, {8})}, 0.1},
         Hidden{{test::effect("coulomb", {}, {8}), test::effect("presliding", {0.01}, {8})}, 0.03},
         Hidden{{test::effect("coulomb", {}, {6}), test::effect("lugre", {0.01, 0.3, 0.75}, {8, 20})}, 0.03},
+        Hidden{{test::effect("coulomb", {}, {8}), test::effect("maxwell_slip", {0.02}, {2, 1, 3, 1, 1})}, 0.03},
         Hidden{{test::effect("asymmetric_friction", {}, {2, 1})}, 0.03},
         Hidden{{test::effect("viscous_quadratic", {}, {3})}, 1e-6},
         Hidden{{test::effect("viscous_cubic", {}, {-1})}, 1e-6},
