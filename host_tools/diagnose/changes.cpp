@@ -24,7 +24,9 @@ std::vector<EffectCandidate> changed_effects(const Linearised& problem) {
     if (!is_changed(u, problem.models().options.prior.changed)) continue;
     const EffectFit& fit = problem.models().current.joints[u.joint].effects[u.effect];
     // Of these, one that comes on top is the change: torques that add up, with shapes of their own.
-    if (find_effect(fit.effect)->changes_by_one_more) out.push_back({fit.effect, u.joint, fit.shape});
+    const EffectInfo& info = *find_effect(fit.effect);
+    const bool memory_or_curve = info.friction && !info.nominal && !info.shape.empty() && !info.drifts();
+    if (info.changes_by_one_more || memory_or_curve) out.push_back({fit.effect, u.joint, fit.shape});
   }
   return out;
 }

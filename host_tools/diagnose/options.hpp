@@ -22,8 +22,11 @@ struct NoiseOptions {
 
 /// What is known of parameters before the logs are looked at. All but `changed` are standard deviations.
 struct PriorOptions {
-  /// share of itself; change of a nominal coefficient between two healthy sessions; hand, decision 0005
+  /// share of itself; change of a coefficient between two healthy sessions, of friction in proportion to the velocity:
+  /// the grease's warmth; hand, decision 0005
   double friction_change = 0.3;
+  /// share of itself; .. of any other: dry friction changes little with warmth; hand
+  double dry_friction_change = 0.1;
   /// share of Coulomb friction; change of the offset, beside that of itself; hand
   double offset_change = 0.05;
   /// share of rated torque; change of a coefficient that is zero; hand

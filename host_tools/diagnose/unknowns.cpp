@@ -144,10 +144,11 @@ class Builder {
     const EffectFit* friction = dry_friction_of(common_.joints[shared.joint]);
     // Of motions of unit size: a coefficient's own scale.
     const PriorOptions& prior = models_.options.prior;
-    double scale = prior.friction_change * std::fabs(shared.value);
+    const bool in_proportion = parameter.quantity == Quantity::velocity;
+    double scale = (in_proportion ? prior.friction_change : prior.dry_friction_change) * std::fabs(shared.value);
     if (joint.effects[shared.effect].effect == constant_effect().name && friction != nullptr)
       scale += prior.offset_change * std::fabs(friction->linear[0]);
-    const double motion = parameter.quantity == Quantity::velocity ? joint.dq_limit : 1.0;
+    const double motion = in_proportion ? joint.dq_limit : 1.0;
     return std::hypot(scale, prior.smallest_change * joint.rated_torque / std::max(motion, 1e-9));
   }
 
