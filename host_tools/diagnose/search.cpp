@@ -459,6 +459,10 @@ std::vector<Found> Search::explain(const Choice& choice, std::optional<Choice>& 
       if (group.candidate.effect == mine.candidate.effect && group.on_body == mine.on_body &&
           (mine.on_body || group.candidate.joint == mine.candidate.joint))
         continue;
+      // A law comes in place of its parts, not beside them.
+      if (std::any_of(others.begin(), others.end(),
+                      [&](std::size_t g) { return contains(group.candidate, problem_.groups()[g].candidate); }))
+        continue;
       std::vector<std::size_t> groups = others;
       groups.push_back(refine(without, one.group));
       const Choice instead = evaluate(groups);

@@ -62,7 +62,7 @@ class Search {
   /// @param start groups to begin with (named effects of the model)
   Choice run(const std::vector<std::size_t>& start, Progress& progress);
   /// The choice with an effect that unites others (EffectTraits::unites) in place of those of them that it has, joint
-  /// by joint, where that scores better.
+  /// by joint, where that scores better; and with its parts where it does not.
   Choice unite(Choice best);
   /// What speaks for each effect of a choice. One whose rival is clearly better on data that fitted neither gives way.
   std::vector<Found> explain(Choice& choice);
@@ -103,6 +103,8 @@ class Search {
   Choice pruned(Choice choice, std::size_t kept) const;
   std::size_t refine(const Choice& state, std::size_t group);
   std::optional<Choice> united(const Choice& choice, const EffectInfo& info, std::size_t joint);
+  std::optional<Choice> divided(const Choice& choice, const EffectInfo& info, std::size_t joint);
+  std::optional<Choice> with_best(const std::vector<std::size_t>& others, const std::vector<Group>& candidates);
   bool is_better_held_out(const std::vector<std::size_t>& groups, const std::vector<std::size_t>& than,
                           std::size_t joint) const;
   double penalty(std::size_t group) const;

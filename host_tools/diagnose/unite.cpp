@@ -39,40 +39,82 @@ std::vector<std::vector<double>> starts(const EffectInfo& info, const std::vecto
   return combinations(values);
 }
 
-Group candidate(const EffectInfo& info, std::size_t joint, std::vector<double> shape) {
-  Group group;
-  group.candidate = {std::string(info.name), joint, std::move(shape)};
-  group.nonlinear = static_cast<int>(info.refined_shapes().size());
-  for (const ParameterInfo& p : info.linear) group.lower.push_back(p.lower);
-  return group;
+std::vector<Group> candidates_of(const EffectInfo& info, std::size_t joint, const std::vector<Group>& members,
+                                 const MotionScales& scales) {
+  std::vector<Group> out;
+  for (const std::vector<double>& shape : starts(info, members, scales)) {
+    Group group;
+    group.candidate = {std::string(info.name), joint, shape};
+    group.nonlinear = static_cast<int>(info.refined_shapes().size());
+    for (const ParameterInfo& p : info.linear) group.lower.push_back(p.lower);
+    out.push_back(std::move(group));
+  }
+  return out;
 }
 
 }  // namespace
 
-std::optional<Choice> Search::united(const Choice& choice, const EffectInfo& info, std::size_t joint) {
-  std::vector<std::size_t> others;
-  std::vector<Group> members;
-  for (const std::size_t g : choice.groups) {
-    const Group& group = problem_.groups()[g];
-    const bool member = !group.on_body && group.candidate.joint == joint && is_united(info, group.candidate.effect);
-    if (member) members.push_back(group);
-    if (!member) others.push_back(g);
-  }
-  if (members.empty()) return {};
+/// The choice of those groups and one of the candidates beside them, the best of all and refined; none is possible:
+/// none.
+std::optional<Choice> Search::with_best(const std::vector<std::size_t>& others, const std::vector<Group>& candidates) {
   const Choice without = evaluate(others);
   std::optional<Choice> best;
   const auto consider = [&](std::size_t g) {
     std::vector<std::size_t> groups = others;
     groups.push_back(g);
     Choice tried = evaluate(groups);
-    if (tried.possible() && (!best || tried.score > best->score)) best = std::move(tried);
+    const bool possible = tried.impossible <= without.impossible;
+    if (possible && (!best || tried.score > best->score)) best = std::move(tried);
   };
-  for (const auto& shape : starts(info, members, scales_of(problem_, joint))) {
-    const Group start = candidate(info, joint, shape);
-    consider(problem_.add(start, problem_.make(start)));
-  }
+  for (const Group& start : candidates) consider(problem_.add(start, problem_.make(start)));
   if (best) consider(refine(without, best->groups.back()));
   return best;
+}
+
+std::optional<Choice> Search::united(const Choice& choice, const EffectInfo& info, std::size_t joint) {
+  std::vector<std::size_t> others;
+  std::vector<Group> members;
+  bool parts = false;
+  for (const std::size_t g : choice.groups) {
+    const Group& group = problem_.groups()[g];
+    const bool here = !group.on_body && group.candidate.joint == joint;
+    const bool part = here && is_united(info, group.candidate.effect);
+    // The law itself, beside one of its parts, takes that part in.
+    if (part || (here && group.candidate.effect == info.name)) {
+      members.push_back(group);
+    } else {
+      others.push_back(g);
+    }
+    parts |= part;
+  }
+  if (!parts) return {};
+  return with_best(others, candidates_of(info, joint, members, scales_of(problem_, joint)));
+}
+
+/// A law that explains no more than its parts, or with coefficients that it can't have, is those.
+std::optional<Choice> Search::divided(const Choice& choice, const EffectInfo& info, std::size_t joint) {
+  const auto is_here = [&](std::size_t g, std::string_view effect) {
+    const Group& group = problem_.groups()[g];
+    return !group.on_body && group.candidate.joint == joint && group.candidate.effect == effect;
+  };
+  const auto itself =
+      std::find_if(choice.groups.begin(), choice.groups.end(), [&](std::size_t g) { return is_here(g, info.name); });
+  if (itself == choice.groups.end()) return {};
+  const std::vector<Group> law{problem_.groups()[*itself]};
+  const double needed = threshold(*itself);
+  std::vector<std::size_t> groups = choice.groups;
+  std::erase(groups, *itself);
+  std::optional<Choice> tried;
+  for (const std::string_view part : info.unites) {
+    if (part.empty() || std::any_of(groups.begin(), groups.end(), [&](std::size_t g) { return is_here(g, part); }))
+      continue;
+    tried = with_best(groups, candidates_of(*find_effect(part), joint, law, scales_of(problem_, joint)));
+    if (!tried) return {};
+    groups = tried->groups;
+  }
+  if (!tried) tried = evaluate(groups);  // the parts are all there
+  if (tried->impossible < choice.impossible) return tried;
+  return tried->impossible == choice.impossible && tried->score + needed > choice.score ? tried : std::nullopt;
 }
 
 /// More shapes fit more of a log's own noise: every fold's judge has to be better off as well.
@@ -96,6 +138,7 @@ Choice Search::unite(Choice best) {
             return !fit.named && (fit.effect == info.name || is_united(info, fit.effect));
           }))
         continue;
+      if (auto parts = divided(best, info, j)) best = std::move(*parts);
       std::optional<Choice> tried = united(best, info, j);
       // As any effect it has to bring more than noise does: it holds its parts as special cases.
       if (!tried || tried->score <= best.score + threshold(tried->groups.back())) continue;
