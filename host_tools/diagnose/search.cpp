@@ -460,8 +460,10 @@ std::vector<Found> Search::explain(const Choice& choice, std::optional<Choice>& 
           (mine.on_body || group.candidate.joint == mine.candidate.joint))
         continue;
       // A law comes in place of its parts, not beside them.
-      if (std::any_of(others.begin(), others.end(),
-                      [&](std::size_t g) { return contains(group.candidate, problem_.groups()[g].candidate); }))
+      if (std::any_of(others.begin(), others.end(), [&](std::size_t g) {
+            const EffectCandidate& other = problem_.groups()[g].candidate;
+            return other.joint == group.candidate.joint && contains(group.candidate, other);
+          }))
         continue;
       std::vector<std::size_t> groups = others;
       groups.push_back(refine(without, one.group));
