@@ -130,6 +130,21 @@ TEST_F(SearchOfEffects, OneOfTheUnitedStaysWhereTheOtherDoesNotShow) {
   EXPECT_EQ(candidate(choice, 0).effect, "stribeck");
 }
 
+TEST_F(SearchOfEffects, ALawThatExplainsNoMoreThanItsPartsIsThose) {
+  const Choice choice = run(1, {test::effect("presliding", {0.01}, {4}), test::effect("stribeck", {0.2}, {2})},
+                            {{"lugre", 1, {0.01, 0.2, 0.7}}});
+  ASSERT_EQ(choice.groups.size(), 2U) << names(choice);
+  EXPECT_EQ(candidate(choice, 0).effect, "presliding") << names(choice);
+  EXPECT_EQ(candidate(choice, 1).effect, "stribeck") << names(choice);
+}
+
+TEST_F(SearchOfEffects, ManyContactsAreNotOne) {
+  const std::vector<EffectCandidate> parts{{"presliding", 1, {0.005}}, {"presliding", 1, {0.02}}};
+  const Choice choice = run(1, {test::effect("maxwell_slip", {0.04}, {2, 1, 1, 0.5, 3})}, parts);
+  EXPECT_EQ(names(choice).substr(0, 13), "maxwell_slip ") << names(choice);
+  EXPECT_EQ(choice.groups.size(), 1U) << names(choice);
+}
+
 // Gains of the joints that feel a load do some of its work, and each scores as an effect of its joint alone does.
 TEST_F(SearchOfEffects, GivesOneLoadForSeveralGains) {
   IdentifiedModel robot = model_;

@@ -60,8 +60,13 @@ TEST_F(UnknownsOfAModel, FrictionMayChangeALittleFromSessionToSession) {
                                    [](const Unknown& u) { return u.change && u.joint == 0 && u.effect == 1; });
   ASSERT_NE(change, unknowns.all.end());
   EXPECT_NEAR(change->value, 0.5, 1e-12);
-  EXPECT_NEAR(change->prior_std, std::hypot(0.3 * 2, 1e-3 * 100), 1e-12);
+  EXPECT_NEAR(change->prior_std, std::hypot(0.1 * 2, 1e-3 * 100), 1e-12);
   EXPECT_EQ(change->prior, 0);
+  // What is in proportion to the velocity changes with the grease's warmth: coefficient 1, at most 3 rad/s
+  const auto viscous = std::find_if(unknowns.all.begin(), unknowns.all.end(),
+                                    [](const Unknown& u) { return u.change && u.joint == 0 && u.effect == 0; });
+  ASSERT_NE(viscous, unknowns.all.end());
+  EXPECT_NEAR(viscous->prior_std, std::hypot(0.3 * 1, 1e-3 * 100 / 3), 1e-12);
 }
 
 // model.json with more damping would be refused: bristles would drive the joint.
@@ -81,7 +86,7 @@ TEST_F(UnknownsOfAModel, LuGreStaysFriction) {
 TEST_F(UnknownsOfAModel, HowMuchIsAThreshold) {
   models_.has_baseline = true;
   models_.healthy = models_.current;
-  models_.options.prior = {.friction_change = 0.5, .smallest_change = 0};
+  models_.options.prior = {.dry_friction_change = 0.5, .smallest_change = 0};
   const Unknowns unknowns = make_unknowns(models_);
   const auto change = std::find_if(unknowns.all.begin(), unknowns.all.end(),
                                    [](const Unknown& u) { return u.change && u.joint == 0 && u.effect == 1; });
