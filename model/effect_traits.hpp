@@ -80,7 +80,7 @@ class OfScales {
 struct ShapeValues {
   OfScales<ValueList> tried{};    ///< by `diagnose`; not for ShapeSearch::spectrum
   OfScales<ValueList> judged{};   ///< by `excite`, the typical one first
-  OfScales<ShapeRange> fitted{};  ///< searched by `identify`; none: it can't fit the effect
+  OfScales<ShapeRange> fitted{};  ///< where `identify` begins its search; none: it can't fit the effect
   ShapeSearch search = ShapeSearch::refine;
   bool seen_by_encoder = false;  ///< a path: what is shorter than the encoder's step does not show
   /// For deflections that a link encoder shows: where the fit begins, then what it tries.
@@ -94,7 +94,7 @@ struct ParameterInfo {
   std::string_view name;
   std::string_view unit;            ///< revolute joint
   std::string_view unit_prismatic;  ///< prismatic joint
-  double lower, upper;              ///< bounds that fits and scenarios keep
+  double lower, upper;              ///< bounds that scenarios and all fits keep, the last ones too
   /// Linear parameter: the quantity of its phi. Shape: the quantity that the tables store (see stored_shape()).
   Quantity quantity;
   std::string_view source;

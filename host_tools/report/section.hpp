@@ -14,7 +14,7 @@ namespace fxdyn {
 
 /// What a section may draw from.
 struct ReportInput {
-  const IdentifiedModel& fitted;           ///< effects/model_parts.hpp looks into it
+  const IdentifiedModel& fitted;           ///< effects/model_parts.hpp gives its parts, identified_model.hpp all of it
   const nlohmann::json model;              ///< the same as in model.json, enough for most sections
   const std::vector<ProcessedLog>& logs;   ///< to draw: the test logs, else validate, else train
   const Results& results;                  ///< all result files that a section needs

@@ -93,29 +93,35 @@ near out/known/model.json shape linear
 
 step "diagnose"
 must diagnose hidden.toml --out out/hidden
-[ "$(value out/hidden/diagnosis.json "[[e['effect'] for e in j['effects']] for j in d['joints']]")" = "[[], ['$effect']]" ] ||
-  fail "diagnose: $(value out/hidden/diagnosis.json "[[e['effect'] for e in j['effects']] for j in d['joints']]")"
-near out/hidden/model.json linear
+found=$(value out/hidden/diagnosis.json "[[e['effect'] for e in j['effects']] for j in d['joints']]")
+# What goes on is a model that has the effect.
+run=hidden
+if [ "$found" = "[[], ['$effect']]" ]; then
+  near out/hidden/model.json linear
+else
+  fail "diagnose: found $found; the steps below go on with known.toml"
+  run=known
+fi
 
 step "predict"
-must predict --model out/hidden/model.json --log test.csv --out out/prediction
+must predict --model out/$run/model.json --log test.csv --out out/prediction
 relative=$(value out/prediction/metrics.json "max(j['relative'] for j in d['logs'][0]['joints'])")
 awk -v r="$relative" 'BEGIN { exit !(r < 0.01) }' || fail "predict: relative error $relative"
 
 step "export"
-must export hidden.toml --out out/hidden
-grep -q "$type" out/hidden/tables.hpp || fail "export: the tables do not name it"
+must export $run.toml --out out/$run
+grep -q "$type" out/$run/tables.hpp || fail "export: the tables do not name it"
 
 step "image for a Cortex-M4"
-"$root/toolchains/build_image.sh" out/hidden/tables.hpp image cortex-m4 ${header:+"$header"} >said.txt 2>&1 || {
+"$root/toolchains/build_image.sh" out/$run/tables.hpp image cortex-m4 ${header:+"$header"} >said.txt 2>&1 || {
   cat said.txt
   fail "the image does not build"
   exit 1
 }
 
 step "replay in QEMU"
-must replay hidden.toml --out out/hidden --image image/fxdyn-mps2-an386.elf --ticks 500
-[ "$(value out/hidden/replay.json "d['bit_exact']")" = True ] || fail "replay: not bit for bit"
+must replay $run.toml --out out/$run --image image/fxdyn-mps2-an386.elf --ticks 500
+[ "$(value out/$run/replay.json "d['bit_exact']")" = True ] || fail "replay: not bit for bit"
 
 step "done"
 exit $((failures > 0))

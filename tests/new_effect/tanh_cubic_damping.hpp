@@ -25,7 +25,7 @@ struct TanhCubicDamping {
                                        .experiments = {experiments::constant_speeds, experiments::small_reversals},
                                        .friction = true};
   static constexpr std::array shape{
-      ParameterInfo{"velocity", "rad/s", "m/s", 1e-5, 1e3, Quantity::inverse_velocity, "made up for this test", knee}};
+      ParameterInfo{"velocity", "rad/s", "m/s", 0.02, 1e3, Quantity::inverse_velocity, "made up for this test", knee}};
   static constexpr std::array linear{
       ParameterInfo{"amplitude", "N*m", "N", 0, unbounded, Quantity::unit, "made up for this test"}};
   template <class N>
