@@ -40,6 +40,7 @@ class Court {
     for (std::size_t l = 0; l < logs.size(); ++l) {
       if (!logs[l].healthy && logs[l].fits) today_.push_back(l);
     }
+    for (const std::size_t l : today_) torque_.push_back(torque(l, 0, 0));
     explainable_ = explainable();
   }
 
@@ -125,17 +126,20 @@ class Court {
     faults_.push_back(std::move(fault));
   }
 
-  /// A secant through the shift that was found last, so that large shifts count as well.
+  /// A secant through the shift that was found last, so that large shifts count as well. Only one that explains
+  /// something is worth further rounds.
   void ask_zero(std::size_t joint) {
+    constexpr int most_rounds = 4;
     double shift = options_.first_shift;
     LinearFit fit;
-    for (int round = 0; round < 4; ++round) {
+    for (int round = 0; round < most_rounds; ++round) {
       std::vector<MatrixXd> rows = no_rows(1);
-      for (const std::size_t l : today_) put(l, (torque(l, joint, shift) - torque(l, joint, 0)) / shift, 0, rows);
+      for (std::size_t i = 0; i < today_.size(); ++i)
+        put(today_[i], (torque(today_[i], joint, shift) - torque_[i]) / shift, 0, rows);
       fit = fit_with(std::move(rows));
-      const double found = fit.x[fit.x.size() - 1];
-      if (!(std::fabs(found) > options_.least_shift) || std::fabs(found) > std::numbers::pi) return;
-      shift = found;
+      shift = fit.x[fit.x.size() - 1];
+      if (!(std::fabs(shift) > options_.least_shift) || std::fabs(shift) > std::numbers::pi) return;
+      if (likelihood(problem_, fit) - nothing_ < options_.least_score) return;
     }
     const Joint& j = model().robot.joints[joint];
     judge(fit, 1,
@@ -149,7 +153,7 @@ class Court {
     std::vector<MatrixXd> rows = no_rows(2 * static_cast<Index>(today_.size()));
     for (std::size_t i = 0; i < today_.size(); ++i) {
       const Motion& motion = problem_.motion(today_[i]);
-      const MatrixXd tau = torque(today_[i], 0, 0);
+      const MatrixXd& tau = torque_[i];
       const Index n = tau.rows();
       MatrixXd rate = MatrixXd::Zero(n, tau.cols());
       rate.middleRows(1, n - 2) = (tau.bottomRows(n - 2) - tau.topRows(n - 2)) / (2 * motion.step_s);
@@ -203,7 +207,8 @@ class Court {
   LinearFit healthy_;
   double nothing_;
   double explainable_ = 0;
-  std::vector<std::size_t> today_;
+  std::vector<std::size_t> today_;  ///< logs that fit
+  std::vector<MatrixXd> torque_;    ///< of the nominal model, by log of today
   std::vector<RecordingFault> faults_;
 };
 

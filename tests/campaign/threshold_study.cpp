@@ -84,36 +84,42 @@ Answer varied(const Prepared& prepared, const Case& one, const Threshold& thresh
   return answer;
 }
 
+/// What each threshold is multiplied by: halved and doubled, or as good as taken away.
+struct Factors {
+  double low = 0.5, high = 2;
+};
+
 /// What this very program answered before, to these thresholds.
-json key_of(const std::vector<Threshold>& thresholds) {
+json key_of(const std::vector<Threshold>& thresholds, const Factors& factors) {
   json names = json::array();
   for (const Threshold& threshold : thresholds) names.push_back(threshold.name);
-  return {{"program", hash_of_file("/proc/self/exe")}, {"thresholds", names}};
+  return {{"program", hash_of_file("/proc/self/exe")}, {"thresholds", names}, {"factors", {factors.low, factors.high}}};
 }
 
-CaseAnswers study(const Case& one, const std::vector<Threshold>& thresholds, const fs::path& out) {
+CaseAnswers study(const Case& one, const std::vector<Threshold>& thresholds, const Factors& factors,
+                  const fs::path& out) {
   const auto start = std::chrono::steady_clock::now();
   const fs::path file = out / (one.name + ".json");
   if (fs::exists(file)) {
     const json before = json::parse(read_file(file));
-    if (before.value("key", json()) == key_of(thresholds)) return case_answers(before.at("answers"));
+    if (before.value("key", json()) == key_of(thresholds, factors)) return case_answers(before.at("answers"));
   }
   const Prepared prepared(one, out);
   CaseAnswers answers;
   answers.normal = prepared.answer({});
   for (const Threshold& threshold : thresholds) {
-    answers.halved.push_back(varied(prepared, one, threshold, answers.normal, 0.5));
-    answers.doubled.push_back(varied(prepared, one, threshold, answers.normal, 2));
+    answers.halved.push_back(varied(prepared, one, threshold, answers.normal, factors.low));
+    answers.doubled.push_back(varied(prepared, one, threshold, answers.normal, factors.high));
   }
   fmt::print("{}: {}, {} ({:.1f} s)\n", one.name, words_of(answers.normal), answers.normal.right ? "right" : "wrong",
              std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   std::fflush(stdout);
-  write_file(file, json{{"key", key_of(thresholds)}, {"answers", to_json(answers)}}.dump(1) + "\n");
+  write_file(file, json{{"key", key_of(thresholds, factors)}, {"answers", to_json(answers)}}.dump(1) + "\n");
   return answers;
 }
 
 std::vector<CaseAnswers> study_all(const std::vector<Case>& cases, const std::vector<Threshold>& thresholds,
-                                   const fs::path& out, std::size_t jobs) {
+                                   const Factors& factors, const fs::path& out, std::size_t jobs) {
   std::vector<CaseAnswers> answers(cases.size());
   std::atomic<std::size_t> next = 0;
   std::exception_ptr failure;
@@ -123,7 +129,7 @@ std::vector<CaseAnswers> study_all(const std::vector<Case>& cases, const std::ve
     workers.emplace_back([&] {
       for (std::size_t at; (at = next++) < cases.size();) {
         try {
-          answers[at] = study(cases[at], thresholds, out);
+          answers[at] = study(cases[at], thresholds, factors, out);
         } catch (...) {
           const std::lock_guard lock(mutex);
           failure = std::current_exception();
@@ -161,10 +167,14 @@ int run(int argc, char** argv) {
   CLI::App app("Diagnoses small cases with each deciding threshold halved and doubled");
   fs::path out, against;
   std::size_t jobs = 1;
+  Factors factors;
   std::vector<std::string> some_cases, some_thresholds;
   bool list = false;
   app.add_option("--out", out, "folder for table and answers; what this program answered there is not asked again")
       ->required();
+  app.add_option("--low", factors.low, "instead of halving; 0 takes a lower bound away")->check(CLI::Range(0.0, 1.0));
+  app.add_option("--high", factors.high, "instead of doubling; 1e6 takes an upper bound away")
+      ->check(CLI::Range(1.0, 1e9));
   app.add_option("--jobs", jobs, "cases at a time")->check(CLI::Range(1, 64));
   app.add_option("--case", some_cases, "only these");
   app.add_option("--threshold", some_thresholds, "only these");
@@ -189,7 +199,7 @@ int run(int argc, char** argv) {
   }
   fs::create_directories(out);
   out = fs::absolute(out);
-  const std::string table = to_markdown(rows_of(thresholds, study_all(cases, thresholds, out, jobs)));
+  const std::string table = to_markdown(rows_of(thresholds, study_all(cases, thresholds, factors, out, jobs)));
   write_file(out / "thresholds.md", table);
   fmt::print("{}", table);
   return against.empty() || missing_in(read_file(against), table) == 0 ? 0 : 1;
