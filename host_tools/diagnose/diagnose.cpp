@@ -133,6 +133,8 @@ class Diagnoser {
     models_.current.session = session_;
     Diagnosis result;
     result.still = still_;
+    // Of a baseline alone: what slipped since has bent nothing yet.
+    const Models start = models_;
     // The model before: no effect that is to be found, its parameters the best without.
     Models before = models_;
     refit(before, logs_, plain(), 8);
@@ -157,7 +159,7 @@ class Diagnoser {
     result.nominal = before.current;
 
     Outcome outcome = explore(models_, logs_, settings_, never_, 2, progress_);
-    refuse_faulty_recordings(before, outcome);
+    refuse_faulty_recordings(start, outcome);
     Gate gate = pass(outcome, models_.current, logs_, still_);
     if (refit_links(outcome)) gate = pass(outcome, models_.current, logs_, still_);
     weigh_evidence(outcome, gate);

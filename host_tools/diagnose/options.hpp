@@ -210,6 +210,8 @@ struct RecordingOptions {
   double least_shift = 1e-3;
   /// samples; lag that two clocks gather over a log; theory: less is within the step of the samples
   double least_drift = 1;
+  /// standard deviations; off nothing that a fault's parameter must be; theory: 2 Phi(-4) = 6e-5
+  double deviations = 4;
 };
 
 struct Options {

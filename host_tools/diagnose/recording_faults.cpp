@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "host_tools/diagnose/features.hpp"
 #include "host_tools/effects/effect_roles.hpp"
@@ -28,34 +27,41 @@ double likelihood(const Linearised& problem, const LinearFit& fit) {
   return out;
 }
 
-/// Asks each fault in turn, around one linearisation.
-class Court {
+/// Fits each fault in turn, around one linearisation.
+class FaultFits {
  public:
-  Court(const Models& nominal, const std::vector<SessionLog>& logs, const std::vector<VectorXd>& whitening)
+  FaultFits(const Models& nominal, const std::vector<SessionLog>& logs, const std::vector<VectorXd>& whitening)
       : nominal_(nominal),
         problem_(nominal, logs, whitening),
         options_(nominal.options.recording),
-        healthy_(problem_.solver().solve(problem_.nuisance())),
-        nothing_(likelihood(problem_, healthy_)) {
+        sound_(problem_.solver().solve(problem_.columns_of({}))),
+        sound_likelihood_(likelihood(problem_, sound_)),
+        price_(std::log(std::max(problem_.solver().row_count(problem_.blocks().fit_of(false)).maxCoeff(), 2.0))) {
     for (std::size_t l = 0; l < logs.size(); ++l) {
-      if (!logs[l].healthy && logs[l].fits) today_.push_back(l);
+      if (logs[l].healthy || !logs[l].fits) continue;
+      today_.push_back(l);
+      torque_.push_back(torque(l, 0, 0));
     }
-    for (const std::size_t l : today_) torque_.push_back(torque(l, 0, 0));
     explainable_ = explainable();
   }
 
   std::vector<RecordingFault> all() {
     if (nominal_.has_baseline) {
-      for (std::size_t j = 0; j < problem_.joints(); ++j) ask_zero(j);
+      for (std::size_t j = 0; j < problem_.joints(); ++j) fit_zero(j);
     }
-    ask_clocks();
-    for (const std::size_t l : today_) {
-      if (today_.size() > 1) ask_load(l);
+    fit_clocks();
+    // Of two logs without a baseline either may be the odd one: the last is asked.
+    const bool either = today_.size() == 2 && !nominal_.has_baseline;
+    for (std::size_t i = either ? 1 : 0; i < today_.size() && today_.size() > 1; ++i) {
+      fit_load(i);
+      for (std::size_t j = 0; j < problem_.joints(); ++j) fit_gain(i, j);
     }
     std::sort(faults_.begin(), faults_.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
     return std::move(faults_);
   }
-  double nothing() const { return nothing_; }
+  double sound_likelihood() const { return sound_likelihood_; }
+  /// What a parameter costs: of the rows of one joint today, as in the search.
+  double price() const { return price_; }
 
  private:
   const IdentifiedModel& model() const { return nominal_.current; }
@@ -70,142 +76,174 @@ class Court {
     return predict(with_load_of(entry(log).log, model()), q, motion.dq, motion.ddq, motion.step_s);
   }
 
-  /// Columns of one log at full rate as rows of all blocks, by joint.
-  void put(std::size_t log, const MatrixXd& full, Index column, std::vector<MatrixXd>& rows) const {
+  /// A joint's column of one log, at full rate, among the rows of all blocks.
+  void put(std::size_t log, std::size_t joint, const VectorXd& full, Index column, std::vector<MatrixXd>& rows) const {
     const Block& block = problem_.blocks().of_log[log];
     const MatrixXd decimated = entry(log).log.decimate(entry(log).log.filter_columns(full));
-    for (std::size_t j = 0; j < rows.size(); ++j) {
-      rows[j].col(column).segment(block.first, block.count) =
-          problem_.noise().apply(log, j, decimated.col(static_cast<Index>(j)));
-    }
+    rows[joint].col(column).segment(block.first, block.count) = problem_.noise().apply(log, joint, decimated);
+  }
+  void put(std::size_t log, const MatrixXd& full, Index column, std::vector<MatrixXd>& rows) const {
+    for (std::size_t j = 0; j < rows.size(); ++j) put(log, j, full.col(static_cast<Index>(j)), column, rows);
   }
   std::vector<MatrixXd> no_rows(Index columns) const {
     return std::vector<MatrixXd>(problem_.joints(), MatrixXd::Zero(problem_.blocks().rows(), columns));
   }
 
-  /// A fit with the columns; they stay in the problem, which does no harm.
-  LinearFit fit_with(std::vector<MatrixXd> rows) {
+  /// Columns as a group of the problem, which keeps them: that does no harm.
+  std::size_t add(std::vector<MatrixXd> rows) {
     for (std::size_t j = 0; j < rows.size(); ++j) {
+      if (rows[j].size() == 0) continue;
       if (const Background* background = problem_.background(j)) rows[j] = background->eliminate(rows[j]);
     }
     Group group;
     group.candidate = {std::string(load_effect().name), 0, {}};
     group.on_body = true;
-    const std::size_t g = problem_.add(group, rows);
-    return problem_.solver().solve(problem_.columns_of({g}));
+    return problem_.add(group, rows);
+  }
+  LinearFit fit_with(std::vector<MatrixXd> rows) {
+    return problem_.solver().solve(problem_.columns_of({add(std::move(rows))}));
+  }
+  /// Standard deviation of a fit's coefficient.
+  static double deviation(const LinearFit& fit, Index at) {
+    return std::sqrt(std::max(SymmetricSolver(fit.information).inverse()(at, at), 0.0));
+  }
+  double gain_of(const LinearFit& fit) const {
+    return (problem_.solver().weights().array() * (sound_.square - fit.square).array()).sum();
   }
 
-  /// What any function of the state, the motion and time explains of today's residual, in noise variances.
-  double explainable() const {
-    double out = 0;
+  /// What the nominal model and any function of the state, the motion and time explain more than the model alone, in
+  /// noise variances beyond those that noise gives.
+  double explainable() {
+    std::vector<std::size_t> groups;
+    double free = 0;
     for (std::size_t j = 0; j < problem_.joints(); ++j) {
-      const MatrixXd functions = features(problem_, j);
-      const VectorXd residual = problem_.solver().residual(j, healthy_);
-      MatrixXd gram = MatrixXd::Zero(functions.cols(), functions.cols());
-      VectorXd projection = VectorXd::Zero(functions.cols());
-      for (const std::size_t b : problem_.blocks().fit_of(false)) {
-        const Block& block = problem_.blocks().all[b];
-        const auto f = functions.middleRows(block.first, block.count);
-        gram.noalias() += f.transpose() * f;
-        projection.noalias() += f.transpose() * residual.segment(block.first, block.count);
-      }
-      gram.diagonal().array() += 1e-9 * std::max(gram.trace(), 1e-300);
-      out +=
-          problem_.solver().weights()[static_cast<Index>(j)] * projection.dot(SymmetricSolver(gram).solve(projection));
-      out -= static_cast<double>(functions.cols());
+      std::vector<MatrixXd> rows(problem_.joints());
+      rows[j] = features(problem_, j);
+      free += static_cast<double>(rows[j].cols());
+      groups.push_back(add(std::move(rows)));
     }
-    return out;
+    return gain_of(problem_.solver().solve(problem_.columns_of(groups))) - free;
   }
 
-  void judge(const LinearFit& fit, Index parameters, std::string complaint) {
+  /// @param already a fit that the fault has to be better than, with so many parameters of its own
+  void weigh(const LinearFit& fit, Index parameters, std::string complaint, const LinearFit* already = nullptr) {
     RecordingFault fault;
     fault.complaint = std::move(complaint);
-    fault.score = likelihood(problem_, fit) - nothing_ - static_cast<double>(parameters) * std::log(fit.rows.sum());
-    const double gain = (problem_.solver().weights().array() * (healthy_.square - fit.square).array()).sum();
-    fault.closure = (gain - static_cast<double>(parameters)) / std::max(explainable_, 1.0);
+    fault.score = likelihood(problem_, fit) - sound_likelihood_ - static_cast<double>(parameters) * price_;
+    const double before = already == nullptr ? 0 : gain_of(*already);
+    const double left = std::max(explainable_, gain_of(fit)) - before;
+    fault.closure = left > 0 ? (gain_of(fit) - before - static_cast<double>(parameters)) / left : 0;
     faults_.push_back(std::move(fault));
   }
 
   /// A secant through the shift that was found last, so that large shifts count as well. Only one that explains
   /// something is worth further rounds.
-  void ask_zero(std::size_t joint) {
-    constexpr int most_rounds = 4;
+  void fit_zero(std::size_t joint) {
+    constexpr int most_rounds = 10;
+    const JointFit& limits = model().joints[joint];
     double shift = options_.first_shift;
-    LinearFit fit;
     for (int round = 0; round < most_rounds; ++round) {
       std::vector<MatrixXd> rows = no_rows(1);
       for (std::size_t i = 0; i < today_.size(); ++i)
         put(today_[i], (torque(today_[i], joint, shift) - torque_[i]) / shift, 0, rows);
-      fit = fit_with(std::move(rows));
-      shift = fit.x[fit.x.size() - 1];
-      if (!(std::fabs(shift) > options_.least_shift) || std::fabs(shift) > std::numbers::pi) return;
-      if (likelihood(problem_, fit) - nothing_ < options_.least_score) return;
+      const LinearFit fit = fit_with(std::move(rows));
+      const Index at = fit.x.size() - 1;
+      const double before = shift;
+      shift = fit.x[at];
+      if (!(std::fabs(shift) > options_.least_shift) || std::fabs(shift) > limits.q_upper - limits.q_lower) return;
+      if (likelihood(problem_, fit) - sound_likelihood_ < options_.least_score) return;
+      if (std::fabs(shift - before) > 0.05 * std::fabs(shift)) continue;
+      if (std::fabs(shift) < options_.deviations * deviation(fit, at)) return;
+      const Joint& j = model().robot.joints[joint];
+      weigh(fit, 1,
+            fmt::format("{}: its encoder slipped since the baseline: these logs fit best with {:+.4g} {} added to its "
+                        "position; correct that, or record the baseline again",
+                        j.name, shift, j.position_unit()));
+      return;
     }
-    const Joint& j = model().robot.joints[joint];
-    judge(fit, 1,
-          fmt::format("{}: its encoder slipped since the baseline: these logs fit best with {:+.4g} {} added to its "
-                      "position; correct that, or record the baseline again",
-                      j.name, shift, j.position_unit()));
   }
 
-  /// Of all of today's logs together: they have one recorder.
-  void ask_clocks() {
-    std::vector<MatrixXd> rows = no_rows(2 * static_cast<Index>(today_.size()));
+  /// Lags of all of today's logs, with or without their growth: they have one recorder.
+  std::vector<MatrixXd> lag_rows(bool growing) const {
+    std::vector<MatrixXd> rows = no_rows((growing ? 2 : 1) * static_cast<Index>(today_.size()));
     for (std::size_t i = 0; i < today_.size(); ++i) {
       const Motion& motion = problem_.motion(today_[i]);
       const MatrixXd& tau = torque_[i];
-      const Index n = tau.rows();
+      const Index n = tau.rows(), column = static_cast<Index>(i), count = static_cast<Index>(today_.size());
       MatrixXd rate = MatrixXd::Zero(n, tau.cols());
       rate.middleRows(1, n - 2) = (tau.bottomRows(n - 2) - tau.topRows(n - 2)) / (2 * motion.step_s);
+      put(today_[i], rate, column, rows);
+      if (!growing) continue;
       const VectorXd since = (motion.t.array() - motion.t.mean()).matrix();
-      put(today_[i], rate, 2 * static_cast<Index>(i), rows);
-      put(today_[i], since.asDiagonal() * rate, 2 * static_cast<Index>(i) + 1, rows);
+      put(today_[i], since.asDiagonal() * rate, count + column, rows);
     }
-    const Index columns = rows[0].cols();
-    const LinearFit fit = fit_with(std::move(rows));
-    double most = 0;
-    std::string complaint;
-    for (std::size_t i = 0; i < today_.size(); ++i) {
-      const Motion& motion = problem_.motion(today_[i]);
-      const Index at = fit.x.size() - columns + 2 * static_cast<Index>(i);
-      const double half = fit.x[at + 1] * (motion.t[motion.t.size() - 1] - motion.t[0]) / 2;
-      if (std::fabs(half) <= most || 2 * std::fabs(half) < options_.least_drift * motion.step_s) continue;
-      most = std::fabs(half);
-      complaint = fmt::format(
-          "{}: position and torque have two clocks: the torque is {:.3g} ms early at the start and {:.3g} ms at the "
-          "end; "
-          "record both with one clock",
-          name(today_[i]), 1e3 * (fit.x[at] - half), 1e3 * (fit.x[at] + half));
-    }
-    if (!complaint.empty()) judge(fit, columns, complaint);
+    return rows;
   }
 
-  void ask_load(std::size_t log) {
+  /// A constant lag is an effect or how signals are sampled; one that grows is two clocks.
+  void fit_clocks() {
+    const LinearFit constant = fit_with(lag_rows(false)), growing = fit_with(lag_rows(true));
+    const auto count = static_cast<Index>(today_.size());
+    const double better =
+        likelihood(problem_, growing) - likelihood(problem_, constant) - static_cast<double>(count) * price_;
+    if (better < options_.least_score) return;
+    double most = 0;
+    std::string complaint;
+    for (Index i = 0; i < count; ++i) {
+      const std::size_t log = today_[static_cast<std::size_t>(i)];
+      const Motion& motion = problem_.motion(log);
+      const Index at = growing.x.size() - 2 * count + i;
+      const double slope = growing.x[at + count], grown = slope * (motion.t[motion.t.size() - 1] - motion.t[0]);
+      if (std::fabs(slope) < options_.deviations * deviation(growing, at + count)) continue;
+      if (std::fabs(grown) <= most || std::fabs(grown) < options_.least_drift * motion.step_s) continue;
+      most = std::fabs(grown);
+      complaint = fmt::format(
+          "{}: position and torque have two clocks: the lag between them changes by {:.3g} ms from start to end; "
+          "record "
+          "both with one clock",
+          name(log), 1e3 * most);
+    }
+    if (!complaint.empty()) weigh(growing, 2 * count, complaint, &constant);
+  }
+
+  void fit_load(std::size_t i) {
     Group load;
     load.candidate = {std::string(load_effect().name), 0, {}};
     load.on_body = true;
-    std::vector<MatrixXd> rows = problem_.make(load);
-    const Block& block = problem_.blocks().of_log[log];
-    const Index total = problem_.blocks().rows();
-    for (MatrixXd& of_joint : rows) {
-      if (of_joint.size() == 0) of_joint = MatrixXd::Zero(total, 4);
-      MatrixXd alone = MatrixXd::Zero(total, of_joint.cols());
-      alone.middleRows(block.first, block.count) = of_joint.middleRows(block.first, block.count);
-      of_joint = std::move(alone);
+    const EffectColumns columns = problem_.log_columns().of(today_[i], load);
+    const auto parameters = static_cast<Index>(load_effect().linear.size());
+    std::vector<MatrixXd> rows = no_rows(parameters);
+    for (std::size_t j = 0; j < rows.size(); ++j) {
+      for (Index c = 0; c < columns.joints[j].cols(); ++c) put(today_[i], j, columns.joints[j].col(c), c, rows);
     }
     const LinearFit fit = fit_with(std::move(rows));
-    const double mass = fit.x[fit.x.size() - 4];
-    judge(fit, 4,
+    const Index at = fit.x.size() - parameters;
+    if (std::fabs(fit.x[at]) < options_.deviations * deviation(fit, at)) return;
+    weigh(fit, parameters,
           fmt::format("{}: recorded with another load than the other logs ({:+.3g} kg): say so by `payload` of its "
                       "[[log]], or leave it out",
-                      name(log), mass));
+                      name(today_[i]), fit.x[at]));
+  }
+
+  /// What one joint's torque has in one log alone may look like a load.
+  void fit_gain(std::size_t i, std::size_t joint) {
+    std::vector<MatrixXd> rows = no_rows(1);
+    put(today_[i], joint, torque_[i].col(static_cast<Index>(joint)), 0, rows);
+    const LinearFit fit = fit_with(std::move(rows));
+    const Index at = fit.x.size() - 1;
+    if (std::fabs(fit.x[at]) < options_.deviations * deviation(fit, at)) return;
+    weigh(
+        fit, 1,
+        fmt::format("{}: its torque of {} is {:.3g} times that of the other logs: another unit or gain? Correct it or "
+                    "leave the log out",
+                    name(today_[i]), model().robot.joints[joint].name, 1 + fit.x[at]));
   }
 
   const Models& nominal_;
   Linearised problem_;
   const RecordingOptions& options_;
-  LinearFit healthy_;
-  double nothing_;
+  LinearFit sound_;
+  double sound_likelihood_, price_;
   double explainable_ = 0;
   std::vector<std::size_t> today_;  ///< logs that fit
   std::vector<MatrixXd> torque_;    ///< of the nominal model, by log of today
@@ -216,23 +254,22 @@ class Court {
 
 std::vector<RecordingFault> recording_faults(const Models& nominal, const std::vector<SessionLog>& logs,
                                              const std::vector<VectorXd>& whitening) {
-  return Court(nominal, logs, whitening).all();
+  return FaultFits(nominal, logs, whitening).all();
 }
 
 std::optional<RecordingFault> likely_recording_fault(const Models& nominal, const std::vector<SessionLog>& logs,
                                                      const Outcome& outcome) {
   const RecordingOptions& options = nominal.options.recording;
-  Court court(nominal, logs, outcome.whitening);
+  FaultFits fits(nominal, logs, outcome.whitening);
   const Linearised& found = *outcome.problem;
   const std::vector<std::size_t> named = in_model(found);
-  const LinearFit fit = found.solver().solve(found.columns_of(named));
-  double score = likelihood(found, fit) - court.nothing();
+  double score = likelihood(found, found.solver().solve(found.columns_of(named))) - fits.sound_likelihood();
   for (const std::size_t g : named) {
     const Group& group = found.groups()[g];
-    score -= static_cast<double>(group.count) * std::log(fit.rows.sum());
+    score -= static_cast<double>(group.count - find_effect(group.candidate.effect)->share) * fits.price();
   }
   const double needed = std::max(score, 0.0) + options.least_score;
-  for (RecordingFault& fault : court.all()) {
+  for (RecordingFault& fault : fits.all()) {
     if (fault.score >= needed && fault.closure >= options.least_closure) return std::move(fault);
   }
   return std::nullopt;

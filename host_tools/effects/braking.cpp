@@ -14,6 +14,7 @@ namespace {
 std::string stiff_parts(const EffectInfo& info, std::string_view parameter) {
   std::string out = fmt::format("`{}`", info.replaces);
   for (const std::string_view part : info.unites) {
+    if (part.empty()) continue;
     const auto& shape = find_effect(part)->shape;
     if (std::none_of(shape.begin(), shape.end(), [&](const ParameterInfo& one) { return one.name == parameter; }))
       out += fmt::format(" and `{}`", part);
@@ -36,7 +37,7 @@ std::optional<std::string> out_of_range(const EffectFit& fit, const EffectInfo& 
     if (auto why = check(info.shape[i], fit.shape[i])) return why;
   }
   // A damping that came out below zero of noisy data is no reason to refuse the model; a static friction is.
-  return check(info.linear[0], fit.linear[0]);
+  return info.brakes.given ? check(info.linear[0], fit.linear[0]) : std::nullopt;
 }
 
 }  // namespace
@@ -62,8 +63,9 @@ void let_it_brake(JointFit& joint) {
 std::optional<std::string> why_it_does_not_brake(const JointFit& joint, double dq_limit) {
   for (const EffectFit& fit : joint.effects) {
     const EffectInfo& info = *find_effect(fit.effect);
-    if (!info.brakes.given) continue;
+    if (!info.brakes.given && !info.unites_others()) continue;
     if (auto why = out_of_range(fit, info)) return why;
+    if (!info.brakes.given) continue;
     const double value = fit.linear[info.brakes.coefficient], most = *most_that_brakes(joint, fit, dq_limit);
     if (value <= most) continue;
     return fmt::format(

@@ -28,13 +28,15 @@ std::vector<PlannedSeries> read_planned_series(const std::filesystem::path& file
   try {
     const json plan = json::parse(read_file(file));
     for (const json& trajectory : plan.at("trajectories")) {
-      PlannedSeries one{trajectory.at("name"), trajectory.value("period_s", 0.0), {}};
+      PlannedSeries one{trajectory.at("name"), 0, {}};
+      if (trajectory.contains("series")) one.period_s = trajectory.at("period_s");
       for (const json& joint : trajectory.value("series", json::array())) {
         one.joints.push_back({joint.at("centre"), vector(joint.at("a")), vector(joint.at("b"))});
         const FourierJoint& series = one.joints.back();
         if (series.a.size() == 0 || series.a.size() != series.b.size())
           throw InputError(file.string() + ": a and b of a series differ in length");
       }
+      if (!one.joints.empty() && !(one.period_s > 0)) throw InputError(file.string() + ": a period_s is not above 0");
       out.push_back(std::move(one));
     }
   } catch (const json::exception&) {

@@ -134,9 +134,9 @@ void add_others(List& list) {
   list.add(Group::pair, {{"payload", 0.02}, {"spring", 0.02}}, "payload_spring");
   for (const char* effect : {"ripple", "stribeck", "viscous_cubic"})
     list.add(Group::no_baseline, {{effect, 0.02}}, effect).baseline = false;
-  for (const auto& [effect, deflection] :
+  for (const auto& [effect, size] :
        {std::pair{"elasticity", 5e-4}, std::pair{"eccentricity", 2e-4}, std::pair{"backlash", 5e-4}})
-    list.add(Group::dual_encoder, {{effect, 0, {}, false, deflection}}, effect).link_encoders = true;
+    list.add(Group::dual_encoder, {{effect, 0, {}, false, size}}, effect).link_encoders = true;
   list.add(Group::background, {}, "quiet").background = {{"ripple", 0.006}, {"stribeck", 0.01}};
   list.add(Group::background, {{"spring", 0.01}}, "spring").background = {{"ripple", 0.006}, {"stribeck", 0.01}};
   list.add(Group::single, {{"stribeck", 0.02}}, "stribeck_15_bits").recording.encoder_bits = 15;
@@ -231,7 +231,10 @@ std::vector<ThresholdRow> rows_of(const std::vector<Threshold>& thresholds, cons
   std::vector<ThresholdRow> rows;
   for (std::size_t t = 0; t < thresholds.size(); ++t) {
     Options defaults;
-    ThresholdRow row{thresholds[t].name, thresholds[t].unit, thresholds[t].of(defaults)};
+    ThresholdRow row;
+    row.name = thresholds[t].name;
+    row.unit = thresholds[t].unit;
+    row.value = thresholds[t].of(defaults);
     for (const CaseAnswers& one : answers) {
       ++row.cases;
       row.right += static_cast<std::size_t>(one.normal.right);

@@ -5,6 +5,7 @@
 
 #include "host_tools/support/error.hpp"
 #include "tests/diagnose/arm_sessions.hpp"
+#include "tests/support/sanitizers.hpp"
 
 // What is wrong with a recording gets a complaint, and no effect gets its name.
 
@@ -33,6 +34,31 @@ TEST(RecordingFaults, AnEncoderThatSlippedSinceTheBaseline) {
   const std::string said = complaint("slipped", {.tamper = [](Log& log) { log.q.col(1).array() += 0.15; }});
   EXPECT_NE(said.find("elbow: its encoder slipped since the baseline"), std::string::npos) << said;
   EXPECT_NEAR(number_after(said, "best with "), -0.15, 0.03) << said;
+}
+
+TEST(RecordingFaults, AnEncoderThatSlippedFar) {
+  if (test::sanitized) GTEST_SKIP() << "other cases run the same code";
+  const std::string said = complaint("slipped_far", {.tamper = [](Log& log) { log.q.col(1).array() += 0.5; }});
+  EXPECT_NE(said.find("elbow: its encoder slipped since the baseline"), std::string::npos) << said;
+  EXPECT_NEAR(number_after(said, "best with "), -0.5, 0.05) << said;
+}
+
+TEST(RecordingFaults, AnotherGainInOneLogIsNoLoad) {
+  if (test::sanitized) GTEST_SKIP() << "other cases run the same code";
+  const std::string said = complaint("one_gain", {.tamper = [](Log& log) {
+                                       if (log.file.filename() == "a1.csv") log.tau.col(1) *= 1.3;
+                                     }});
+  EXPECT_EQ(said.find("another load"), std::string::npos) << said;
+}
+
+// A torque that comes late is how a drive samples, or an effect.
+TEST(RecordingFaults, AConstantLagIsNoClock) {
+  if (test::sanitized) GTEST_SKIP() << "other cases run the same code";
+  const std::string said = complaint("late", {.tamper = [](Log& log) {
+                                       const Eigen::MatrixXd tau = log.tau;
+                                       log.tau.bottomRows(tau.rows() - 3) = tau.topRows(tau.rows() - 3);
+                                     }});
+  EXPECT_EQ(said.substr(0, 4), "none") << said;
 }
 
 TEST(RecordingFaults, PositionAndTorqueOfTwoClocks) {

@@ -46,7 +46,8 @@ TEST_F(PlannedSeriesFile, WhatIsWrittenIsRead) {
 }
 
 TEST_F(PlannedSeriesFile, AnotherFileIsNamedAsSuch) {
-  for (const char* text : {"{", "{}", R"({"trajectories": [{"period_s": 5}]})", R"({"trajectories": 3})"}) {
+  for (const char* text : {"{", "{}", R"({"trajectories": [{"period_s": 5}]})", R"({"trajectories": 3})",
+                           R"({"trajectories": [{"name": "x", "series": [{"centre": 0, "a": [1], "b": [1]}]}]})"}) {
     write(text);
     EXPECT_NE(complaint().find("is no excite.json: make one by fxdyn excite"), std::string::npos) << text;
   }
