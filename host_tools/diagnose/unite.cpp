@@ -106,6 +106,8 @@ std::optional<Choice> Search::divided(const Choice& choice, const EffectInfo& in
   std::erase(groups, *itself);
   std::optional<Choice> tried;
   for (const std::string_view part : info.unites) {
+    // Parts of which one contains another are alternatives: the law took the place of either.
+    if (!part.empty() && find_effect(part)->unites_others()) return {};
     if (part.empty() || std::any_of(groups.begin(), groups.end(), [&](std::size_t g) { return is_here(g, part); }))
       continue;
     tried = with_best(groups, candidates_of(*find_effect(part), joint, law, scales_of(problem_, joint)));

@@ -53,7 +53,8 @@ class BoundScope {
 
 /// The states of Dahl's model and of relaxations forget their rounding errors while they move and add them up while
 /// they creep. Their error is bounded for creeping (less than one presliding distance or time constant in so many
-/// ticks) that lasts no longer than this: ten seconds at 2 ms.
+/// ticks) that lasts no longer than this: ten seconds at 2 ms. A spring that slips (slip()) forgets only when it is
+/// full, so for it a motion to and fro within two slip distances counts as creeping, too.
 inline constexpr double creeping_ticks = 5'000;
 
 struct Bound {
