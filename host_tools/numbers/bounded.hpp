@@ -394,7 +394,7 @@ inline BoundedNumbers::Of<Quantity::unit> slip(BoundedNumbers::Of<Quantity::unit
   const bool creeps = slowest < 2 / creeping_ticks;
   out.error = std::fmax(state.error, way.error * (creeps ? creeping_ticks : 2 / slowest + 1));
   if (creeps && current_bounding.creeps) out.error = state.error + way.error * creeping_ticks;
-  out.error = std::fmin(out.error, 2.0);
+  out.error = std::fmin(out.error + std::ldexp(1.0, -unit_bits), 2.0);  // fixed point is full one unit below 1
   return {out};
 }
 /// Fixed point saturates at 2, where any spring is full.
