@@ -23,12 +23,12 @@ struct Lugre {
   static constexpr std::string_view equation =
       "static (y - share s) + damping (dq - |dq| y / n), dy/dt = (dq - |dq| y / n) / distance, "
       "n = share + (1 - share) exp(-(dq / velocity)^2)";
-  static double judged_speed(const double* shape, double limit) {
-    return limit > 0 && limit < shape[1] ? limit : shape[1];
+  static double judged_speed(const double* at, double limit) {
+    return limit > 0 && limit < at[1] ? limit : at[1];
   }
   /// static + viscous v + damping v (1 - 1 / n) >= 0
-  static double most_damping(const double* shape, double speed, double first, double viscous) {
-    const double velocity = shape[1], share = shape[2];
+  static double most_damping(const double* at, double speed, double first, double viscous) {
+    const double velocity = at[1], share = at[2];
     const double n = share + (1 - share) * exp_negative(speed * speed / (velocity * velocity));
     return (first / speed + (viscous > 0 ? viscous : 0)) * n / (1 - n);
   }
