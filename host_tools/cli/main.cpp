@@ -4,6 +4,7 @@
 
 #include "host_tools/cli/verb.hpp"
 #include "host_tools/support/error.hpp"
+#include "host_tools/support/heap.hpp"
 #include "model/version.hpp"
 
 namespace {
@@ -46,6 +47,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  fxdyn::keep_freed_memory();
   try {
     return run(argc, argv);
   } catch (const fxdyn::InputError& error) {

@@ -12,6 +12,7 @@
 
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
+#include "host_tools/support/heap.hpp"
 #include "tests/campaign/run_case.hpp"
 #include "tests/campaign/write_up.hpp"
 
@@ -194,6 +195,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  keep_freed_memory();
   try {
     return run(argc, argv);
   } catch (const std::exception& error) {

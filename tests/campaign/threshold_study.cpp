@@ -17,6 +17,7 @@
 #include "host_tools/simulate/recordings.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
+#include "host_tools/support/heap.hpp"
 #include "host_tools/support/parallel.hpp"
 #include "tests/campaign/generate.hpp"
 #include "tests/campaign/thresholds.hpp"
@@ -208,6 +209,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  keep_freed_memory();
   try {
     return run(argc, argv);
   } catch (const std::exception& error) {
