@@ -86,7 +86,7 @@ class Value {
   }
   /// One of a list of names.
   std::string name(const Names& known, std::string_view kind) const {
-    const std::string word = string();
+    std::string word = string();
     if (std::find(known.begin(), known.end(), word) == known.end()) {
       place_.fail(fmt::format("unknown {} '{}'; nearest is '{}' (known: {})", kind, word, nearest(word, known),
                               fmt::join(known, " ")));
@@ -107,7 +107,7 @@ class Value {
     return values;
   }
   std::vector<double> positives(std::size_t size, std::string_view per) const {
-    const std::vector<double> values = numbers(size, per);
+    std::vector<double> values = numbers(size, per);
     for (const double value : values) {
       if (!(value > 0)) place_.fail(fmt::format("expected numbers above 0, found {}", value));
     }
