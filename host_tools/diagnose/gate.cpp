@@ -156,10 +156,8 @@ bool holds(const Outcome& outcome, const Group& group, const HeldOut& held, std:
   if (group.on_body) return true;
   const std::size_t j = group.candidate.joint;
   if (held.alone[i][static_cast<Index>(j)] <= 0) return false;  // whatever it does at others
-  const double gap = gap_of(held)[static_cast<Index>(j)];
   // With nothing left over the noise is what it says it is, and a small effect beside a large one is no less sure.
-  if (!outcome.structured(j)) return brings > std::min(options.sure_gain, options.least_share * gap);
-  return brings > options.least_share_in_structure * gap;
+  return !outcome.structured(j) || brings > options.least_share_in_structure * gap_of(held)[static_cast<Index>(j)];
 }
 
 /// How fast drift comes to its end shows on the data that follow.
@@ -203,9 +201,7 @@ void conclude(Gate& gate, const Outcome& outcome, const std::vector<bool>& still
     if (gate.gap[j] > 0) gate.closure[j] = closed / gate.gap[j];
     gate.remains.push_back(!still[k] && outcome.structured(k) &&
                            held.excess[j] > (1 - options.sure_closure) * gate.gap[j]);
-    gate.accepted.push_back(gate.closure[j] >= (gate.remains.back() ? options.sure_closure : options.least_closure) &&
-                            (outcome.problem->background(k) == nullptr ||
-                             closed >= options.beside_background * (closed + held.leftover[j])));
+    gate.accepted.push_back(gate.closure[j] >= (gate.remains.back() ? options.sure_closure : options.least_closure));
   }
 }
 

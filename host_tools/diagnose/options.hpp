@@ -122,12 +122,10 @@ struct LackOfFitOptions {
 struct GateOptions {
   /// noise variances; what an effect must bring; theory: chi^2 of one coefficient, 4.6 % of noise brings more
   double least_gain = 4;
-  /// share of the gap at its joint; .. and at least that; hand, decision 0005
-  double least_share = 0.01;
-  /// noise variances; .. unless it brings that; theory: 4 deviations of one coefficient, 6e-5 of noise brings more.
-  /// What brings that beside free curves of all other variables is believed whatever else is missing
+  /// noise variances; theory: 4 deviations of one coefficient, 6e-5 of noise brings more. What brings that beside free
+  /// curves of all other variables is believed whatever else is missing
   double sure_gain = 16;
-  /// share of the gap at its joint; .. where the joint has structure left; hand, decision 0005: it is no noise
+  /// share of the gap at its joint; .. and that where the joint has structure left; hand, decision 0005: it is no noise
   double least_share_in_structure = 0.02;
   /// times the plain error before; a name may raise it so far; hand
   double worse = 1.02;
@@ -137,8 +135,6 @@ struct GateOptions {
   /// share of the gap above the noise; .. where structure remains; hand: another effect may only resemble it. Likewise
   /// of what a free curve closes: several names in one variable, and those that are believed whatever else is missing
   double sure_closure = 0.8;
-  /// share of the gap with the healthy session's own structure; .. beside a background; hand, decision 0005
-  double beside_background = 0.25;
   /// standard deviations; coefficients of a name are off nothing by; theory: 2 Phi(-2) = 4.6 % of noise is further off
   double sure_deviations = 2;
   /// log10 odds against nothing and against the closest rival; an effect is established; theory: 1000 to 1

@@ -64,7 +64,6 @@ std::vector<Threshold> of_the_judges() {
   using namespace diagnosis;
   return {
       {"gate.least_gain", "noise variances", place<gate, &GateOptions::least_gain>},
-      {"gate.least_share", "share", place<gate, &GateOptions::least_share>},
       {"gate.sure_gain", "noise variances", place<gate, &GateOptions::sure_gain>},
       {"gate.least_share_in_structure", "share", place<gate, &GateOptions::least_share_in_structure>},
       {"gate.worse", "-", place<gate, &GateOptions::worse>},
@@ -74,7 +73,6 @@ std::vector<Threshold> of_the_judges() {
       {"gate.established", "log10 odds", place<gate, &GateOptions::established>},
       {"gate.established_deviations", "deviations", place<gate, &GateOptions::established_deviations>},
       {"gate.likely", "log10 odds", place<gate, &GateOptions::likely>},
-      {"gate.beside_background", "share", place<gate, &GateOptions::beside_background>, Reads::with_baseline},
       {"gate.least_felt", "noise variances", place<gate, &GateOptions::least_felt>},
       {"impact.beyond", "deviations", place<impact, &ImpactOptions::beyond>, Reads::with_baseline},
       {"impact.times", "-", place<impact, &ImpactOptions::times>, Reads::with_baseline},
