@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "host_tools/diagnose/deflection_fit.hpp"
+#include "host_tools/diagnose/deflection_polish.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/parallel.hpp"
@@ -56,7 +57,6 @@ class JointDeflection {
   /// @param background what the healthy session has alike
   Deflections find(std::vector<DeflectionEffect>& background) {
     choose();
-    drop_small_parts();
     if (set_.parts.empty()) return {};
     learn_healthy();
     closure_ = close();
@@ -79,14 +79,23 @@ class JointDeflection {
   VectorXd colour_of_rest() const { return rows_.colour(residual(design(rows_, set_.parts), rows_.delta())); }
 
   void choose() {
-    set_ = best_set(rows_, model_, covariance_, uncertainty_, options_);
-    rotor_ = uncertainty_.rotor > 0 ? uncertainty_.rotor * rows_.z().tail(1)[0] : 0;
+    choose(true);
     if (rotor_ >= 0) return;
     // No rotor has less than nothing.
     rows_ = DeflectionRows(model_, logs_.train, joint_);
     uncertainty_ = {};
-    set_ = best_set(rows_, model_, covariance_, uncertainty_, options_, false);
-    rotor_ = 0;
+    choose(false);
+  }
+
+  void choose(bool with_rotor) {
+    set_ = best_set(rows_, model_, covariance_, uncertainty_, options_, with_rotor);
+    drop_small_parts();
+    if (!set_.parts.empty()) {
+      const VectorXd colour = colour_of_rest();
+      polish(rows_, colour, set_);
+      add_deviations(rows_, colour, model_, covariance_, with_rotor, set_);
+    }
+    rotor_ = uncertainty_.rotor > 0 ? uncertainty_.rotor * rows_.z().tail(1)[0] : 0;
   }
 
   /// Encoders are so fine that errors of the torque show too: what is a small part of the deflection is no finding.
@@ -196,7 +205,7 @@ class JointDeflection {
       out.fit.linear.push_back(set_.theta[i]);
       out.fit.linear_std.push_back(set_.std[i]);
     }
-    out.fit.shape_std.assign(part.shape.size(), 0.0);
+    out.fit.shape_std.assign(part.shape.size(), set_.shape_std[p]);
     out.closure = (closure_.without[p] - closure_.after) / closure_.gap();
     out.held_out = held_out();
     if (bends(part.effect)) out.rotor = rotor_;

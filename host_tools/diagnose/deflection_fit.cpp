@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "host_tools/diagnose/deflection_polish.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/regression/dataset.hpp"
 #include "host_tools/regression/gauss_newton.hpp"
@@ -68,21 +69,6 @@ struct Moved {
   double score = -1e300;  ///< of the set, less what the load's move costs and what it was free to do (Laplace)
 };
 
-/// d deflection / d z by central differences, rows x directions.
-MatrixXd slopes(const DeflectionRows& rows, const DeflectionSet& set, const VectorXd& theta) {
-  constexpr double h = 0.02;  // of a standard deviation
-  MatrixXd out(rows.delta().size(), rows.z().size());
-  for (Index i = 0; i < out.cols(); ++i) {
-    DeflectionRows moved = rows;
-    const VectorXd step = VectorXd::Unit(out.cols(), i) * h;
-    moved.move(rows.z() + step);
-    const MatrixXd there = design(moved, set.parts);
-    moved.move(rows.z() - step);
-    out.col(i) = (there - design(moved, set.parts)) * theta / (2 * h);
-  }
-  return out;
-}
-
 /// Gauss-Newton over coefficients and z.
 Moved move_load(const DeflectionRows& start, const VectorXd& a, const DeflectionSet& from) {
   constexpr int most_rounds = 8;
@@ -94,11 +80,9 @@ Moved move_load(const DeflectionRows& start, const VectorXd& a, const Deflection
   const auto step_of = [&](const VectorXd& here, int round) -> std::optional<VectorXd> {
     const MatrixXd own = design(rows, best.set.parts);
     const Index first = own.cols();
-    VectorXd theta = VectorXd::Zero(first);
-    theta.tail(best.set.theta.size()) = best.set.theta;
     MatrixXd x(own.rows(), first + directions);
     x.leftCols(first) = own;
-    x.rightCols(directions) = slopes(rows, best.set, theta);
+    x.rightCols(directions) = load_slopes(rows, best.set);
     x = rows.whiten(x, a);
     MatrixXd gram = x.transpose() * x;
     // What the load at z makes stays on the other side; a priori z is 0 with variance 1.
@@ -157,27 +141,6 @@ void try_likely_load(const DeflectionRows& rows, const VectorXd& a, const std::v
   }
 }
 
-/// Standard deviations where the load is as uncertain as the base parameters make it, in all directions: a compliance
-/// is deflection over load, and link encoders know the deflection far better than torque knows the load.
-///   Cov = s^2 (X^T X + s^2 diag(0, 1))^-1, X = [columns, d deflection / d z], s^2 the variance of the whitened rows
-void add_load_deviations(DeflectionRows rows, const VectorXd& a, const IdentifiedModel& model,
-                         const MatrixXd& covariance, DeflectionOptions options, bool with_rotor, DeflectionSet& set) {
-  options.load_uncertainty = 0;
-  rows.add_uncertainty(model, covariance, options, with_rotor);
-  const Index directions = rows.z().size();
-  if (directions == 0) return;
-  const MatrixXd own = design(rows, set.parts);
-  VectorXd theta = VectorXd::Zero(own.cols());
-  theta.tail(set.theta.size()) = set.theta;
-  MatrixXd x(own.rows(), own.cols() + directions);
-  x << own, slopes(rows, set, theta);
-  x = rows.whiten(x, a);
-  MatrixXd gram = x.transpose() * x;
-  gram.diagonal().tail(directions).array() += set.noise;
-  const VectorXd variances = SymmetricSolver(gram).inverse().diagonal() * set.noise;
-  set.std = variances.segment(own.cols() - set.theta.size(), set.theta.size()).cwiseMax(0).cwiseSqrt();
-}
-
 /// A set with each of the parts that it does not have.
 std::vector<Moved> extended(const DeflectionRows& rows, const VectorXd& a, const Moved& best,
                             const std::vector<DeflectionPart>& full) {
@@ -224,7 +187,9 @@ void fit(const DeflectionRows& rows, const VectorXd& a, DeflectionSet& set) {
   const VectorXd theta = solver.solve(x.transpose() * y);
   const auto n = static_cast<double>(y.size());
   set.square = (y - x * theta).squaredNorm();
-  set.noise = set.square / n;
+  // The first rows of each log have no past: whitening leaves them out.
+  const auto lost = static_cast<double>(a.size()) * static_cast<double>(rows.logs());
+  set.noise = set.square / std::max(n - lost, 1.0);
   const Index own = x.cols() - static_cast<Index>(rows.logs());
   set.theta = theta.tail(own);
   set.std = (solver.inverse().diagonal().tail(own) * set.noise).cwiseMax(0).cwiseSqrt();
@@ -267,8 +232,6 @@ DeflectionSet best_set(DeflectionRows& rows, const IdentifiedModel& model, const
     best = *chosen;
     if (best.z.size() > 0) rows.move(best.z);
   }
-  if (covariance.size() > 0 && any_bends(best.set))
-    add_load_deviations(rows, a, model, covariance, options, with_rotor, best.set);
   return best.set;
 }
 

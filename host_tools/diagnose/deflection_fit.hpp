@@ -17,8 +17,9 @@ struct DeflectionPart {
 /// Effects that make up a joint's deflection together.
 struct DeflectionSet {
   std::vector<DeflectionPart> parts;
-  Eigen::VectorXd theta;  ///< coefficients of the parts, in their order
-  Eigen::VectorXd std;    ///< of best_set() with the load's uncertainty, else of rows with the load as it is
+  Eigen::VectorXd theta;          ///< coefficients of the parts, in their order
+  Eigen::VectorXd std;            ///< of polish() with all that is uncertain, else with load and shapes as they are
+  std::vector<double> shape_std;  ///< of polish(), by part; 0: not estimated
   double square = 1e300, score = -1e300;
   double likelihood = -1e300;  ///< score whatever the signs of the coefficients
   double noise = 0;            ///< variance of the whitened residual

@@ -15,6 +15,18 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+namespace {
+
+/// Two rows a period of the filter's cut-off. Above it there is next to nothing in the rows but the load's own noise,
+/// from differentiated positions. Rows that are closer let the autoregression see that band, and whitening makes it
+/// count as much as the motion.
+Index stride_of(const ProcessedLog& log) {
+  const double rows_a_period = 1 / (log.step_s * static_cast<double>(log.decimation) * log.filter.torque_cutoff_hz);
+  return std::max<Index>(1, static_cast<Index>(rows_a_period / 2));
+}
+
+}  // namespace
+
 std::vector<MatrixXd> rigid_loads(const IdentifiedModel& model, const std::vector<ProcessedLog>& logs) {
   IdentifiedModel rigid = model;
   for (JointFit& fit : rigid.joints) fit.effects.clear();
@@ -35,8 +47,9 @@ DeflectionRows::DeflectionRows(const IdentifiedModel& model, const std::vector<L
     series_.push_back({m.q, m.dq, m.ddq, load->col(j), log->step_s});
     logs_.push_back(log);
     first_.push_back(total);
-    count_.push_back(log->rows());
-    total += log->rows();
+    stride_.push_back(stride_of(*log));
+    count_.push_back((log->rows() + stride_.back() - 1) / stride_.back());
+    total += count_.back();
   }
   delta_.resize(total);
   for (std::size_t l = 0; l < logs_.size(); ++l)
@@ -44,7 +57,8 @@ DeflectionRows::DeflectionRows(const IdentifiedModel& model, const std::vector<L
 }
 
 MatrixXd DeflectionRows::kept(std::size_t log, const MatrixXd& full) const {
-  return logs_[log]->decimate(logs_[log]->filter_columns(full));
+  const MatrixXd rows = logs_[log]->decimate(logs_[log]->filter_columns(full));
+  return rows(Eigen::seqN(0, count_[log], stride_[log]), Eigen::all);
 }
 
 MatrixXd DeflectionRows::columns(std::string_view effect, const std::vector<double>& shape) const {

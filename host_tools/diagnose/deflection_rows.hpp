@@ -28,7 +28,8 @@ struct LoadUncertainty {
   double rotor = 0;  ///< one more direction: so much of the inertia is a rotor's, a priori; 0: none is hidden
 };
 
-/// q - qlink of one joint, filtered and decimated, and the columns of effects that may explain it.
+/// q - qlink of one joint, filtered and decimated to what the filter lets through, and the columns of effects that may
+/// explain it.
 class DeflectionRows {
  public:
   DeflectionRows(const IdentifiedModel& model, const std::vector<LinkedLog>& logs, std::size_t joint);
@@ -68,7 +69,7 @@ class DeflectionRows {
   double width_;  ///< of the sign
   std::vector<const ProcessedLog*> logs_;
   std::vector<JointSeries> series_;
-  std::vector<Eigen::Index> first_, count_;
+  std::vector<Eigen::Index> first_, count_, stride_;
   Eigen::VectorXd delta_;
   std::vector<Eigen::MatrixXd> slopes_;  ///< d load / d z by log, at full rate
   Eigen::VectorXd z_;
