@@ -138,6 +138,32 @@ std::vector<Index> felt_columns(const LogColumns& columns, const std::vector<Unk
   return out;
 }
 
+/// Filters and decimates columns as they are made, as many at once as the filter takes side by side: all of them at
+/// full rate are several times the log.
+class Keeper {
+ public:
+  explicit Keeper(const ProcessedLog& log) : log_(log), pending_(log.samples(), 8) {}
+
+  /// @param to where the rows go
+  void add(const Eigen::Ref<const VectorXd>& column, double* to) {
+    pending_.col(static_cast<Index>(to_.size())) = column;
+    to_.push_back(to);
+    if (static_cast<Index>(to_.size()) == pending_.cols()) flush();
+  }
+  void flush() {
+    if (to_.empty()) return;
+    const MatrixXd kept = log_.decimate(log_.filter_columns(pending_.leftCols(static_cast<Index>(to_.size()))));
+    for (std::size_t i = 0; i < to_.size(); ++i)
+      Eigen::Map<VectorXd>(to_[i], kept.rows()) = kept.col(static_cast<Index>(i));
+    to_.clear();
+  }
+
+ private:
+  const ProcessedLog& log_;
+  MatrixXd pending_;
+  std::vector<double*> to_;
+};
+
 /// Rows of all joints, as they are filled log by log.
 class Rows {
  public:
@@ -156,9 +182,8 @@ class Rows {
   void fill(std::size_t log) {
     const std::size_t n = rows_.size();
     const Derivatives derivatives(columns_, log);
-    std::vector<MatrixXd> full(n);  // everything but the base columns, and the prediction
-    for (std::size_t j = 0; j < n; ++j)
-      full[j].setZero(columns_.logs()[log].log.samples(), rows_[j].x.cols() - base_columns(j) + 1);
+    Keeper keeper(columns_.logs()[log].log);
+    const Block& b = blocks_.of_log[log];
     MatrixXd predicted = derivatives.torque();
     for (Index c = columns_.base_parameters(); c < static_cast<Index>(unknowns_.size()); ++c) {
       const Unknown& u = unknowns_[static_cast<std::size_t>(c)];
@@ -169,13 +194,12 @@ class Rows {
         predicted.col(static_cast<Index>(u.joint)) += u.value * derivatives.warm_less_cold(here, made[u.joint]);
       for (std::size_t j = 0; j < n; ++j) {
         const Index local = rows_[j].place(c);
-        if (local >= 0 && made[j].size() > 0) full[j].col(local - base_columns(j)) = made[j];
+        if (local >= 0 && made[j].size() > 0) keeper.add(made[j].col(0), &rows_[j].x(b.first, local));
       }
     }
-    for (std::size_t j = 0; j < n; ++j) {
-      full[j].rightCols(1) = predicted.col(static_cast<Index>(j));
-      keep(log, j, full[j]);
-    }
+    for (std::size_t j = 0; j < n; ++j) keeper.add(predicted.col(static_cast<Index>(j)), &rows_[j].y[b.first]);
+    keeper.flush();
+    for (std::size_t j = 0; j < n; ++j) keep(log, j);
   }
 
   /// y = r + J x0
@@ -197,19 +221,17 @@ class Rows {
     return u.change || (u.kind != Unknown::Kind::width && effect_of(columns_.models().current, u).named);
   }
 
-  /// @param full columns behind those of the base, and the predicted torque
-  void keep(std::size_t log, std::size_t joint, const MatrixXd& full) {
+  /// The base columns, and the measured torque less the prediction that y holds.
+  void keep(std::size_t log, std::size_t joint) {
     const ProcessedLog& l = columns_.logs()[log].log;
     const Block& b = blocks_.of_log[log];
-    const Index nb = base_columns(joint);
     JointRows& rows = rows_[joint];
-    rows.x.block(b.first, 0, b.count, nb) = columns_.base_rows(log, joint);
-    const MatrixXd kept = l.decimate(l.filter_columns(full));
-    rows.x.block(b.first, nb, b.count, kept.cols() - 1) = kept.leftCols(kept.cols() - 1);
+    rows.x.block(b.first, 0, b.count, base_columns(joint)) = columns_.base_rows(log, joint);
     MatrixXd tau = l.filter_columns(l.tau.col(static_cast<Index>(joint)));
     if (const double lead = columns_.model(log).filter.torque_lead_s / l.step_s; lead != 0)
       tau = at_other_times(tau, -lead);
-    rows.y.segment(b.first, b.count) = l.decimate(tau) - kept.rightCols(1);
+    auto y = rows.y.segment(b.first, b.count);
+    y = l.decimate(tau) - y;
   }
 
   const LogColumns& columns_;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cassert>
 #include <numbers>
+#include <utility>
 
 #include "host_tools/diagnose/linearised.hpp"
 #include "host_tools/effects/effects.hpp"
@@ -73,7 +74,8 @@ struct Place {
   double begins, lasts;
 };
 
-/// Functions of one joint over one log, at full rate.
+/// Functions of one joint over one log, filtered and decimated a few at a time: at full rate all of them together are
+/// several times the log.
 class Functions {
  public:
   Functions(const LogColumns& columns, const Scales& scales, std::size_t log, std::size_t joint)
@@ -83,7 +85,8 @@ class Functions {
         joint_(joint),
         motion_(columns.motion(log)),
         dq_(motion_.dq.col(j()) / scales.speed[j()]),
-        ddq_(motion_.ddq.col(j()) / scales.acceleration[j()]) {}
+        ddq_(motion_.ddq.col(j()) / scales.acceleration[j()]),
+        pending_(motion_.q.rows(), 8) {}
 
   MatrixXd of_motion() {
     const auto joints = static_cast<Index>(columns_.joints());
@@ -94,17 +97,17 @@ class Functions {
     for (Index k = 0; k < joints; ++k) {
       if (k == j()) continue;
       const ArrayXd other = motion_.dq.col(k).array() / scales_.speed[k];
-      made_.emplace_back((other * 40).tanh());
-      made_.push_back(other);
-      made_.emplace_back(dq_ * other);
+      add((other * 40).tanh());
+      add(other);
+      add(dq_ * other);
     }
     add_waves(position(j()), own_waves, one);
     for (const double width : {0.01, 0.03, 0.1, 0.3}) {
-      made_.emplace_back((dq_ / width).tanh());
-      made_.emplace_back((dq_ / width).tanh().abs());
+      add((dq_ / width).tanh());
+      add((dq_ / width).tanh().abs());
     }
-    made_.push_back(ddq_);
-    made_.emplace_back(ddq_ * ddq_.abs());
+    add(ddq_);
+    add(ddq_ * ddq_.abs());
     return take();
   }
 
@@ -113,12 +116,11 @@ class Functions {
     const double sign_width = columns_.joint(joint_).sign_width;
     const ArrayXd load = columns_.robot(log_).structural().col(j()).array() / scales_.load[j()],
                   sign = (motion_.dq.col(j()).array() / sign_width).tanh();
-    made_.push_back(load);
-    made_.emplace_back(load * (dq_ * 40).tanh());
+    add(load);
+    add(load * (dq_ * 40).tanh());
     for (const double distance : {1e-3, 5e-3}) {
       const JointSeries series{motion_.q.col(j()), motion_.dq.col(j()), motion_.ddq.col(j()), {}, motion_.step_s};
-      made_.emplace_back(
-          effect_columns(Presliding::name, std::array{turns ? distance : 0.1 * distance}, sign_width, series)
+      add(effect_columns(Presliding::name, std::array{turns ? distance : 0.1 * distance}, sign_width, series)
               .col(0)
               .array());
     }
@@ -136,8 +138,7 @@ class Functions {
   }
   /// cos(m pi u), m = 1..count.
   void add_waves(const ArrayXd& u, Index count, const ArrayXd& times) {
-    for (Index m = 1; m <= count; ++m)
-      made_.emplace_back((static_cast<double>(m) * std::numbers::pi * u).cos() * times);
+    for (Index m = 1; m <= count; ++m) add((static_cast<double>(m) * std::numbers::pi * u).cos() * times);
   }
   void add_random(const ArrayXd& load, double scale) {
     const ArrayXd slowest = (dq_ / 0.02).asinh();
@@ -145,15 +146,24 @@ class Functions {
     for (Index r = 0; r < random_features; ++r) {
       const double a = 3 * random.normal(), b = 3 * random.normal(), c = 1.5 * random.normal(), d = random.normal(),
                    e = 2 * std::numbers::pi * random.uniform(), f = 2 * random.normal();
-      made_.emplace_back(
-          (a * scale * motion_.q.col(j()).array() + b * dq_ + c * slowest + d * ddq_ + f * load + e).cos());
+      add((a * scale * motion_.q.col(j()).array() + b * dq_ + c * slowest + d * ddq_ + f * load + e).cos());
     }
   }
+  void add(const Eigen::Ref<const ArrayXd>& function) {
+    pending_.col(count_++) = function;
+    if (count_ == pending_.cols()) keep();
+  }
+  void keep() {
+    if (count_ == 0) return;
+    const ProcessedLog& log = columns_.logs()[log_].log;
+    const Index kept = rows_.cols();
+    rows_.conservativeResize(log.rows(), kept + count_);
+    rows_.rightCols(count_) = log.decimate(log.filter_columns(pending_.leftCols(count_)));
+    count_ = 0;
+  }
   MatrixXd take() {
-    MatrixXd full(motion_.q.rows(), static_cast<Index>(made_.size()));
-    for (std::size_t c = 0; c < made_.size(); ++c) full.col(static_cast<Index>(c)) = made_[c];
-    made_.clear();
-    return full;
+    keep();
+    return std::exchange(rows_, {});
   }
 
   const LogColumns& columns_;
@@ -161,7 +171,9 @@ class Functions {
   std::size_t log_, joint_;
   const Motion& motion_;
   ArrayXd dq_, ddq_;
-  std::vector<ArrayXd> made_;
+  MatrixXd pending_;  ///< at full rate, the first `count_` of them; as many as the filter takes side by side
+  Index count_ = 0;
+  MatrixXd rows_;  ///< what is kept of those before
 };
 
 bool nearly(const VectorXd& kept, const VectorXd& now) {
@@ -172,10 +184,9 @@ bool nearly(const VectorXd& kept, const VectorXd& now) {
 void renew(RowCache::AllFeatures& kept, const LogColumns& columns, const Scales& scales, std::size_t log,
            std::size_t joint, Index first, Index whole) {
   const ProcessedLog& l = columns.logs()[log].log;
-  const auto rows = [&](const MatrixXd& full) { return l.decimate(l.filter_columns(full)); };
   Functions functions(columns, scales, log, joint);
   if (const VectorXd now = scales.of_motion(); kept.of_motion.scales.size() == 0 || kept.of_motion.scales != now) {
-    kept.of_motion = {now, rows(functions.of_motion())};
+    kept.of_motion = {now, functions.of_motion()};
     kept.of_model.scales.resize(0);
   }
   // The load moves a little with each fit; these functions need not.
@@ -184,7 +195,7 @@ void renew(RowCache::AllFeatures& kept, const LogColumns& columns, const Scales&
   if (nearly(kept.of_model.scales, now)) return;
   const auto count = static_cast<double>(l.rows());
   const Place place{static_cast<double>(first) / static_cast<double>(whole), count / static_cast<double>(whole)};
-  kept.of_model = {now, rows(functions.of_model(place))};
+  kept.of_model = {now, functions.of_model(place)};
 }
 
 }  // namespace

@@ -15,6 +15,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+/// All that robot_with() keeps [bytes]: enough for every rotor of a session of usual length.
+constexpr double most_kept = 64e6;
+
 LogColumns::LogColumns(const Models& models, const std::vector<SessionLog>& logs)
     : models_(std::make_shared<const Models>(models)),
       logs_(&logs),
@@ -54,18 +57,22 @@ Index LogColumns::first_base(std::size_t joint) const {
   return first - base_.columns.begin();
 }
 
-/// At full rate, by joint; empty for joints that are not asked for.
-std::vector<MatrixXd> LogColumns::base_columns(std::size_t log, const std::vector<std::size_t>& of) const {
+/// Of some samples at full rate, the joints' columns side by side.
+MatrixXd LogColumns::base_columns(std::size_t log, const std::vector<std::size_t>& of, Index begin,
+                                  Index samples) const {
   const Motion& motion = *motions_[log];
   const Index nb = base_parameters();
-  std::vector<MatrixXd> out(joints());
-  for (const std::size_t j : of) out[j].resize(motion.q.rows(), nb - first_base(j));
+  Index columns = 0;
+  for (const std::size_t j : of) columns += nb - first_base(j);
+  MatrixXd out(samples, columns);
   Regressor regressor(chain_);
-  for (Index k = 0; k < motion.q.rows(); ++k) {
-    const MatrixXd& y = regressor(motion.q.row(k), motion.dq.row(k), motion.ddq.row(k));
+  for (Index k = 0; k < samples; ++k) {
+    const Index at = begin + k;
+    const MatrixXd& y = regressor(motion.q.row(at), motion.dq.row(at), motion.ddq.row(at));
+    Index i = 0;
     for (const std::size_t j : of) {
-      for (Index c = first_base(j), i = 0; c < nb; ++c, ++i)
-        out[j](k, i) = y(static_cast<Index>(j), base_.columns[static_cast<std::size_t>(c)]);
+      for (Index c = first_base(j); c < nb; ++c)
+        out(k, i++) = y(static_cast<Index>(j), base_.columns[static_cast<std::size_t>(c)]);
     }
   }
   return out;
@@ -77,12 +84,20 @@ MatrixXd LogColumns::base_rows(std::size_t log, std::size_t joint) const {
   std::call_once(cache.made, [&] {
     std::vector<std::size_t> all(joints());
     std::iota(all.begin(), all.end(), std::size_t{0});
-    for (const MatrixXd& full : base_columns(log, all))
-      cache.base.push_back(entry.log.decimate(entry.log.filter_columns(full)));
+    for (const std::size_t j : all) cache.base.emplace_back(entry.log.rows(), base_parameters() - first_base(j));
+    // Block by block: at full rate the columns of all joints are ten times the log.
+    for (const RowBlock& block : row_blocks(entry.log)) {
+      const MatrixXd kept = block.filter_and_keep(entry.log, base_columns(log, all, block.begin, block.samples));
+      Index from = 0;
+      for (MatrixXd& rows : cache.base) {
+        rows.middleRows(block.row, block.rows) = kept.middleCols(from, rows.cols());
+        from += rows.cols();
+      }
+    }
     cache.features.resize(joints());
   });
   if (in_order(model(log).joints[joint], true).empty()) return cache.base[joint];
-  const MatrixXd columns = follow(log, joint, std::move(base_columns(log, {joint})[joint]));
+  const MatrixXd columns = follow(log, joint, base_columns(log, {joint}, 0, entry.log.samples()));
   return entry.log.decimate(entry.log.filter_columns(columns));
 }
 
@@ -149,6 +164,9 @@ std::shared_ptr<const RobotColumns> LogColumns::robot_with(std::size_t log, cons
   auto made = std::make_shared<const RobotColumns>(with_load_of((*logs_)[log].log, std::move(model)),
                                                    slow ? *slow_[log] : *motions_[log]);
   const std::lock_guard lock(for_group_mutex_);
+  // Those of a long log are made again rather than kept for every rotor; whoever uses one holds it.
+  const auto bytes = static_cast<double>(2 * sizeof(double) * made->torque().size());
+  if (bytes * static_cast<double>(for_group_.size() + 1) > most_kept) for_group_.clear();
   return for_group_.emplace(key, std::move(made)).first->second;
 }
 

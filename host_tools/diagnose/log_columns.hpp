@@ -58,7 +58,8 @@ class LogColumns {
 
  private:
   EffectColumns of(std::size_t log, const EffectCandidate& candidate, const RobotColumns& columns) const;
-  std::vector<Eigen::MatrixXd> base_columns(std::size_t log, const std::vector<std::size_t>& joints) const;
+  Eigen::MatrixXd base_columns(std::size_t log, const std::vector<std::size_t>& joints, Eigen::Index begin,
+                               Eigen::Index samples) const;
   std::shared_ptr<const RobotColumns> robot_with(std::size_t log, const Group& group) const;
 
   std::shared_ptr<const Models> models_;

@@ -19,6 +19,21 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr Index samples_used = 400;
+
+/// One sample of each `stride` of the log, not at even distances: those may keep step with a motion that repeats
+/// itself, and all rows would show one pose. The golden ratio spreads them most evenly over any cycle.
+std::vector<Index> spread_samples(Index first, Index last, Index stride) {
+  constexpr double golden = 0.6180339887498949;
+  std::vector<Index> out;
+  double share = 0;
+  for (Index k = first; k < last; k += stride) {
+    const Index at = k + static_cast<Index>(share * static_cast<double>(stride));
+    if (at < last) out.push_back(at);
+    share += golden;
+    share -= std::floor(share);
+  }
+  return out;
+}
 /// Columns of a joint beside the base parameters: the nominal effects.
 const auto own = static_cast<Index>(nominal_effects().size());
 Index column_of(std::string_view effect) {
@@ -69,7 +84,7 @@ class Rows {
     std::vector<Index> at;
     for (const ProcessedLog& log : logs) {
       if (log.role != Role::train) continue;
-      for (Index k = log.first; k < log.last; k += stride) {
+      for (const Index k : spread_samples(log.first, log.last, stride)) {
         of.push_back(&log);
         at.push_back(k);
       }
@@ -85,14 +100,8 @@ class Rows {
     }
     const VectorXd zero = VectorXd::Zero(n_);
     accelerations_ = zero;
-    MatrixXd filtered;
-    const ProcessedLog* filtered_of = nullptr;
     for (Index k = 0; k < rows; ++k) {
       const ProcessedLog& log = *of[static_cast<std::size_t>(k)];
-      if (filtered_of != &log) {
-        filtered = log.filter_columns(log.tau);
-        filtered_of = &log;
-      }
       const Index i = at[static_cast<std::size_t>(k)];
       const MotionRows motion = log.motion(i, 1);
       const VectorXd q = motion.q.row(0), dq = motion.dq.row(0), ddq = motion.ddq.row(0);
@@ -106,9 +115,9 @@ class Rows {
         own_[joint].row(k) = own_row(joints[joint].sign_width, dq[j], ddq[j]);
         if (!has_rotor_[joint]) own_[joint](k, rotor) = 0;
         own_inertia_[joint].row(k) = regressor(q, zero, VectorXd::Unit(n_, j)).row(j)(base_.columns) - still.row(j);
-        tau_(k, j) = filtered(i, j);
       }
     }
+    keep_torque(of, at);
     for (Index j = 0; j < n_; ++j) {
       for (const double up : {1.0, -1.0}) {
         const MatrixXd x = columns(j, up);
@@ -220,6 +229,20 @@ class Rows {
   }
 
  private:
+  /// Column by column: a long log's filtered torque is not held for a few hundred of its samples.
+  void keep_torque(const std::vector<const ProcessedLog*>& of, const std::vector<Index>& at) {
+    const ProcessedLog* last = nullptr;
+    for (std::size_t from = 0; from < of.size(); ++from) {
+      if (of[from] == last) continue;
+      last = of[from];
+      for (Index j = 0; j < n_; ++j) {
+        const MatrixXd filtered = last->filter_columns(last->tau.col(j));
+        for (std::size_t k = from; k < of.size() && of[k] == last; ++k)
+          tau_(static_cast<Index>(k), j) = filtered(at[k], 0);
+      }
+    }
+  }
+
   MatrixXd columns(Index j, double up) const {
     const auto joint = static_cast<std::size_t>(j);
     MatrixXd x(tau_.rows(), moving_[joint].cols() + own);

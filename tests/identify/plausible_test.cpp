@@ -90,6 +90,20 @@ TEST(Plausible, ACleanRobotRaisesNoAlarm) {
   }
 }
 
+/// So long that the samples that are looked at are a whole cycle apart: all at one pose they would say anything.
+TEST(Plausible, AMotionThatRepeatsItselfRaisesNoAlarm) {
+  constexpr Eigen::Index every = 10, cycle = 2500 / every, cycles = 401;
+  Simulated s(puma(), 1);
+  for (Eigen::MatrixXd* columns : {&s.log.q, &s.log.dq, &s.log.ddq, &s.log.tau}) {
+    const Eigen::MatrixXd once = (*columns)(Eigen::seqN(0, cycle, every), Eigen::all);
+    *columns = once.replicate(cycles, 1);
+  }
+  s.log.step_s *= every;
+  s.log.t = Eigen::VectorXd::LinSpaced(cycle * cycles, 0, s.log.step_s * static_cast<double>(cycle * cycles - 1));
+  EXPECT_EQ(errors(s.check()), "");
+  EXPECT_EQ(errors(s.check_with(without_inertias(puma()))), "");
+}
+
 TEST(Plausible, NamesEachJointWithTheWrongSign) {
   for (Eigen::Index j = 0; j < 6; ++j) {
     Simulated s(puma(), 2);

@@ -1,0 +1,107 @@
+#!/usr/bin/env python3
+"""memory_test.py FXDYN: what a row more of a log costs a diagnosis in memory. Columns at full rate that are held all
+at once, a copy of a log, or rows kept for every candidate show in the difference of two logs' peaks."""
+import os
+import subprocess
+import sys
+import tempfile
+
+FXDYN = os.path.abspath(sys.argv[1])
+ROWS = (20_000, 60_000)
+MOST = 2100  # bytes a row of two joints: 1670 measured, 2550 with the columns of a search at full rate all at once
+
+SCENARIO = """seed = 2
+[robot]
+urdf = "../arm.urdf"
+rated_torque = [60, 20]
+acceleration = [8, 8]
+[sensors]
+sample_s = 0.002
+encoder_bits = 18
+torque_noise = 0.01
+[[effect]]
+name = "viscous"
+joint = "all"
+parameters = {{ coefficient = 1.0 }}
+[[effect]]
+name = "coulomb"
+joint = "all"
+parameters = {{ amplitude = 1.5, width = 0.02 }}
+[[effect]]
+name = "presliding"
+joint = 1
+parameters = {{ distance = 0.004, amplitude = 1.5 }}
+[[log]]
+name = "long"
+duration_s = {seconds}
+period_s = 10
+speed = 0.8
+seed = 1
+[[log]]
+name = "short"
+duration_s = 20
+period_s = 10
+speed = 0.7
+seed = 2
+"""
+
+PROJECT = """[robot]
+urdf = "arm.urdf"
+rated_torque = [60, 20]
+[identify]
+effects = ["viscous", "coulomb", "offset", "rotor_inertia"]
+[[log]]
+file = "{rows}/long.csv"
+role = "train"
+[[log]]
+file = "{rows}/short.csv"
+role = "test"
+"""
+
+URDF = """<robot name="arm"><link name="base"/>
+<link name="upper"><inertial><origin xyz="0.2 0.01 0"/><mass value="5"/>
+<inertia ixx="0.01" ixy="0" ixz="0" iyy="0.08" iyz="0" izz="0.08"/></inertial></link>
+<link name="fore"><inertial><origin xyz="0.15 0 0.02"/><mass value="3"/>
+<inertia ixx="0.006" ixy="0" ixz="0" iyy="0.05" iyz="0" izz="0.05"/></inertial></link>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 0.3"/>
+<axis xyz="0 1 0"/><limit lower="-2" upper="2" velocity="2" effort="60"/></joint>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="0.4 0 0"/>
+<axis xyz="0 1 0"/><limit lower="-2" upper="2" velocity="2" effort="60"/></joint>
+</robot>
+"""
+
+
+def peak_bytes(command):
+    """Runs it; the most memory that it held."""
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    errors = process.stderr.read()
+    _, status, usage = os.wait4(process.pid, 0)
+    if os.waitstatus_to_exitcode(status) != 0:
+        sys.exit(f"FAILED: {' '.join(command)}: {errors}")
+    return 1024 * usage.ru_maxrss
+
+
+def main():
+    with tempfile.TemporaryDirectory() as work:
+        def write(name, text):
+            path = os.path.join(work, name)
+            os.makedirs(os.path.dirname(path), exist_ok=True)
+            with open(path, "w", encoding="utf-8") as file:
+                file.write(text)
+            return path
+
+        write("arm.urdf", URDF)
+        peaks = []
+        for rows in ROWS:
+            scenario = write(f"{rows}/scenario.toml", SCENARIO.format(seconds=rows * 0.002))
+            peak_bytes([FXDYN, "simulate", scenario, "--out", os.path.join(work, str(rows))])
+            project = write(f"{rows}.toml", PROJECT.format(rows=rows))
+            peaks.append(peak_bytes([FXDYN, "diagnose", project, "--out", os.path.join(work, f"out{rows}")]))
+            print(f"{rows} rows: {peaks[-1] / 1e6:.0f} MB")
+        of_row = (peaks[1] - peaks[0]) / (ROWS[1] - ROWS[0])
+        print(f"{of_row:.0f} bytes a row more, at most {MOST}")
+        sys.exit(of_row > MOST)
+
+
+os.environ["FXDYN_THREADS"] = "1"  # each thread holds columns of its own
+main()
