@@ -90,12 +90,18 @@ class JointDeflection {
   void choose(bool with_rotor) {
     set_ = best_set(rows_, model_, covariance_, uncertainty_, options_, with_rotor);
     drop_small_parts();
-    if (!set_.parts.empty()) {
-      const VectorXd colour = colour_of_rest();
-      polish(rows_, colour, set_);
-      add_deviations(rows_, colour, model_, covariance_, with_rotor, set_);
-    }
+    if (!set_.parts.empty()) refine(with_rotor);
     rotor_ = uncertainty_.rotor > 0 ? uncertainty_.rotor * rows_.z().tail(1)[0] : 0;
+  }
+
+  /// Coefficients, shapes and load together, and how sure they are.
+  void refine(bool with_rotor) {
+    DeflectionRows rows = alike(logs_.train, Rows::independent);
+    const VectorXd colour = rows.colour(residual(design(rows, set_.parts), rows.delta()));
+    fit(rows, colour, set_);
+    polish(rows, colour, set_);
+    add_deviations(rows, colour, model_, covariance_, with_rotor, set_);
+    if (rows.z().size() > 0) rows_.move(rows.z());
   }
 
   /// Encoders are so fine that errors of the torque show too: what is a small part of the deflection is no finding.
@@ -115,9 +121,9 @@ class JointDeflection {
     }
   }
 
-  /// Other logs of the joint with the load that was found.
-  DeflectionRows others(const std::vector<LinkedLog>& logs) const {
-    DeflectionRows out(model_, logs, joint_);
+  /// Logs of the joint with the load that was found.
+  DeflectionRows alike(const std::vector<LinkedLog>& logs, Rows rows = Rows::all) const {
+    DeflectionRows out(model_, logs, joint_, rows);
     if (rows_.z().size() == 0) return out;
     out.add_slopes(model_, uncertainty_);
     out.move(rows_.z());
@@ -126,7 +132,7 @@ class JointDeflection {
 
   void learn_healthy() {
     if (logs_.healthy.empty()) return;
-    DeflectionRows rows = others(logs_.healthy);
+    DeflectionRows rows = alike(logs_.healthy);
     // The load stays where today's deflection has it: only the product with the compliance is known.
     rows.drop_slopes();
     LoadUncertainty same;
@@ -152,7 +158,7 @@ class JointDeflection {
     const auto mean_square = [](const DeflectionRows& rows) {
       return residual(rows.offsets(), rows.delta()).squaredNorm() / static_cast<double>(rows.delta().size());
     };
-    const double healthy = mean_square(others(logs_.healthy)), today = mean_square(rows_);
+    const double healthy = mean_square(alike(logs_.healthy)), today = mean_square(rows_);
     return today < std::pow(1 + options_.same, 2) * healthy;
   }
 
@@ -161,7 +167,7 @@ class JointDeflection {
     Closure out;
     out.without.assign(set_.parts.size(), 0.0);
     if (!logs_.judge.empty()) {
-      add(out, others(logs_.judge), set_);
+      add(out, alike(logs_.judge), set_);
     } else if (!held_out()) {
       add(out, rows_, set_);
     } else {
@@ -170,8 +176,8 @@ class JointDeflection {
         std::vector<LinkedLog> rest = logs_.train;
         rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(l));
         DeflectionSet other = set_;
-        fit(others(rest), colour, other);
-        add(out, others({logs_.train[l]}), other);
+        fit(alike(rest), colour, other);
+        add(out, alike({logs_.train[l]}), other);
       }
     }
     return out;

@@ -17,10 +17,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// Two rows a period of the filter's cut-off. Above it there is next to nothing in the rows but the load's own noise,
-/// from differentiated positions. Rows that are closer let the autoregression see that band, and whitening makes it
-/// count as much as the motion.
-Index stride_of(const ProcessedLog& log) {
+Index stride_of(const ProcessedLog& log, Rows rows) {
+  if (rows == Rows::all) return 1;
   const double rows_a_period = 1 / (log.step_s * static_cast<double>(log.decimation) * log.filter.torque_cutoff_hz);
   return std::max<Index>(1, static_cast<Index>(rows_a_period / 2));
 }
@@ -38,7 +36,8 @@ std::vector<MatrixXd> rigid_loads(const IdentifiedModel& model, const std::vecto
   return out;
 }
 
-DeflectionRows::DeflectionRows(const IdentifiedModel& model, const std::vector<LinkedLog>& logs, std::size_t joint)
+DeflectionRows::DeflectionRows(const IdentifiedModel& model, const std::vector<LinkedLog>& logs, std::size_t joint,
+                               Rows rows)
     : joint_(joint), width_(model.joints[joint].sign_width) {
   const auto j = static_cast<Index>(joint);
   Index total = 0;
@@ -47,7 +46,7 @@ DeflectionRows::DeflectionRows(const IdentifiedModel& model, const std::vector<L
     series_.push_back({m.q, m.dq, m.ddq, load->col(j), log->step_s});
     logs_.push_back(log);
     first_.push_back(total);
-    stride_.push_back(stride_of(*log));
+    stride_.push_back(stride_of(*log, rows));
     count_.push_back((log->rows() + stride_.back() - 1) / stride_.back());
     total += count_.back();
   }

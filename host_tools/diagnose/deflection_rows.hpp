@@ -28,11 +28,16 @@ struct LoadUncertainty {
   double rotor = 0;  ///< one more direction: so much of the inertia is a rotor's, a priori; 0: none is hidden
 };
 
-/// q - qlink of one joint, filtered and decimated to what the filter lets through, and the columns of effects that may
-/// explain it.
+/// Which rows of a log: `all`, or two a period of the filter's cut-off. Above it there is next to nothing in the rows
+/// but the load's own noise, from differentiated positions. Rows that are closer let the autoregression see that band,
+/// and whitening makes it count as much as the motion: coefficients then seem surer than they are.
+enum class Rows { all, independent };
+
+/// q - qlink of one joint, filtered and decimated, and the columns of effects that may explain it.
 class DeflectionRows {
  public:
-  DeflectionRows(const IdentifiedModel& model, const std::vector<LinkedLog>& logs, std::size_t joint);
+  DeflectionRows(const IdentifiedModel& model, const std::vector<LinkedLog>& logs, std::size_t joint,
+                 Rows rows = Rows::all);
 
   std::size_t joint() const { return joint_; }
   std::size_t logs() const { return logs_.size(); }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "host_tools/effects/identified_model.hpp"
@@ -18,6 +19,7 @@ using Eigen::VectorXd;
 
 /// A parabola has three coefficients.
 constexpr Index fewest_given = 3;
+constexpr double most_of_one = 2;  // share of its torque that a joint counts with at most
 
 std::size_t effects_of(const IdentifiedModel& model) {
   std::size_t count = 0;
@@ -53,16 +55,23 @@ void check_torque(const IdentifiedModel& model, const Log& raw, double stuck_sha
   }
 }
 
-/// The model of another robot, or another unit: at no joint less is left of the torque than there was.
+/// The model of another robot, or another unit: what it leaves of the torque is more than there was, as a mean of the
+/// joints' shares. One joint that bears the same weight in both robots says nothing of the others.
 void check_robot(const IdentifiedModel& model, const ProcessedLog& log) {
   const MatrixXd measured = log.filter_columns(log.tau);
   const MatrixXd left = measured - log.filter_columns(predict(model, log));
   const Index count = log.last - log.first;
+  double share = 0;
   for (Index j = 0; j < measured.cols(); ++j) {
-    if (left.col(j).segment(log.first, count).norm() < measured.col(j).segment(log.first, count).norm()) return;
+    const double before = measured.col(j).segment(log.first, count).squaredNorm();
+    const double after = left.col(j).segment(log.first, count).squaredNorm();
+    share += std::min(after / std::max(before, 1e-300), most_of_one) / static_cast<double>(measured.cols());
   }
+  if (share < 1) return;
   throw InputError(
-      fmt::format("{}: the model explains the torque of no joint: is it this robot's, in the same units?", log.name));
+      fmt::format("{}: the model explains the torque of no joint, or of too few: is it this robot's, in the "
+                  "same units?",
+                  log.name));
 }
 
 /// Where the simulation starts: at sample given - 1.

@@ -17,10 +17,11 @@ LuGreBristles::LuGreBristles(const EffectFit& effect)
       static_(effect.linear[0]),
       stribeck_(effect.shape[1]) {}
 
-double LuGreBristles::rate(double z, double v) const {
-  const double g = coulomb_ + (static_ - coulomb_) * std::exp(-v * v / (stribeck_ * stribeck_));
-  return v - sigma0_ * std::fabs(v) * z / g;
+double LuGreBristles::sliding(double v) const {
+  return coulomb_ + (static_ - coulomb_) * std::exp(-v * v / (stribeck_ * stribeck_));
 }
+
+double LuGreBristles::rate(double z, double v) const { return v - sigma0_ * std::fabs(v) * z / sliding(v); }
 
 void LuGreBristles::integrate(double v0, double v1, double seconds) {
   constexpr double longest = 20e-6;  // s
@@ -28,6 +29,12 @@ void LuGreBristles::integrate(double v0, double v1, double seconds) {
   const double h = seconds / steps, slope = (v1 - v0) / steps;
   for (int i = 0; i < steps; ++i) {
     const double from = v0 + slope * i, middle = from + slope / 2, to = from + slope;
+    const double fastest = sigma0_ * std::max(std::fabs(from), std::fabs(to)) / coulomb_;  // 1/s
+    if (h * fastest > 1) {
+      const double steady = std::copysign(sliding(middle), middle) / sigma0_;
+      z_ = steady + (z_ - steady) * std::exp(-h * sigma0_ * std::fabs(middle) / sliding(middle));
+      continue;
+    }
     const double k1 = rate(z_, from), k2 = rate(z_ + h / 2 * k1, middle), k3 = rate(z_ + h / 2 * k2, middle),
                  k4 = rate(z_ + h * k3, to);
     z_ += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4);

@@ -13,13 +13,15 @@ class LuGreBristles {
  public:
   /// @param effect fit of the effect `lugre`
   explicit LuGreBristles(const EffectFit& effect);
-  /// Over `seconds` in which the velocity goes from v0 to v1 linearly: fourth-order Runge-Kutta, steps of at most 20
-  /// us, one of them ending where the velocity turns. @return F at the end [N*m | N]
+  /// Over `seconds` in which the velocity goes from v0 to v1 linearly, in steps of at most 20 us, one of them ending
+  /// where the velocity turns: fourth-order Runge-Kutta. Where bristles settle within a step it would diverge; there a
+  /// step is the solution for the velocity in its middle. @return F at the end [N*m | N]
   double advance(double v0, double v1, double seconds);
   double coulomb() const { return coulomb_; }  ///< Fc [N*m | N]
 
  private:
   void integrate(double v0, double v1, double seconds);
+  double sliding(double v) const;         ///< g(v) [N*m | N]
   double rate(double z, double v) const;  ///< dz/dt [rad/s | m/s]
 
   double sigma0_, sigma1_, coulomb_, static_, stribeck_;

@@ -146,6 +146,24 @@ TEST(LuGreEffect, FollowsTheOdeForTenMinutesOfCreepAndReversals) {
   }
 }
 
+TEST(LuGrePlant, ShortBristlesSlideOnTheStribeckCurve) {
+  Joint joint = joints[0];
+  for (const double distance : {1e-5, 1e-7}) {
+    joint.distance = distance;
+    LuGreBristles bristles(fit_of(joint));
+    double last = 0;
+    for (int k = 1; k < 1000; ++k) {  // up to 60 000 distances a tick
+      const double t = tick_s * k, dq = 3 * std::sin(3 * t);
+      const double force = bristles.advance(last, dq, tick_s);
+      const double curve = 7 + 2.8 * std::exp(-std::pow(dq / 0.08, 2));
+      // Bristles lag by the time that they take to slide once, and g(v) changes meanwhile.
+      if (std::fabs(dq) > 0.01) ASSERT_NEAR(force, std::copysign(curve, dq), 0.02 * curve) << distance << ' ' << t;
+      ASSERT_LE(std::fabs(force), 9.8 + joint.damping * 3) << distance << ' ' << t;
+      last = dq;
+    }
+  }
+}
+
 TEST(LuGreEffect, IsStableWhereEulerIsNot) {
   Joint joint = joints[0];
   joint.distance = 1e-5;
