@@ -68,11 +68,23 @@ void run_gnuplot(const fs::path& directory) {
   throw InputError(fmt::format("gnuplot failed: {}", errors));
 }
 
+/// Where an axis of time begins: 0, or the first stamp where six digits don't resolve what follows (seconds since
+/// 1970).
+double origin_of(const Eigen::VectorXd& t) {
+  constexpr double resolved = 1e-4;
+  const double length = t[t.size() - 1] - t[0];
+  return std::fabs(t[0]) * resolved > length ? t[0] : 0;
+}
+
+std::string label_of(const std::string& axis, double origin) {
+  return origin == 0 ? axis : fmt::format("{} after {:.12g}", axis, origin);
+}
+
 /// The curve as a gnuplot data block of at most `points` lines: of each bucket its lowest and highest sample, in time
 /// order.
-std::string curve(const Eigen::VectorXd& t, const Eigen::VectorXd& y, Eigen::Index points) {
+std::string curve(const Eigen::VectorXd& t, const Eigen::VectorXd& y, Eigen::Index points, double origin) {
   std::string text;
-  const auto line = [&](Eigen::Index k) { text += fmt::format("{:.6g} {:.6g}\n", t[k], y[k]); };
+  const auto line = [&](Eigen::Index k) { text += fmt::format("{:.6g} {:.6g}\n", t[k] - origin, y[k]); };
   if (y.size() <= points) {
     for (Eigen::Index k = 0; k < y.size(); ++k) line(k);
   } else {
@@ -129,6 +141,7 @@ double round_up(double value) {
 }
 
 std::string commands(std::size_t number, const TorquePlot& plot) {
+  const double origin = origin_of(plot.t);
   const std::string data = fmt::format("{}.dat", number);
   return fmt::format(R"(set output '{0}.svg'
 set multiplot
@@ -149,14 +162,14 @@ set tmargin 1
 set yrange [-{5:g}:{5:g}]
 set ytics {5:g}
 set format x '%g'
-set xlabel 'time [s]'
+set xlabel '{6}'
 set ylabel 'residual [{3}]'
 plot '{4}' index 2 with lines lw 1 lc rgb '#2e6fb7' notitle
 unset multiplot
 unset output
 )",
-                     number, plot.t[0], plot.t[plot.t.size() - 1], plot.unit, data,
-                     round_up((plot.measured - plot.predicted).cwiseAbs().maxCoeff()));
+                     number, plot.t[0] - origin, plot.t[plot.t.size() - 1] - origin, plot.unit, data,
+                     round_up((plot.measured - plot.predicted).cwiseAbs().maxCoeff()), label_of("time [s]", origin));
 }
 
 /// Colours of curves that share a panel; more curves than these take them again.
@@ -193,9 +206,10 @@ std::vector<std::string> draw(const std::vector<TorquePlot>& plots) {
   std::string script = settings;
   for (std::size_t i = 0; i < plots.size(); ++i) {
     const TorquePlot& plot = plots[i];
-    write_file(directory.path() / fmt::format("{}.dat", i), curve(plot.t, plot.measured, points) +
-                                                                curve(plot.t, plot.predicted, points) +
-                                                                curve(plot.t, plot.measured - plot.predicted, points));
+    const double origin = origin_of(plot.t);
+    write_file(directory.path() / fmt::format("{}.dat", i),
+               curve(plot.t, plot.measured, points, origin) + curve(plot.t, plot.predicted, points, origin) +
+                   curve(plot.t, plot.measured - plot.predicted, points, origin));
     script += commands(i, plot);
   }
   write_file(directory.path() / "script.gp", script);
@@ -218,16 +232,18 @@ std::string draw(const std::vector<Panel>& panels, const std::vector<std::string
       panel_height * panels.size(), panels.size());
   for (std::size_t p = 0; p < panels.size(); ++p) {
     const Panel& panel = panels[p];
+    const double origin = origin_of(panel.t);
     std::string data, lines;
     for (Eigen::Index c = 0; c < panel.columns.cols(); ++c) {
       const auto i = static_cast<std::size_t>(c);
-      data += curve(panel.t, panel.columns.col(c), panel_points);
+      data += curve(panel.t, panel.columns.col(c), panel_points, origin);
       lines += fmt::format("{}'{}.dat' index {} with lines lw 1.4 lc rgb '{}' title '{}'", c > 0 ? ", " : "", p, c,
                            colours[i % colours.size()], quoted(names[i]));
     }
     write_file(directory.path() / fmt::format("{}.dat", p), data);
-    script += fmt::format("set xrange [{:.6g}:{:.6g}]\nset ylabel '{}'\nset xlabel '{}'\nplot {}\n", panel.t[0],
-                          panel.t[panel.t.size() - 1], panel.label, p + 1 == panels.size() ? "time [s]" : "", lines);
+    script += fmt::format("set xrange [{:.6g}:{:.6g}]\nset ylabel '{}'\nset xlabel '{}'\nplot {}\n",
+                          panel.t[0] - origin, panel.t[panel.t.size() - 1] - origin, panel.label,
+                          p + 1 == panels.size() ? label_of("time [s]", origin) : "", lines);
     script += "unset key\n";  // one is enough
   }
   write_file(directory.path() / "script.gp", script + "unset multiplot\nunset output\n");
@@ -248,17 +264,19 @@ std::string draw(const std::vector<Chart>& charts, int columns) {
   for (std::size_t c = 0; c < charts.size(); ++c) {
     const Chart& chart = charts[c];
     std::string lines;
+    const bool has_origin = !chart.curves.empty() && !chart.curves[0].path && chart.curves[0].x.size() > 0;
+    const double origin = has_origin ? origin_of(chart.curves[0].x) : 0;
     for (std::size_t i = 0; i < chart.curves.size(); ++i) {
       const Curve& one = chart.curves[i];
       const std::string file = fmt::format("{}_{}.dat", c, i);
       write_file(directory.path() / file,
-                 one.path ? path(one.x, one.y, chart_points) : curve(one.x, one.y, chart_points));
+                 one.path ? path(one.x, one.y, chart_points) : curve(one.x, one.y, chart_points, origin));
       lines += fmt::format("{}'{}' with lines lw {} lc rgb '{}' {}", i > 0 ? ", " : "", file, one.width, one.colour,
                            one.title.empty() ? "notitle" : "title '" + quoted(one.title) + "'");
     }
     script += fmt::format("{} logscale y\nset format y '{}'\nset xlabel '{}'\nset ylabel '{}'\nplot {}\n",
-                          chart.logarithmic ? "set" : "unset", chart.logarithmic ? "%.0e" : "%g", quoted(chart.x_label),
-                          quoted(chart.y_label), lines);
+                          chart.logarithmic ? "set" : "unset", chart.logarithmic ? "%.0e" : "%g",
+                          quoted(label_of(chart.x_label, origin)), quoted(chart.y_label), lines);
   }
   write_file(directory.path() / "script.gp", script + "unset multiplot\nunset output\n");
   run_gnuplot(directory.path());

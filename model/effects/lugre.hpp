@@ -23,9 +23,7 @@ struct Lugre {
   static constexpr std::string_view equation =
       "static (y - share s) + damping (dq - |dq| y / n), dy/dt = (dq - |dq| y / n) / distance, "
       "n = share + (1 - share) exp(-(dq / velocity)^2)";
-  static double judged_speed(const double* at, double limit) {
-    return limit > 0 && limit < at[1] ? limit : at[1];
-  }
+  static double judged_speed(const double* at, double limit) { return limit > 0 && limit < at[1] ? limit : at[1]; }
   /// static + viscous v + damping v (1 - 1 / n) >= 0
   static double most_damping(const double* at, double speed, double first, double viscous) {
     const double velocity = at[1], share = at[2];

@@ -119,18 +119,20 @@ class ASmallNameBesideALargeOne : public testing::Test {
     outcome_.not_identifiable.resize(7);
     outcome_.look_again(logs_);
   }
-  std::size_t names_left() { return pass(outcome_, nominal_, logs_, std::vector<bool>(6, false)).groups.size(); }
+  Gate judged() { return pass(outcome_, nominal_, logs_, std::vector<bool>(6, false)); }
 
   IdentifiedModel nominal_;
   std::vector<SessionLog> logs_;
   Outcome outcome_;
 };
 
-TEST_F(ASmallNameBesideALargeOne, StaysWhereItIsSure) { EXPECT_EQ(names_left(), 2U); }
-
-TEST_F(ASmallNameBesideALargeOne, GoesWhereItIsNot) {
-  outcome_.models.options.gate.sure_gain = 1e9;
-  EXPECT_EQ(names_left(), 1U);
+TEST_F(ASmallNameBesideALargeOne, GoesWhereItBringsTooLittleAndNotBefore) {
+  const Gate gate = judged();
+  ASSERT_EQ(gate.groups.size(), 2U);
+  const double small = std::min(gate.held.alone[0].sum(), gate.held.alone[1].sum());
+  EXPECT_GT(small, outcome_.models.options.gate.least_gain);
+  outcome_.models.options.gate.least_gain = 2 * small;
+  EXPECT_EQ(judged().groups.size(), 1U);
 }
 
 TEST(WhatJudges, IsNamed) {

@@ -63,13 +63,14 @@ class Step {
     else
       u.dq = {to_raw(dq, TestFormats::velocity)};
     double sum = 0;
-    Lugre::basis<N>(u, Words<N>{words_.data()}, state_, saturations_, [&](auto tag, std::size_t i, auto phi) {
-      const double coefficient = i == 0 ? joint_.static_friction : joint_.damping;
-      if constexpr (std::is_same_v<N, Real>)
-        sum += coefficient * phi;
-      else
-        sum += coefficient * from_raw(phi.raw, Fixed32::bits(decltype(tag)::value));
-    });
+    Lugre::basis<N>(u, Words<N>{words_.data()}, state_, saturations_,
+                    [&]([[maybe_unused]] auto tag, std::size_t i, auto phi) {
+                      const double coefficient = i == 0 ? joint_.static_friction : joint_.damping;
+                      if constexpr (std::is_same_v<N, Real>)
+                        sum += coefficient * phi;
+                      else
+                        sum += coefficient * from_raw(phi.raw, Fixed32::bits(decltype(tag)::value));
+                    });
     return sum;
   }
 
@@ -156,8 +157,9 @@ TEST(LuGrePlant, ShortBristlesSlideOnTheStribeckCurve) {
       const double t = tick_s * k, dq = 3 * std::sin(3 * t);
       const double force = bristles.advance(last, dq, tick_s);
       const double curve = 7 + 2.8 * std::exp(-std::pow(dq / 0.08, 2));
-      // Bristles lag by the time that they take to slide once, and g(v) changes meanwhile.
-      if (std::fabs(dq) > 0.01) ASSERT_NEAR(force, std::copysign(curve, dq), 0.02 * curve) << distance << ' ' << t;
+      // Bristles lag by the time in which they move by their distance.
+      if (std::fabs(dq) * tick_s > 30 * distance && std::fabs(dq) > 0.01)
+        ASSERT_NEAR(force, std::copysign(curve, dq), 0.02 * curve) << distance << ' ' << t;
       ASSERT_LE(std::fabs(force), 9.8 + joint.damping * 3) << distance << ' ' << t;
       last = dq;
     }
