@@ -131,8 +131,35 @@ TEST(Mujoco, RefusesAnEffectThatItDoesNotKnow) {
   EXPECT_THROW(drive_forces(test::effect("new_friction", {}, {1})), InputError);
 }
 
-TEST(Mujoco, ClosedLoopWithEveryEffectItTakes) {
+/// Dry friction creeps otherwise than a tanh does, and is most of the wrist's torque: only joint 2 has it.
+IdentifiedModel with_dry_friction_at_joint_2() {
   IdentifiedModel plant = test::puma_with_friction();
+  for (std::size_t j : {0U, 2U, 3U, 4U, 5U})
+    std::erase_if(plant.joints[j].effects, [](const EffectFit& fit) { return fit.effect == "coulomb"; });
+  return plant;
+}
+
+/// A controlled motion of the plant has the torque that the model makes of it, as slow as its gear has to be.
+PlantRun expect_torque_of_the_model(const IdentifiedModel& plant) {
+  Reference reference = test::motion_of(plant.robot, 0.0005, 10);
+  reference.feedforward = model_torque(test::plant_of(plant.robot), reference);
+  ClosedLoopSettings settings;
+  settings.hold = 4;
+  PlantRun run = closed_loop_on_mujoco(plant, reference, settings);
+  EXPECT_LT(test::rms(run.q - reference.q), 0.03);
+  const ZeroPhaseFilter filter(8, run.step_s);
+  const MatrixXd expected =
+      filter.apply(predict(plant, filter.apply(run.q), filter.apply(run.dq), filter.apply(run.ddq), run.step_s));
+  const MatrixXd measured = filter.apply(run.tau);
+  for (Eigen::Index j = 0; j < 6; ++j) {
+    const double error = test::rms(measured.col(j) - expected.col(j)) / test::rms(expected.col(j));
+    EXPECT_LT(error, 0.02) << "joint " << j + 1;  // 0.1 to 1.7 %
+  }
+  return run;
+}
+
+TEST(Mujoco, ClosedLoopWithManyEffects) {
+  IdentifiedModel plant = with_dry_friction_at_joint_2();
   const std::vector<EffectFit> effects{test::effect("stribeck", {0.1}, {2}),
                                        test::effect("presliding", {0.005}, {5}),
                                        test::effect("asymmetric_friction", {}, {1, 0.5}),
@@ -145,27 +172,19 @@ TEST(Mujoco, ClosedLoopWithEveryEffectItTakes) {
                                        test::effect("elasticity", {0.004}, {3e-5}),
                                        test::effect("eccentricity", {}, {1e-3, 0})};
   for (const EffectFit& effect : effects) plant.joints[1].effects.push_back(effect);
-  // Dry friction creeps otherwise than a tanh does, and is most of the wrist's torque: only joint 2 has it.
-  for (std::size_t j : {0U, 2U, 3U, 4U, 5U})
-    std::erase_if(plant.joints[j].effects, [](const EffectFit& fit) { return fit.effect == "coulomb"; });
   plant.body = {test::effect("payload", {}, {2, 0, 0, 0.1})};
-  Reference reference = test::motion_of(plant.robot, 0.0005, 10);
-  reference.feedforward = model_torque(test::plant_of(plant.robot), reference);
-  ClosedLoopSettings settings;
-  settings.hold = 4;
-  const PlantRun run = closed_loop_on_mujoco(plant, reference, settings);
-  EXPECT_LT(test::rms(run.q - reference.q), 0.03);
-  // The model's torque for that motion, as slow as its gear has to be.
-  const ZeroPhaseFilter filter(8, run.step_s);
-  const MatrixXd expected =
-      filter.apply(predict(plant, filter.apply(run.q), filter.apply(run.dq), filter.apply(run.ddq), run.step_s));
-  const MatrixXd measured = filter.apply(run.tau);
-  for (Eigen::Index j = 0; j < 6; ++j) {
-    const double error = test::rms(measured.col(j) - expected.col(j)) / test::rms(expected.col(j));
-    EXPECT_LT(error, 0.02) << "joint " << j + 1;  // 0.1 to 1.7 %
-  }
+  const PlantRun run = expect_torque_of_the_model(plant);
   EXPECT_GT(test::rms(run.deflections.col(1)), 5e-4);
   EXPECT_EQ(run.deflections.col(2).cwiseAbs().maxCoeff(), 0);
+}
+
+TEST(Mujoco, ClosedLoopWithLuGre) {
+  IdentifiedModel plant = with_dry_friction_at_joint_2();
+  JointFit& joint = plant.joints[1];
+  std::erase_if(joint.effects, [](const EffectFit& fit) { return fit.effect == "coulomb"; });
+  joint.effects.push_back(test::effect("coulomb", {}, {0.7 * 10}));
+  joint.effects.push_back(test::effect("lugre", {0.003, 0.1, 0.7}, {10, 40}));
+  expect_torque_of_the_model(plant);
 }
 
 }  // namespace
