@@ -35,6 +35,7 @@ std::vector<Threshold> before_the_search() {
        Reads::with_baseline},
       {"noise.mostly_gap", "times the noise", place<noise, &NoiseOptions::mostly_gap>, Reads::without_baseline},
       {"prior.friction_change", "share", place<prior, &PriorOptions::friction_change>, Reads::with_baseline},
+      {"prior.dry_friction_change", "share", place<prior, &PriorOptions::dry_friction_change>, Reads::with_baseline},
       {"prior.offset_change", "share", place<prior, &PriorOptions::offset_change>, Reads::with_baseline},
       {"prior.rotor", "share", place<prior, &PriorOptions::rotor>},
       {"prior.link_rotor", "share", place<prior, &PriorOptions::link_rotor>, Reads::with_link_encoders},
@@ -83,6 +84,7 @@ std::vector<Threshold> of_the_judges() {
        Reads::with_link_encoders},
       {"deflection.least_part", "share", place<deflection, &DeflectionOptions::least_part>, Reads::with_link_encoders},
       {"deflection.same", "share", place<deflection, &DeflectionOptions::same>, Reads::with_link_encoders},
+      {"deflection.noted", "times the noise", place<deflection, &DeflectionOptions::noted>, Reads::with_link_encoders},
   };
 }
 
