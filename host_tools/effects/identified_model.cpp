@@ -323,7 +323,11 @@ json to_json(const IdentifiedModel& model) {
   for (const EffectFit& fit : model.body) body.push_back(effect_json(fit, {}, false));
   json log_formats = json::object();
   for (const auto& [file, format] : model.log_formats) {
-    log_formats[file] = {{"columns", format.columns}, {"torque_gain", format.torque_gain}};
+    json& out = log_formats[file] = {{"columns", format.columns}, {"torque_gain", format.torque_gain}};
+    if (!format.position_gain.empty()) out["position_gain"] = format.position_gain;
+    if (!format.position_offset.empty()) out["position_offset"] = format.position_offset;
+    if (!format.joint_columns.empty()) out["joint_columns"] = format.joint_columns;
+    if (format.time_unit_s > 0) out["time_unit_s"] = format.time_unit_s;
   }
   json out = {{"schema", "fxdyn.model/1"},
               {"stage", model.stage},
@@ -403,8 +407,13 @@ IdentifiedModel read_model(const std::filesystem::path& file) {
                     filter.value("encoder_step", std::vector<double>{}),
                     filter.value("position_noise", std::vector<double>{})};
     for (const auto& [name, format] : j.at("log_formats").items()) {
-      model.log_formats[name] = {format.at("columns").get<std::map<std::string, std::string>>(),
-                                 format.at("torque_gain").get<std::vector<double>>()};
+      using Numbers = std::vector<double>;
+      model.log_formats[name] = {format.at("columns"),
+                                 format.at("torque_gain"),
+                                 format.value("position_gain", Numbers{}),
+                                 format.value("position_offset", Numbers{}),
+                                 format.value("joint_columns", decltype(LogFormat::joint_columns){}),
+                                 format.value("time_unit_s", 0.0)};
     }
     model.stage = j.at("stage");
     if (j.contains("session")) model.session = {j.at("session").at("start_s"), j.at("session").at("end_s")};

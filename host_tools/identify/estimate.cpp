@@ -50,7 +50,7 @@ auto log_formats(const std::vector<LogEntry>& logs) {
   bool agree = true;
   for (const LogEntry& entry : logs) {
     const LogFormat& first = logs.front().format;
-    agree = agree && entry.format.columns == first.columns && entry.format.torque_gain == first.torque_gain;
+    agree = agree && entry.format == first;
     formats[entry.scenario ? entry.scenario_log + ".csv" : entry.file.filename().string()] = entry.format;
   }
   if (agree) formats = {{"", logs.front().format}};

@@ -163,10 +163,36 @@ class ProjectReader {
     project_.limits.box = corners;
   }
 
+  /// A prefix, or a column for each joint: in their order, by their names, or by the columns' numbers.
+  void read_columns(const std::string& signal, const Value& value, LogFormat& format) {
+    format.columns.erase(signal);
+    format.joint_columns.erase(signal);
+    if (value.is_string()) {
+      format.columns[signal] = value.string();
+    } else if (signal == "t") {
+      format.columns[signal] = column_name(value);
+    } else if (value.is_list()) {
+      const std::vector<Value> items = value.items();
+      value.expect(items.size(), joints(), per_joint());
+      for (const Value& item : items) format.joint_columns[signal].push_back(column_name(item));
+    } else {
+      Table names(value);
+      for (const Joint& joint : project_.robot.joints)
+        format.joint_columns[signal].push_back(column_name(names.need(joint.name, "name a column for every joint")));
+      names.finish();
+    }
+  }
+  static std::string column_name(const Value& value) {
+    if (value.is_string()) return value.string();
+    const double number = value.number();
+    if (number < 0 || number != std::floor(number)) value.place().fail("a column's number counts from 0");
+    return fmt::format("#{}", number);
+  }
+
   LogFormat read_format(Table& table, LogFormat format) {
     if (auto columns = table.table("columns")) {
       for (const std::string& signal : signal_names) {
-        if (const auto value = columns->find(signal)) format.columns[signal] = value->string();
+        if (const auto value = columns->find(signal)) read_columns(signal, *value, format);
       }
       columns->finish();
     }
@@ -175,6 +201,13 @@ class ProjectReader {
       if (std::count(gains.begin(), gains.end(), 0.0) > 0) v.place().fail("a gain of 0 leaves no torque");
       return gains;
     });
+    set(format.position_gain, table.find("position_gain"), [this](const Value& v) {
+      const std::vector<double> gains = v.numbers(joints(), per_joint());
+      if (std::count(gains.begin(), gains.end(), 0.0) > 0) v.place().fail("a gain of 0 leaves no motion");
+      return gains;
+    });
+    set(format.position_offset, table.find("position_offset"),
+        [this](const Value& v) { return v.numbers(joints(), per_joint()); });
     return format;
   }
 

@@ -46,12 +46,23 @@ class Header {
   Header(const std::string& file, int line, std::string_view text) : file_(file), line_(line), names_(split(text)) {
     layout_.fields = names_.size();
     layout_.target.assign(names_.size(), -1);
+    double number = 0;
+    const std::string& name = names_.front();
+    has_names_ = std::from_chars(name.data(), name.data() + name.size(), number).ec != std::errc();
+    if (has_names_) return;
+    for (std::size_t field = 0; field < names_.size(); ++field) names_[field] = fmt::format("#{}", field);
   }
+  /// Else the file starts with a row of numbers: its columns are called #0, #1, ...
+  bool has_names() const { return has_names_; }
 
   Layout layout(std::size_t joints, const LogFormat& format, bool torque_required) {
     if (!take(prefix(format, "t"))) missing(prefix(format, "t"), "time stamps in s");
     for (std::size_t signal = 0; signal < signal_count; ++signal) {
       const std::string name = signal_names[signal];
+      if (const auto given = format.joint_columns.find(name); given != format.joint_columns.end()) {
+        add_named(static_cast<Signal>(signal), given->second, joints);
+        continue;
+      }
       const bool required = signal == q || (signal == tau && torque_required) || format.columns.contains(name);
       add(static_cast<Signal>(signal), prefix(format, name), joints, required);
     }
@@ -64,10 +75,21 @@ class Header {
     return found == format.columns.end() ? signal : found->second;
   }
 
-  std::optional<int> take(const std::string& name) {
+  /// Where a column is, by its name or, as "#3", by its number from 0.
+  std::vector<std::string>::const_iterator place_of(const std::string& name) const {
     const auto found = std::find(names_.begin(), names_.end(), name);
+    if (found != names_.end() || !name.starts_with('#')) return found;
+    std::size_t field = 0;
+    const char* end = name.data() + name.size();
+    const auto [stop, error] = std::from_chars(name.data() + 1, end, field);
+    if (error != std::errc() || stop != end || field >= names_.size()) return names_.end();
+    return names_.begin() + static_cast<std::ptrdiff_t>(field);
+  }
+
+  std::optional<int> take(const std::string& name) {
+    const auto found = place_of(name);
     if (found == names_.end()) return std::nullopt;
-    if (std::find(found + 1, names_.end(), name) != names_.end()) {
+    if (std::find(found + 1, names_.cend(), name) != names_.cend()) {
       throw InputError(fmt::format("{}:{}: column '{}' appears twice; rename one", file_, line_, name));
     }
     int& target = layout_.target[static_cast<std::size_t>(found - names_.begin())];
@@ -76,6 +98,19 @@ class Header {
       layout_.names.push_back(name);
     }
     return target;
+  }
+
+  /// The columns that a project names joint by joint.
+  void add_named(Signal signal, const std::vector<std::string>& names, std::size_t joints) {
+    if (names.size() != joints) {
+      throw InputError(fmt::format("{}:{}: columns.{} names {} columns for {} moving joints", file_, line_,
+                                   signal_names[signal], names.size(), joints));
+    }
+    for (std::size_t joint = 0; joint < joints; ++joint) {
+      const auto column = take(names[joint]);
+      if (!column) missing(names[joint], fmt::format("signal {} of joint {}", signal_names[signal], joint + 1));
+      layout_.columns[signal].push_back(*column);
+    }
   }
 
   void add(Signal signal, const std::string& name, std::size_t joints, bool required) {
@@ -116,10 +151,11 @@ class Header {
       throw InputError(fmt::format("{}:{}: no commas in the header '{}'; separate columns by commas", file_, line_,
                                    all.substr(0, 60)));
     }
-    double number = 0;
-    if (std::from_chars(all.data(), all.data() + all.size(), number).ec == std::errc()) {
-      throw InputError(fmt::format(
-          "{}:{}: starts with a number; the first line must name the columns (t,q1,...,tau1,...)", file_, line_));
+    if (!has_names_) {
+      throw InputError(
+          fmt::format("{}:{}: starts with a number, so its {} columns have no names; give their numbers, counted from "
+                      "0: columns = {{ t = 0, q = [1, 2], tau = [3, 4] }}, or a first line (t,q1,...,tau1,...)",
+                      file_, line_, names_.size()));
     }
     throw InputError(fmt::format("{}:{}: no column '{}' ({}); nearest is '{}' (map it with columns = {{ ... }})", file_,
                                  line_, name, meaning, nearest(name, names_)));
@@ -128,6 +164,7 @@ class Header {
   std::string file_;
   int line_;
   std::vector<std::string> names_;
+  bool has_names_ = true;
   Layout layout_;
 };
 
@@ -242,8 +279,9 @@ RecordedLog read_csv(const LogRequest& request) {
   std::string_view first;
   if (!lines.next(first))
     throw InputError(where + ":1: empty file; the first line must name the columns (t,q1,...,tau1,...)");
-  const Layout layout =
-      Header(where, lines.number(), first).layout(request.joints, request.columns, request.torque_required);
+  Header header(where, lines.number(), first);
+  const Layout layout = header.layout(request.joints, request.columns, request.torque_required);
+  if (!header.has_names()) lines = LineReader(mapped.text());
   Table table = Rows(where, layout).read(mapped, lines, request.from, request.to);
   const double first_t = table.first_t, last_t = table.last_t;
   return {to_log(std::move(table), layout, request.joints), first_t, last_t};

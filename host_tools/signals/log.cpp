@@ -46,12 +46,32 @@ Role role_of(std::string_view name) {
   throw InputError(fmt::format("'{}' is no role of a log; use baseline, train, validate or test", name));
 }
 
+namespace {
+
+/// The project's gains and offsets, so that the columns are what Log says.
+void to_si_units(Log& log, const LogFormat& format) {
+  const auto scale = [](Eigen::MatrixXd& columns, const std::vector<double>& gains) {
+    if (columns.size() == 0) return;
+    for (std::size_t joint = 0; joint < gains.size(); ++joint) columns.col(static_cast<Index>(joint)) *= gains[joint];
+  };
+  scale(log.tau, format.torque_gain);
+  for (Eigen::MatrixXd* columns : {&log.q, &log.dq, &log.ddq, &log.qlink}) scale(*columns, format.position_gain);
+  for (std::size_t joint = 0; joint < format.position_offset.size(); ++joint) {
+    for (Eigen::MatrixXd* columns : {&log.q, &log.qlink})
+      if (columns->size() > 0) columns->col(static_cast<Index>(joint)).array() += format.position_offset[joint];
+  }
+}
+
+}  // namespace
+
 Log read_log(const std::filesystem::path& file, std::size_t joints, const std::vector<bool>& revolute,
              const LogFormat& format, std::optional<double> from_s, std::optional<double> to_s, bool torque_required) {
   const std::string where = file.string();
-  if (!format.torque_gain.empty() && format.torque_gain.size() != joints) {
-    throw InputError(
-        fmt::format("{}: torque_gain has {} values for {} joints", where, format.torque_gain.size(), joints));
+  for (const auto& [key, values] : {std::pair("torque_gain", &format.torque_gain),
+                                    std::pair("position_gain", &format.position_gain),
+                                    std::pair("position_offset", &format.position_offset)}) {
+    if (!values->empty() && values->size() != joints)
+      throw InputError(fmt::format("{}: {} has {} values for {} joints", where, key, values->size(), joints));
   }
   LogRequest request{.file = file, .joints = joints, .columns = format, .torque_required = torque_required};
   if (from_s) request.from = *from_s;
@@ -62,10 +82,7 @@ Log read_log(const std::filesystem::path& file, std::size_t joints, const std::v
     throw InputError(fmt::format("{}: the window [{:.9g}, {:.9g}) s holds {} rows; the file has {:.9g} to {:.9g} s",
                                  where, request.from, request.to, log.samples(), recorded.first_t, recorded.last_t));
   }
-  if (log.tau.size() > 0) {
-    for (std::size_t joint = 0; joint < format.torque_gain.size(); ++joint)
-      log.tau.col(static_cast<Index>(joint)) *= format.torque_gain[joint];
-  }
+  to_si_units(log, format);
   log.file = file;
   log.step_s = check_stamps(log, where);
   log.from_s = from_s.value_or(log.t[0]);

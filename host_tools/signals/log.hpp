@@ -49,14 +49,7 @@ struct LogFormat {
   /// Signal -> one column a joint, in the order of the chain; in place of a prefix. "#3": the fourth column of the file.
   std::map<std::string, std::vector<std::string>> joint_columns{};
   double time_unit_s = 0;  ///< of the time column [s]; 0: told from its steps
-};  ///< signal (t q dq ddq tau qlink temp) -> column prefix in the file
-  /// Signal -> one column a joint, in the order of the chain; a number counts the file's columns from 0. Before `columns`.
-  std::map<std::string, std::vector<std::string>> joint_columns{};
-  std::vector<double> torque_gain{};      ///< measured column -> N*m; empty: 1
-  std::vector<double> position_gain{};    ///< measured position (velocity, acceleration) -> rad | m; empty: 1
-  std::vector<double> position_offset{};  ///< added to the position after its gain [rad | m]; empty: 0
-  /// The time column's unit [s]; 0: told from the stamps.
-  double time_unit_s = 0;
+  bool operator==(const LogFormat&) const = default;
 };
 
 /// Reads `joints` joints. Irregular stamps (jitter > 1 % of the median step) are resampled to the median step by
