@@ -2,13 +2,17 @@
 
 #include <fmt/format.h>
 
+#include <nlohmann/json.hpp>
+
 #include "host_tools/cli/verb.hpp"
+#include "host_tools/check/check.hpp"
 #include "host_tools/excite/excite.hpp"
 #include "host_tools/pipeline/forward_log.hpp"
 #include "host_tools/pipeline/one_log.hpp"
 #include "host_tools/pipeline/refine_model.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/support/error.hpp"
+#include "host_tools/support/temporary_folder.hpp"
 
 namespace fxdyn::cli {
 
@@ -29,6 +33,25 @@ Action add_excite(CLI::App& verb) {
     Progress progress;
     fmt::print("{}", options->paper ? excite_paper(options->out)
                                     : excite(read_project(options->project), options->out, progress));
+  };
+}
+
+Action add_check(CLI::App& verb) {
+  struct Options {
+    std::string project, out;
+    bool as_json = false;
+  };
+  const auto options = std::make_shared<Options>();
+  verb.add_option("PROJECT", options->project, "project file (TOML)")->required();
+  verb.add_flag("--json", options->as_json, "what was seen as JSON");
+  verb.add_option("--out", options->out, "directory for the logs of scenarios (default: none is kept)");
+  return [options] {
+    const TemporaryFolder temporary;
+    const CheckResult result =
+        check(read_project(options->project), options->out.empty() ? temporary.path() : std::filesystem::path(options->out));
+    fmt::print("{}", options->as_json ? to_json(result).dump(2) + "\n" : check_table(result));
+    if (result.has_error())
+      throw DataError("these logs can't be what the project says: write the lines above, then check again");
   };
 }
 

@@ -7,6 +7,7 @@
 
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/link_parameters.hpp"
+#include "host_tools/identify/torque_samples.hpp"
 #include "host_tools/regression/physical.hpp"
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/regression/solver.hpp"
@@ -20,20 +21,6 @@ using Eigen::VectorXd;
 
 constexpr Index samples_used = 400;
 
-/// One sample of each `stride` of the log, not at even distances: those may keep step with a motion that repeats
-/// itself, and all rows would show one pose. The golden ratio spreads them most evenly over any cycle.
-std::vector<Index> spread_samples(Index first, Index last, Index stride) {
-  constexpr double golden = 0.6180339887498949;
-  std::vector<Index> out;
-  double share = 0;
-  for (Index k = first; k < last; k += stride) {
-    const Index at = k + static_cast<Index>(share * static_cast<double>(stride));
-    if (at < last) out.push_back(at);
-    share += golden;
-    share -= std::floor(share);
-  }
-  return out;
-}
 /// Columns of a joint beside the base parameters: the nominal effects.
 const auto own = static_cast<Index>(nominal_effects().size());
 Index column_of(std::string_view effect) {
@@ -72,26 +59,10 @@ class Rows {
       has_rotor_.push_back(!rotor_inertia_is_absorbed(chain, base_, j));
       left_out_.push_back(logs.front().is_left_out(j));
     }
-    Index available = 0;
-    double independent = 0;  // samples of noise below the torque's cut-off: 2 f T
-    for (const ProcessedLog& log : logs) {
-      if (log.role != Role::train) continue;
-      available += log.last - log.first;
-      independent += 2 * log.filter.torque_cutoff_hz * static_cast<double>(log.last - log.first) * log.step_s;
-    }
-    const Index stride = std::max<Index>(1, available / samples_used);
-    std::vector<const ProcessedLog*> of;
-    std::vector<Index> at;
-    for (const ProcessedLog& log : logs) {
-      if (log.role != Role::train) continue;
-      for (const Index k : spread_samples(log.first, log.last, stride)) {
-        of.push_back(&log);
-        at.push_back(k);
-      }
-    }
-    const auto rows = static_cast<Index>(of.size());
-    rows_per_sample_ = std::max(1.0, static_cast<double>(rows) / independent);
-    tau_.resize(rows, n_);
+    TorqueSamples samples = sample_torque(logs, samples_used);
+    tau_ = std::move(samples.tau);
+    const Index rows = tau_.rows();
+    rows_per_sample_ = std::max(1.0, static_cast<double>(rows) / samples.independent);
     for (Index j = 0; j < n_; ++j) {
       moving_.emplace_back(rows, nb);
       gravity_.emplace_back(rows, nb);
@@ -101,10 +72,7 @@ class Rows {
     const VectorXd zero = VectorXd::Zero(n_);
     accelerations_ = zero;
     for (Index k = 0; k < rows; ++k) {
-      const ProcessedLog& log = *of[static_cast<std::size_t>(k)];
-      const Index i = at[static_cast<std::size_t>(k)];
-      const MotionRows motion = log.motion(i, 1);
-      const VectorXd q = motion.q.row(0), dq = motion.dq.row(0), ddq = motion.ddq.row(0);
+      const VectorXd q = samples.q.row(k), dq = samples.dq.row(k), ddq = samples.ddq.row(k);
       const MatrixXd still = regressor(q, zero, zero)(Eigen::all, base_.columns);
       const MatrixXd moving = regressor(q, dq, ddq)(Eigen::all, base_.columns);
       accelerations_ += ddq.cwiseAbs2();
@@ -117,7 +85,6 @@ class Rows {
         own_inertia_[joint].row(k) = regressor(q, zero, VectorXd::Unit(n_, j)).row(j)(base_.columns) - still.row(j);
       }
     }
-    keep_torque(of, at);
     for (Index j = 0; j < n_; ++j) {
       for (const double up : {1.0, -1.0}) {
         const MatrixXd x = columns(j, up);
@@ -229,20 +196,6 @@ class Rows {
   }
 
  private:
-  /// Column by column: a long log's filtered torque is not held for a few hundred of its samples.
-  void keep_torque(const std::vector<const ProcessedLog*>& of, const std::vector<Index>& at) {
-    const ProcessedLog* last = nullptr;
-    for (std::size_t from = 0; from < of.size(); ++from) {
-      if (of[from] == last) continue;
-      last = of[from];
-      for (Index j = 0; j < n_; ++j) {
-        const MatrixXd filtered = last->filter_columns(last->tau.col(j));
-        for (std::size_t k = from; k < of.size() && of[k] == last; ++k)
-          tau_(static_cast<Index>(k), j) = filtered(at[k], 0);
-      }
-    }
-  }
-
   MatrixXd columns(Index j, double up) const {
     const auto joint = static_cast<std::size_t>(j);
     MatrixXd x(tau_.rows(), moving_[joint].cols() + own);

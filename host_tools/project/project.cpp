@@ -69,6 +69,10 @@ class ProjectReader {
     Table root({file_, "", 1}, root_);
     read_robot(Table(root.need("robot", "add a table [robot] with urdf = \"...\"")));
     if (auto table = root.table("signals")) read_signals(*table);
+    if (auto table = root.table("check")) {
+      set(project_.check.columns, table->find("columns"), as_boolean);
+      table->finish();
+    }
     if (auto table = root.table("limits")) read_limits(*table);
     if (auto table = root.table("identify")) read_identify(*table);
     if (auto table = root.table("diagnose")) read_diagnose(*table);

@@ -33,6 +33,11 @@ struct IdentifySettings {
   std::optional<double> prior_error;  ///< relative, of the URDF's masses: they take part in the fit
 };
 
+/// What `fxdyn check`, and every verb that fits, looks at before it believes a log.
+struct CheckSettings {
+  bool columns = true;  ///< order, signs, zeros, axes, gravity and gains against the URDF
+};
+
 struct DiagnoseSettings {
   int max_effects = 3;  ///< per joint
 };
@@ -98,6 +103,7 @@ struct Project {
   std::vector<LogEntry> logs;
   SignalSettings signals;
   IdentifySettings identify;
+  CheckSettings check;
   DiagnoseSettings diagnose;
   TrainSettings train;
   ExciteSettings excite;

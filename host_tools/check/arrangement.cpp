@@ -1,0 +1,199 @@
+#include "host_tools/check/arrangement.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "host_tools/effects/effect_roles.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/regression/pseudo_inertia.hpp"
+#include "host_tools/regression/regressor.hpp"
+
+namespace fxdyn {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr auto ten = static_cast<Index>(parameters_per_link);
+Index own_columns() { return static_cast<Index>(nominal_effects().size()); }
+
+/// The URDF's body of a link, or a sphere of the mass that the torques ask for.
+LinkInertia<Real> body_of(const Joint& joint, const Eigen::Isometry3d& pose, double mass, double radius) {
+  if (joint.inertial) return to_link_inertia(possible_body(*joint.inertial), pose);
+  Inertial sphere;
+  sphere.mass = mass;
+  sphere.tensor = 0.4 * mass * radius * radius * Eigen::Matrix3d::Identity();
+  return to_link_inertia(sphere, pose);
+}
+
+/// Length of the chain [m].
+double chain_length(const Robot& robot) {
+  double length = 0;
+  for (const Joint& joint : robot.joints) length += joint.origin.translation().norm();
+  return std::max(length, 0.3);
+}
+
+}  // namespace
+
+Arrangement as_given(const Robot& robot) {
+  const auto n = static_cast<Index>(robot.size());
+  Arrangement out;
+  out.motion_from.resize(robot.size());
+  std::iota(out.motion_from.begin(), out.motion_from.end(), 0);
+  out.torque_from = out.motion_from;
+  out.motion_gain = out.torque_gain = VectorXd::Ones(n);
+  out.motion_offset = VectorXd::Zero(n);
+  for (const Joint& joint : robot.joints) out.axis.push_back(joint.axis);
+  out.gravity = robot.gravity;
+  return out;
+}
+
+ArrangementEvidence::ArrangementEvidence(Robot robot, TorqueSamples samples, const ArrangementOptions& options)
+    : robot_(std::move(robot)), samples_(std::move(samples)), options_(options) {
+  const auto n = static_cast<Index>(robot_.size());
+  const VectorXd speed = samples_.dq.colwise().norm().transpose();
+  torque_square_ = samples_.tau.colwise().squaredNorm().transpose() / static_cast<double>(samples_.size());
+  for (Index j = 0; j < n; ++j) moves_.push_back(speed[j] > options_.standstill * speed.maxCoeff());
+}
+
+bool ArrangementEvidence::enough() const { return samples_.size() >= 2 * (ten + own_columns()); }
+
+ArrangementEvidence::Design ArrangementEvidence::design(const Arrangement& arrangement) const {
+  const auto n = static_cast<Index>(robot_.size());
+  const Index rows = samples_.size(), bodies = ten * n, own = own_columns();
+  Robot robot = robot_;
+  robot.gravity = arrangement.gravity;
+  for (std::size_t j = 0; j < robot.size(); ++j) robot.joints[j].axis = arrangement.axis[j];
+  const DhChain chain = to_dh(robot);
+
+  MatrixXd q(rows, n), dq(rows, n), ddq(rows, n);
+  for (Index j = 0; j < n; ++j) {
+    const Index from = arrangement.motion_from[static_cast<std::size_t>(j)];
+    const double gain = arrangement.motion_gain[j];
+    q.col(j) = (gain * samples_.q.col(from)).array() + arrangement.motion_offset[j];
+    dq.col(j) = gain * samples_.dq.col(from);
+    ddq.col(j) = gain * samples_.ddq.col(from);
+  }
+  std::vector<MatrixXd> x(robot.size(), MatrixXd(rows, bodies + own));
+  Regressor regressor(chain);
+  for (Index k = 0; k < rows; ++k) {
+    const MatrixXd& y = regressor(q.row(k), dq.row(k), ddq.row(k));
+    for (Index j = 0; j < n; ++j) x[static_cast<std::size_t>(j)].row(k).head(bodies) = y.row(j);
+  }
+
+  Design out;
+  out.information = MatrixXd::Zero(bodies, bodies);
+  out.mean.resize(bodies);
+  const double length = chain_length(robot);
+  const double mass = std::sqrt(torque_square_.maxCoeff()) / (9.81 * length);
+  for (std::size_t j = 0; j < robot.size(); ++j) {
+    const auto joint = static_cast<Index>(j);
+    JointSeries series;
+    series.q = q.col(joint);
+    series.dq = dq.col(joint);
+    series.ddq = ddq.col(joint);
+    series.step_s = 1;
+    const double width = std::max(0.02 * series.dq.cwiseAbs().maxCoeff(), 1e-9);
+    out.own_square.emplace_back(own);
+    for (Index i = 0; i < own; ++i) {
+      const auto column = effect_columns(nominal_effects()[static_cast<std::size_t>(i)], {}, width, series);
+      x[j].col(bodies + i) = column.col(0);
+      out.own_square[j][i] = std::max(column.col(0).squaredNorm() / static_cast<double>(rows), 1e-12);
+    }
+    out.gram.push_back(x[j].transpose() * x[j]);
+    out.projection.push_back(x[j].transpose() * samples_.tau);
+
+    const bool known = robot.joints[j].inertial.has_value();
+    const double vague = known ? 1 : options_.vague;
+    const Eigen::Matrix4d body =
+        pseudo_inertia(body_of(robot.joints[j], chain.urdf_in_dh[j], mass, length / 4));
+    out.mean.segment(ten * joint, ten) = pseudo_inertia_parameters(body);
+    out.information.block(ten * joint, ten * joint, ten, ten) = barrier_hessian(body.inverse()) / (vague * vague);
+  }
+  return out;
+}
+
+ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangement& arrangement) const {
+  ArrangementScore best = score(design, arrangement, options_.mass_errors.front());
+  for (std::size_t i = 1; i < options_.mass_errors.size(); ++i) {
+    ArrangementScore other = score(design, arrangement, options_.mass_errors[i]);
+    if (other.nats < best.nats) best = std::move(other);
+  }
+  return best;
+}
+
+ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangement& arrangement,
+                                            double mass_error) const {
+  const auto n = static_cast<Index>(robot_.size());
+  const Index bodies = ten * n, own = own_columns(), all = bodies + own * n;
+  const auto rows = static_cast<double>(samples_.size());
+  const double count = std::min(options_.independent, rows);
+
+  MatrixXd prior = MatrixXd::Zero(all, all);
+  prior.topLeftCorner(bodies, bodies) = design.information / (mass_error * mass_error);
+  VectorXd mean = VectorXd::Zero(all);
+  mean.head(bodies) = design.mean;
+  VectorXd whole(n), gain(n), variance(n);
+  std::vector<Index> from(static_cast<std::size_t>(n));
+  for (Index j = 0; j < n; ++j) {
+    const auto joint = static_cast<std::size_t>(j);
+    from[joint] = arrangement.torque_from[joint];
+    gain[j] = arrangement.torque_gain[j];
+    whole[j] = std::max(gain[j] * gain[j] * torque_square_[from[joint]], 1e-300);
+    prior.diagonal().segment(bodies + own * j, own) =
+        design.own_square[joint] / (options_.own_share * options_.own_share * whole[j]);
+  }
+  variance = whole;
+
+  ArrangementScore out;
+  VectorXd solution;
+  double log_determinant = 0;
+  for (int round = 0; round < 5; ++round) {
+    MatrixXd information = prior;
+    VectorXd projection = prior * mean;
+    for (Index j = 0; j < n; ++j) {
+      if (!moves(j)) continue;
+      const auto joint = static_cast<std::size_t>(j);
+      const double weight = count / (rows * variance[j]);
+      const Index at = bodies + own * j;
+      const MatrixXd& gram = design.gram[joint];
+      information.topLeftCorner(bodies, bodies) += weight * gram.topLeftCorner(bodies, bodies);
+      information.block(0, at, bodies, own) += weight * gram.topRightCorner(bodies, own);
+      information.block(at, 0, own, bodies) += weight * gram.bottomLeftCorner(own, bodies);
+      information.block(at, at, own, own) += weight * gram.bottomRightCorner(own, own);
+      const VectorXd target = weight * gain[j] * design.projection[joint].col(from[joint]);
+      projection.head(bodies) += target.head(bodies);
+      projection.segment(at, own) += target.tail(own);
+    }
+    const VectorXd scale = information.diagonal().cwiseSqrt().cwiseInverse();
+    const Eigen::LLT<MatrixXd> llt(scale.asDiagonal() * information * scale.asDiagonal());
+    solution = scale.asDiagonal() * llt.solve(scale.asDiagonal() * projection);
+    log_determinant = 2 * (llt.matrixLLT().diagonal().array().abs().log().sum() - scale.array().log().sum());
+    for (Index j = 0; j < n; ++j) {
+      const auto joint = static_cast<std::size_t>(j);
+      VectorXd x(bodies + own);
+      x << solution.head(bodies), solution.segment(bodies + own * j, own);
+      const double square = whole[j] + (x.dot(design.gram[joint] * x) -
+                                        2 * gain[j] * x.dot(design.projection[joint].col(from[joint]))) /
+                                           rows;
+      variance[j] = std::max(square, options_.perfect * options_.perfect * whole[j]);
+    }
+  }
+  out.rms = variance.cwiseSqrt();
+  for (Index j = 0; j < n; ++j)
+    if (moves(j)) out.nats += count / 2 * std::log(variance[j] / whole[j]);
+  const VectorXd change = solution - mean;
+  const Eigen::LLT<MatrixXd> of_prior(prior);
+  out.nats += 0.5 * change.dot(prior * change) + 0.5 * log_determinant -
+              of_prior.matrixLLT().diagonal().array().abs().log().sum();
+  return out;
+}
+
+ArrangementScore ArrangementEvidence::operator()(const Arrangement& arrangement) const {
+  return score(design(arrangement), arrangement);
+}
+
+}  // namespace fxdyn

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <string>
+#include <vector>
+
+#include "host_tools/check/options.hpp"
+#include "host_tools/identify/torque_samples.hpp"
+#include "host_tools/robot/robot.hpp"
+
+namespace fxdyn {
+
+/// How the columns of a log belong to the joints of a URDF. What a project says is the identity.
+struct Arrangement {
+  std::vector<Eigen::Index> motion_from, torque_from;  ///< joint -> column of q (dq, ddq), of tau
+  Eigen::VectorXd motion_gain, motion_offset;          ///< q = gain * column + offset [rad | m]
+  Eigen::VectorXd torque_gain;                         ///< tau = gain * column
+  std::vector<Eigen::Vector3d> axis;                   ///< of each joint, in its URDF frame
+  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();   ///< base frame [m/s^2]
+};
+Arrangement as_given(const Robot& robot);
+
+/// How well an arrangement explains the torque.
+struct ArrangementScore {
+  double nats = 0;      ///< minus log of the evidence, up to a constant that all arrangements share
+  Eigen::VectorXd rms;  ///< residual of each joint [N*m | N]
+};
+
+/// The evidence of arrangements of one robot's samples. Model: tau_j = Y_j(q, dq, ddq) pi + nominal friction, rotor and
+/// offset of the joint. pi is normal about the URDF's bodies (pseudo-inertia metric, see barrier_hessian()), with that
+/// of options.mass_errors that has the most evidence; where a link has no body about a sphere, options.vague times as
+/// wide. The residual's deviation is
+/// each joint's own, found by iteration. What it consists of is structure more than noise, so only
+/// `options.independent` rows of a joint count.
+class ArrangementEvidence {
+ public:
+  ArrangementEvidence(Robot robot, TorqueSamples samples, const ArrangementOptions& options);
+
+  /// Safe from several threads.
+  ArrangementScore operator()(const Arrangement& arrangement) const;
+
+  /// The regressors of an arrangement's motion, axes and gravity: most of the work. Columns and gains of the torque
+  /// do not change them.
+  struct Design {
+    std::vector<Eigen::MatrixXd> gram, projection;  ///< per joint: X^T X; X^T tau of all torque columns
+    Eigen::MatrixXd information;                    ///< of the bodies before any log, for a mass error of 1
+    Eigen::VectorXd mean;                           ///< likewise
+    std::vector<Eigen::VectorXd> own_square;  ///< per joint: mean squares of its own columns
+  };
+  Design design(const Arrangement& arrangement) const;
+  ArrangementScore score(const Design& design, const Arrangement& arrangement) const;
+
+  const Robot& robot() const { return robot_; }
+  /// A joint that never moves holds any torque, as does its brake.
+  bool moves(Eigen::Index joint) const { return moves_[static_cast<std::size_t>(joint)]; }
+  /// Twice as many samples as unknowns: fewer prove nothing.
+  bool enough() const;
+
+ private:
+  ArrangementScore score(const Design& design, const Arrangement& arrangement, double mass_error) const;
+
+  Robot robot_;
+  TorqueSamples samples_;
+  ArrangementOptions options_;
+  std::vector<bool> moves_;
+  Eigen::VectorXd torque_square_;  ///< mean squares of the torque columns
+};
+
+}  // namespace fxdyn

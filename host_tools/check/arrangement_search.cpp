@@ -1,0 +1,270 @@
+#include "host_tools/check/arrangement_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "host_tools/support/parallel.hpp"
+
+namespace fxdyn {
+
+using Eigen::Index;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+std::string to_string(Mistake mistake) {
+  switch (mistake) {
+    case Mistake::swapped_joints:
+      return "swapped_joints";
+    case Mistake::swapped_torques:
+      return "swapped_torques";
+    case Mistake::mirrored_motion:
+      return "mirrored_motion";
+    case Mistake::mirrored_torque:
+      return "mirrored_torque";
+    case Mistake::mirrored_joint:
+      return "mirrored_joint";
+    case Mistake::zero:
+      return "zero";
+    case Mistake::axis:
+      return "axis";
+    case Mistake::gravity:
+      return "gravity";
+    case Mistake::torque_gain:
+      return "torque_gain";
+    case Mistake::position_unit:
+      return "position_unit";
+  }
+  return "";
+}
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+bool changes_motion(Mistake mistake) {
+  return mistake != Mistake::swapped_torques && mistake != Mistake::mirrored_torque && mistake != Mistake::torque_gain;
+}
+
+/// All single changes of an arrangement, continuous ones on a grid.
+class Moves {
+ public:
+  Moves(const ArrangementEvidence& evidence, const Arrangement& now) : evidence_(evidence), now_(now) {
+    const auto n = static_cast<Index>(evidence.robot().size());
+    for (Index j = 0; j < n; ++j) {
+      for (Index other = j + 1; other < n; ++other) swap(j, other);
+      if (evidence.moves(j)) signs_and_gains(j);
+      zeros(j);
+      axes(j);
+      units(j);
+    }
+    directions_of_gravity();
+  }
+  std::vector<ArrangementMove> all;
+
+ private:
+  ArrangementMove& add(Mistake mistake, Index joint) {
+    all.push_back({mistake, joint, joint, 0, Vector3d::Zero(), now_});
+    return all.back();
+  }
+  const Joint& joint(Index j) const { return evidence_.robot().joints[static_cast<std::size_t>(j)]; }
+
+  void swap(Index a, Index b) {
+    const auto i = static_cast<std::size_t>(a), k = static_cast<std::size_t>(b);
+    ArrangementMove& torques = add(Mistake::swapped_torques, a);
+    torques.other = b;
+    std::swap(torques.result.torque_from[i], torques.result.torque_from[k]);
+    if (joint(a).type != joint(b).type) return;
+    ArrangementMove& joints = add(Mistake::swapped_joints, a);
+    joints.other = b;
+    std::swap(joints.result.torque_from[i], joints.result.torque_from[k]);
+    std::swap(joints.result.motion_from[i], joints.result.motion_from[k]);
+  }
+
+  void signs_and_gains(Index j) {
+    add(Mistake::mirrored_torque, j).result.torque_gain[j] *= -1;
+    add(Mistake::mirrored_motion, j).result.motion_gain[j] *= -1;
+    ArrangementMove& both = add(Mistake::mirrored_joint, j);
+    both.result.torque_gain[j] *= -1;
+    both.result.motion_gain[j] *= -1;
+    for (const double gain : {1e-3, 1e-2, 0.1, 0.2, 0.35, 0.5, 0.7, 0.85, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 1e2, 1e3}) {
+      ArrangementMove& move = add(Mistake::torque_gain, j);
+      move.value = gain;
+      move.result.torque_gain[j] *= gain;
+    }
+  }
+
+  void zeros(Index j) {
+    if (joint(j).type != JointType::revolute) return;
+    constexpr int steps = 12;
+    for (int i = 1; i < steps; ++i) {
+      ArrangementMove& move = add(Mistake::zero, j);
+      move.value = std::remainder(2 * pi * i / steps, 2 * pi);
+      move.result.motion_offset[j] += move.value;
+    }
+  }
+
+  void axes(Index j) {
+    const Vector3d given = now_.axis[static_cast<std::size_t>(j)];
+    for (int i = 0; i < 3; ++i) {
+      for (const double sign : {1.0, -1.0}) {
+        const Vector3d axis = sign * Vector3d::Unit(i);
+        if (std::fabs(axis.dot(given)) > 0.9) continue;
+        ArrangementMove& move = add(Mistake::axis, j);
+        move.direction = axis;
+        move.result.axis[static_cast<std::size_t>(j)] = axis;
+      }
+    }
+  }
+
+  void units(Index j) {
+    const std::vector<double> factors = joint(j).type == JointType::revolute
+                                            ? std::vector<double>{pi / 180, 180 / pi, 2 * pi, 1 / (2 * pi)}
+                                            : std::vector<double>{1e-3, 1e3};
+    for (const double factor : factors) {
+      ArrangementMove& move = add(Mistake::position_unit, j);
+      move.value = factor;
+      move.result.motion_gain[j] *= factor;
+    }
+  }
+
+  void directions_of_gravity() {
+    if (now_.gravity.norm() == 0) return;
+    for (int x = -1; x <= 1; ++x) {
+      for (int y = -1; y <= 1; ++y) {
+        for (int z = -1; z <= 1; ++z) {
+          if (x == 0 && y == 0 && z == 0) continue;
+          const Vector3d direction = Vector3d(x, y, z).normalized();
+          if (direction.dot(now_.gravity.normalized()) > 0.99) continue;
+          ArrangementMove& move = add(Mistake::gravity, 0);
+          move.direction = direction * now_.gravity.norm();
+          move.result.gravity = move.direction;
+        }
+      }
+    }
+  }
+
+  const ArrangementEvidence& evidence_;
+  const Arrangement& now_;
+};
+
+struct Scored {
+  ArrangementMove move;
+  ArrangementScore score;
+};
+
+std::vector<Scored> score_all(const ArrangementEvidence& evidence, const Arrangement& now,
+                              std::vector<ArrangementMove> moves) {
+  const ArrangementEvidence::Design as_now = evidence.design(now);
+  std::vector<Scored> out(moves.size());
+  parallel_for(moves.size(), [&](std::size_t i) {
+    out[i].score = changes_motion(moves[i].mistake) ? evidence(moves[i].result)
+                                                    : evidence.score(as_now, moves[i].result);
+    out[i].move = std::move(moves[i]);
+  });
+  std::sort(out.begin(), out.end(), [](const Scored& a, const Scored& b) { return a.score.nats < b.score.nats; });
+  return out;
+}
+
+/// Halves the steps of a continuous change around where the grid found it best.
+void refine(const ArrangementEvidence& evidence, const Arrangement& now, Scored& best) {
+  std::vector<VectorXd> directions;
+  double step = 0;
+  const Mistake mistake = best.move.mistake;
+  if (mistake == Mistake::zero) {
+    step = pi / 12;
+  } else if (mistake == Mistake::torque_gain) {
+    step = 0.2;  // of the logarithm
+  } else if (mistake == Mistake::gravity) {
+    step = pi / 8;
+  } else {
+    return;
+  }
+  const auto moved = [&](const ArrangementMove& from, double by, int axis) {
+    ArrangementMove move = from;
+    const Index j = move.joint;
+    if (mistake == Mistake::zero) {
+      move.value += by;
+      move.result.motion_offset[j] = now.motion_offset[j] + move.value;
+    } else if (mistake == Mistake::torque_gain) {
+      move.value *= std::exp(by);
+      move.result.torque_gain[j] = now.torque_gain[j] * move.value;
+    } else {
+      move.direction = Eigen::AngleAxisd(by, Vector3d::Unit(axis)) * move.direction;
+      move.result.gravity = move.direction;
+    }
+    return move;
+  };
+  const int axes = mistake == Mistake::gravity ? 3 : 1;
+  for (int round = 0; round < 6; ++round, step /= 2) {
+    for (int axis = 0; axis < axes; ++axis) {
+      for (const double by : {step, -step}) {
+        Scored next{moved(best.move, by, axis), {}};
+        next.score = evidence(next.move.result);
+        if (next.score.nats < best.score.nats) best = std::move(next);
+      }
+    }
+  }
+}
+
+bool is_small(const ArrangementMove& move, const Arrangement& now, const ArrangementOptions& options) {
+  switch (move.mistake) {
+    case Mistake::zero:
+      return std::fabs(std::remainder(move.value, 2 * pi)) < options.least_zero;
+    case Mistake::torque_gain:
+      return std::fabs(std::log(move.value)) < std::log1p(options.least_gain);
+    case Mistake::gravity:
+      return std::acos(std::clamp(move.direction.normalized().dot(now.gravity.normalized()), -1.0, 1.0)) <
+             options.least_turn;
+    default:
+      return false;
+  }
+}
+
+bool same_thing(const ArrangementMove& a, const ArrangementMove& b) {
+  return a.mistake == b.mistake && a.joint == b.joint && a.other == b.other;
+}
+
+/// The best of each kind and joint, continuous ones refined where they may be the best.
+std::vector<Scored> best_of_each(const ArrangementEvidence& evidence, const Arrangement& now, double nats,
+                                 const ArrangementOptions& options) {
+  std::vector<Scored> best;
+  for (Scored& one : score_all(evidence, now, Moves(evidence, now).all)) {
+    const bool known = std::any_of(best.begin(), best.end(), [&](const Scored& b) { return same_thing(b.move, one.move); });
+    if (!known) best.push_back(std::move(one));
+  }
+  // A grid point beside a sharp minimum may be no better than nothing.
+  parallel_for(best.size(), [&](std::size_t i) {
+    if (best[i].score.nats < nats + options.gain) refine(evidence, now, best[i]);
+  });
+  std::sort(best.begin(), best.end(), [](const Scored& a, const Scored& b) { return a.score.nats < b.score.nats; });
+  return best;
+}
+
+}  // namespace
+
+std::vector<ArrangementFinding> find_mistakes(const ArrangementEvidence& evidence, const ArrangementOptions& options) {
+  std::vector<ArrangementFinding> out;
+  if (!evidence.enough()) return out;
+  Arrangement now = as_given(evidence.robot());
+  ArrangementScore score = evidence(now);
+  for (int found = 0; found < options.most; ++found) {
+    std::vector<Scored> best = best_of_each(evidence, now, score.nats, options);
+    if (best.empty() || best.front().score.nats > score.nats - options.gain) break;
+    ArrangementFinding finding;
+    finding.nats = score.nats - best.front().score.nats;
+    (best.front().score.rms.array() / score.rms.array()).minCoeff(&finding.felt);
+    finding.before = score.rms[finding.felt];
+    finding.after = best.front().score.rms[finding.felt];
+    for (std::size_t i = 1; i < best.size() && best[i].score.nats < best.front().score.nats + options.as_good; ++i)
+      finding.as_good.push_back(best[i].move);
+    const bool small = is_small(best.front().move, now, options);
+    now = best.front().move.result;
+    score = best.front().score;
+    finding.move = std::move(best.front().move);
+    if (!small) out.push_back(std::move(finding));
+  }
+  return out;
+}
+
+}  // namespace fxdyn

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host_tools/check/arrangement.hpp"
+
+namespace fxdyn {
+
+/// What may be wrong with the columns or the URDF.
+enum class Mistake {
+  swapped_joints,   ///< all columns of two joints
+  swapped_torques,  ///< their torques alone
+  mirrored_motion,  ///< q runs against the URDF's axis, the torque does not
+  mirrored_torque,  ///< the torque alone
+  mirrored_joint,   ///< both
+  zero,             ///< q has another zero
+  axis,             ///< the URDF's axis
+  gravity,          ///< its direction
+  torque_gain,
+  position_unit
+};
+std::string to_string(Mistake mistake);
+
+/// A change of one thing that explains the torques better.
+struct ArrangementMove {
+  Mistake mistake{};
+  Eigen::Index joint = 0, other = 0;  ///< `other` of the swaps
+  double value = 0;                   ///< offset [rad | m], gain, unit
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< axis, gravity
+  Arrangement result;                                   ///< with all moves before it
+};
+
+struct ArrangementFinding {
+  ArrangementMove move;
+  double nats = 0;                       ///< gained
+  Eigen::Index felt = 0;                 ///< the joint whose error falls most
+  double before = 0, after = 0;          ///< RMS error of that joint [N*m | N]
+  std::vector<ArrangementMove> as_good;  ///< other explanations that the data can't exclude
+};
+
+/// The changes that explain the torques better than what the project says, each beside those before it, one by one
+/// while that gains `options.gain`. Empty where nothing is wrong, or where there are too few samples.
+std::vector<ArrangementFinding> find_mistakes(const ArrangementEvidence& evidence, const ArrangementOptions& options);
+
+}  // namespace fxdyn

@@ -1,0 +1,170 @@
+#include "host_tools/check/column_words.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace fxdyn {
+
+using Eigen::Index;
+
+namespace {
+
+class MoveWords {
+ public:
+  explicit MoveWords(const Project& project) : project_(project) {
+    for (const LogEntry& entry : project.logs) {
+      if (entry.role == Role::train) format_ = &entry.format;
+    }
+  }
+
+  std::string what(const ArrangementMove& move) const {
+    const Index j = move.joint;
+    switch (move.mistake) {
+      case Mistake::swapped_joints:
+        return fmt::format("the columns of {} and {} look swapped", joint(j), joint(move.other));
+      case Mistake::swapped_torques:
+        return fmt::format("torques of {} and {} look swapped", joint(j), joint(move.other));
+      case Mistake::mirrored_motion:
+        return fmt::format("q of {} runs against the URDF's axis, its torque does not", joint(j));
+      case Mistake::mirrored_torque:
+        return fmt::format("torque of {} has the wrong sign", joint(j));
+      case Mistake::mirrored_joint:
+        return fmt::format("{} looks mirrored: q and torque run against the URDF's axis", joint(j));
+      case Mistake::zero:
+        return fmt::format("the zero of {} is off: its q lacks about {:+.0f} degrees", joint(j),
+                           180 / std::numbers::pi * std::remainder(move.value, 2 * std::numbers::pi));
+      case Mistake::axis:
+        return fmt::format("{} turns about another axis than the URDF's: {} in its frame", joint(j),
+                           vector(move.direction, 0));
+      case Mistake::gravity:
+        return fmt::format("gravity points along {} in the base frame, not along {}", vector(move.direction, 1),
+                           vector(project_.robot.gravity, 1));
+      case Mistake::torque_gain:
+        return fmt::format("torque of {} is about {:.2g} times too {} beside the others' and the URDF's masses", joint(j),
+                           move.value < 1 ? 1 / move.value : move.value, move.value < 1 ? "large" : "small");
+      case Mistake::position_unit:
+        return unit(move);
+    }
+    return "";
+  }
+
+  std::string fix(const ArrangementMove& move) const {
+    const Arrangement& now = move.result;
+    switch (move.mistake) {
+      case Mistake::swapped_joints:
+        return fmt::format("[signals] columns = {{ q = {}, tau = {} }}", columns("q", now.motion_from),
+                           columns("tau", now.torque_from));
+      case Mistake::swapped_torques:
+        return fmt::format("[signals] columns = {{ tau = {} }}", columns("tau", now.torque_from));
+      case Mistake::mirrored_motion:
+      case Mistake::position_unit:
+        return "[signals] " + position_gain(now);
+      case Mistake::mirrored_torque:
+      case Mistake::torque_gain:
+        return "[signals] " + torque_gain(now);
+      case Mistake::mirrored_joint:
+        return fmt::format("[signals] {}, {}", position_gain(now), torque_gain(now));
+      case Mistake::zero:
+        return fmt::format("[signals] position_offset = [{}]", offsets(now));
+      case Mistake::axis:
+        return fmt::format("in the URDF, joint '{}': <axis xyz=\"{} {} {}\"/>",
+                           project_.robot.joints[static_cast<std::size_t>(move.joint)].name, move.direction.x(),
+                           move.direction.y(), move.direction.z());
+      case Mistake::gravity:
+        return fmt::format("[robot] gravity = {}", vector(move.direction, 2));
+    }
+    return "";
+  }
+
+  std::string joint(Index j) const {
+    return fmt::format("joint {} ({})", j + 1, project_.robot.joints[static_cast<std::size_t>(j)].name);
+  }
+  const char* torque_unit(Index j) const { return project_.robot.joints[static_cast<std::size_t>(j)].torque_unit(); }
+
+ private:
+  static std::string vector(const Eigen::Vector3d& v, int digits) {
+    // No "-0".
+    const double unit = std::pow(10, -digits);
+    const auto rounded = [&](double x) { return std::round(x / unit) * unit + 0.0; };
+    return fmt::format("[{:.{}f}, {:.{}f}, {:.{}f}]", rounded(v.x()), digits, rounded(v.y()), digits, rounded(v.z()),
+                       digits);
+  }
+
+  std::string unit(const ArrangementMove& move) const {
+    const bool turns = project_.robot.joints[static_cast<std::size_t>(move.joint)].type == JointType::revolute;
+    return fmt::format("q of {} is not in {}: it looks {:.3g} times too {}", joint(move.joint), turns ? "rad" : "m",
+                       move.value < 1 ? 1 / move.value : move.value, move.value < 1 ? "large" : "small");
+  }
+
+  /// The file's columns in another order, as a list.
+  std::string columns(const std::string& signal, const std::vector<Index>& from) const {
+    std::vector<std::string> names;
+    for (const Index j : from) {
+      const auto at = static_cast<std::size_t>(j);
+      std::string name = fmt::format("{}{}", signal, j + 1);
+      if (format_ != nullptr) {
+        if (const auto given = format_->joint_columns.find(signal); given != format_->joint_columns.end()) {
+          name = given->second[at];
+        } else if (const auto prefix = format_->columns.find(signal); prefix != format_->columns.end()) {
+          name = fmt::format("{}{}", prefix->second, j + 1);
+        }
+      }
+      names.push_back(name.starts_with('#') ? name.substr(1) : '"' + name + '"');
+    }
+    return fmt::format("[{}]", fmt::join(names, ", "));
+  }
+
+  /// What the project has, times what was found.
+  static std::string product(const std::vector<double>* given, const Eigen::VectorXd& found) {
+    std::vector<std::string> out;
+    for (Index j = 0; j < found.size(); ++j) {
+      const double before = given == nullptr || given->empty() ? 1 : (*given)[static_cast<std::size_t>(j)];
+      out.push_back(fmt::format("{:.3g}", before * found[j]));
+    }
+    return fmt::format("[{}]", fmt::join(out, ", "));
+  }
+  std::string position_gain(const Arrangement& now) const {
+    return "position_gain = " + product(format_ ? &format_->position_gain : nullptr, now.motion_gain);
+  }
+  std::string torque_gain(const Arrangement& now) const {
+    return "torque_gain = " + product(format_ ? &format_->torque_gain : nullptr, now.torque_gain);
+  }
+  std::string offsets(const Arrangement& now) const {
+    std::vector<std::string> out;
+    for (Index j = 0; j < now.motion_offset.size(); ++j) {
+      const bool given = format_ != nullptr && !format_->position_offset.empty();
+      const double before = given ? format_->position_offset[static_cast<std::size_t>(j)] : 0;
+      out.push_back(fmt::format("{:.4g}", std::remainder(before + now.motion_offset[j], 2 * std::numbers::pi)));
+    }
+    return fmt::format("{}", fmt::join(out, ", "));
+  }
+
+  const Project& project_;
+  const LogFormat* format_ = nullptr;
+};
+
+/// A gain of other units; a smaller one may be masses that the URDF has wrong.
+bool is_sure(const ArrangementMove& move) {
+  return move.mistake != Mistake::torque_gain || move.value > 3 || move.value < 1.0 / 3;
+}
+
+}  // namespace
+
+CheckFinding in_words(const ArrangementFinding& finding, const Project& project) {
+  const MoveWords words(project);
+  CheckFinding out;
+  out.error = is_sure(finding.move);
+  out.kind = to_string(finding.move.mistake);
+  if (finding.move.mistake != Mistake::gravity) out.joint = static_cast<std::size_t>(finding.move.joint);
+  out.text = fmt::format("{}: with that the torque error of {} falls from {:.3g} to {:.3g} {} (odds 10^{:.0f})",
+                         words.what(finding.move), words.joint(finding.felt), finding.before, finding.after,
+                         words.torque_unit(finding.felt), finding.nats / std::numbers::ln10);
+  for (const ArrangementMove& other : finding.as_good) out.text += fmt::format("; or {}", words.what(other));
+  out.fix = words.fix(finding.move);
+  return out;
+}
+
+}  // namespace fxdyn

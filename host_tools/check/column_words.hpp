@@ -1,0 +1,12 @@
+#pragma once
+
+#include "host_tools/check/arrangement_search.hpp"
+#include "host_tools/check/check.hpp"
+#include "host_tools/project/project.hpp"
+
+namespace fxdyn {
+
+/// A mistake of columns or URDF for people: what, how much the torque error falls, and the line to write.
+CheckFinding in_words(const ArrangementFinding& finding, const Project& project);
+
+}  // namespace fxdyn

@@ -1,0 +1,128 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "host_tools/check/check.hpp"
+
+namespace fxdyn {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+namespace {
+
+/// Speeds over a window of at least 20 ms: single steps of a coarse encoder are no motion.
+Eigen::MatrixXd coarse_speed(const Log& log, Index& window) {
+  window = std::clamp<Index>(static_cast<Index>(std::ceil(0.02 / log.step_s)), 1, std::max<Index>(1, log.samples() / 4));
+  const Index rows = log.samples() - window;
+  return (log.q.bottomRows(rows) - log.q.topRows(rows)) / (static_cast<double>(window) * log.step_s);
+}
+
+std::string of_joint(const Robot& robot, Index j) {
+  return fmt::format("joint {} ({})", j + 1, robot.joints[static_cast<std::size_t>(j)].name);
+}
+
+void add_rest(const LogFacts& log, const LogFactOptions& options, double begin, double end,
+              std::vector<CheckFinding>& out) {
+  const bool front = log.rest_until_s - begin > options.rest, back = end - log.rest_from_s > options.rest;
+  if (!front && !back) return;
+  std::string text, fix;
+  if (front) {
+    text = fmt::format("at rest from {:.6g} to {:.6g} s", begin, log.rest_until_s);
+    fix = fmt::format("from_s = {:.6g}", log.rest_until_s);
+  }
+  if (back) {
+    text += fmt::format("{}at rest from {:.6g} to {:.6g} s", front ? ", " : "", log.rest_from_s, end);
+    fix += fmt::format("{}to_s = {:.6g}", front ? ", " : "", log.rest_from_s);
+  }
+  text += ": stiction holds any torque there, and the fit takes it for friction";
+  out.push_back({false, "rest", {}, log.name, text, fix});
+}
+
+}  // namespace
+
+LogFacts facts_of(const Log& log, const LogFactOptions& options) {
+  LogFacts facts;
+  facts.name = log.file.filename().string();
+  facts.role = log.role;
+  facts.seconds = static_cast<double>(log.samples()) * log.step_s;
+  facts.rate_hz = 1 / log.step_s;
+  facts.resampled = log.resampled;
+  facts.q_lower = log.q.colwise().minCoeff().transpose();
+  facts.q_upper = log.q.colwise().maxCoeff().transpose();
+  Index window = 1;
+  const Eigen::MatrixXd speed = coarse_speed(log, window).cwiseAbs();
+  facts.speed = speed.colwise().maxCoeff().transpose();
+  facts.largest_torque =
+      log.tau.size() > 0 ? VectorXd(log.tau.cwiseAbs().colwise().maxCoeff().transpose()) : VectorXd::Zero(log.joints());
+  facts.encoder_step.resize(log.joints());
+  for (Index j = 0; j < log.joints(); ++j)
+    facts.encoder_step[j] = log.encoder_step.size() > 0 ? log.encoder_step[j] : encoder_step(log.q.col(j));
+
+  // A joint rests where it moves by less than two steps of its encoder, or by next to nothing of its speed.
+  const double window_s = static_cast<double>(window) * log.step_s;
+  const VectorXd rest = (options.rest_speed * facts.speed).cwiseMax(2.01 / window_s * facts.encoder_step);
+  const auto resting = [&](Index k) { return (speed.row(k).transpose().array() <= rest.array()).all(); };
+  Index first = 0, last = speed.rows(), count = 0;
+  for (Index k = 0; k < speed.rows(); ++k) count += resting(k);
+  while (first < speed.rows() && resting(first)) ++first;
+  while (last > first && resting(last - 1)) --last;
+  facts.rest_share = static_cast<double>(count) / static_cast<double>(std::max<Index>(1, speed.rows()));
+  const bool moves = first < last;
+  facts.rest_until_s = moves ? log.t[first] : log.t[0];
+  facts.rest_from_s = moves ? log.t[std::min(last - 1 + window, log.samples() - 1)] : log.t[log.samples() - 1];
+  facts.begin_s = log.t[0];
+  facts.end_s = log.t[log.samples() - 1];
+  return facts;
+}
+
+std::vector<CheckFinding> findings_of(const std::vector<LogFacts>& logs, const Robot& robot,
+                                      const LogFactOptions& options) {
+  std::vector<CheckFinding> out;
+  const auto n = static_cast<Index>(robot.size());
+  VectorXd lower = VectorXd::Constant(n, 1e300), upper = -lower, speed = VectorXd::Zero(n);
+  for (const LogFacts& log : logs) {
+    add_rest(log, options, log.begin_s, log.end_s, out);
+    lower = lower.cwiseMin(log.q_lower);
+    upper = upper.cwiseMax(log.q_upper);
+    speed = speed.cwiseMax(log.speed);
+  }
+  for (Index j = 0; j < n; ++j) {
+    const Joint& joint = robot.joints[static_cast<std::size_t>(j)];
+    const auto at = static_cast<std::size_t>(j);
+    const std::string unit = joint.position_unit();
+    if (!(upper[j] > lower[j])) {
+      out.push_back({false, "never_moves", at, "", fmt::format("{} never moves: nothing of it can be told", of_joint(robot, j)),
+                     ""});
+      continue;
+    }
+    if (!joint.limits || joint.continuous) continue;
+    const double range = joint.limits->upper - joint.limits->lower;
+    const double beyond = std::max(upper[j] - joint.limits->upper, joint.limits->lower - lower[j]);
+    if (range > 0 && beyond > options.beyond * range) {
+      out.push_back({false, "beyond_limits", at, "",
+                     fmt::format("{} goes from {:.4g} to {:.4g} {}, up to {:.3g} beyond the URDF's limits {:.4g} to {:.4g}: "
+                                 "its zero, sign or unit, or another joint's column?",
+                                 of_joint(robot, j), lower[j], upper[j], unit, beyond, joint.limits->lower,
+                                 joint.limits->upper),
+                     ""});
+    } else if (range > 0 && upper[j] - lower[j] < options.least_range * range && range < options.widest) {
+      out.push_back({false, "little_range", at, "",
+                     fmt::format("{} covers {:.2g} {} of the {:.3g} that the URDF allows: what depends on its position "
+                                 "can't be told",
+                                 of_joint(robot, j), upper[j] - lower[j], unit, range),
+                     ""});
+    }
+    if (joint.limits->velocity > 0 && speed[j] > options.too_fast * joint.limits->velocity) {
+      out.push_back({false, "too_fast", at, "",
+                     fmt::format("{} reaches {:.3g} {}/s, {:.2g} times the URDF's limit: the unit of q or t, or q on the "
+                                 "motor's side of the gearbox?",
+                                 of_joint(robot, j), speed[j], unit, speed[j] / joint.limits->velocity),
+                     ""});
+    }
+  }
+  return out;
+}
+
+}  // namespace fxdyn

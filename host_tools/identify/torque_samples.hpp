@@ -1,0 +1,21 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <vector>
+
+#include "host_tools/regression/dataset.hpp"
+
+namespace fxdyn {
+
+/// Some hundred samples of the train logs, filtered, for fits that have to be quick: samples x joints.
+struct TorqueSamples {
+  Eigen::MatrixXd q, dq, ddq, tau;
+  double independent = 0;  ///< samples of noise below the torque's cut-off: 2 f T, over all train logs
+  Eigen::Index size() const { return tau.rows(); }
+};
+
+/// About `wanted` of them, spread over the motion. Not at even distances: those may keep step with a motion that repeats
+/// itself, and all samples would show one pose.
+TorqueSamples sample_torque(const std::vector<ProcessedLog>& logs, Eigen::Index wanted);
+
+}  // namespace fxdyn

@@ -1,0 +1,173 @@
+// How often `fxdyn check` finds a mistake in the columns or the URDF, on robots drawn at random whose URDF's masses are
+// off: docs/findings/check.md. Every robot is judged as it is, and with one mistake of each kind put in.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+#include "host_tools/check/arrangement_search.hpp"
+#include "host_tools/identify/gate_data.hpp"
+#include "host_tools/project/project.hpp"
+#include "host_tools/support/heap.hpp"
+#include "host_tools/support/parallel.hpp"
+#include "host_tools/support/random.hpp"
+#include "tests/campaign/generate.hpp"
+
+namespace {
+
+using namespace fxdyn;
+using Eigen::Index;
+namespace fs = std::filesystem;
+
+struct Planted {
+  std::string name;
+  Robot robot;
+  TorqueSamples samples;
+  Mistake mistake{};
+  Index joint = 0, other = 0;
+};
+
+/// Each mass with its inertia off by up to `share`.
+Robot with_masses_off(Robot robot, double share, Random& random) {
+  for (Joint& joint : robot.joints) {
+    const double factor = 1 + share * random.uniform(-1, 1);
+    if (!joint.inertial) continue;
+    joint.inertial->mass *= factor;
+    joint.inertial->tensor *= factor;
+  }
+  return robot;
+}
+
+/// A turn of the base that horizontal axes show, by 30 degrees to half a turn.
+Eigen::Vector3d turned(const Eigen::Vector3d& gravity, Random& random) {
+  const Eigen::Vector3d any(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1));
+  const Eigen::Vector3d axis = gravity.cross(any).normalized();
+  return Eigen::AngleAxisd(random.uniform(std::numbers::pi / 6, std::numbers::pi), axis) * gravity;
+}
+
+std::vector<Planted> plant(const Robot& robot, const TorqueSamples& samples, Random& random) {
+  const auto n = static_cast<Index>(robot.size());
+  const auto any = [&] { return static_cast<Index>(random.next() % static_cast<std::uint64_t>(n)); };
+  std::vector<Planted> out;
+  const auto add = [&](std::string name, Mistake mistake, Index joint, Index other = -1) -> Planted& {
+    return out.emplace_back(Planted{std::move(name), robot, samples, mistake, joint, other});
+  };
+  const Index a = any();
+  const Index b = (a + 1 + static_cast<Index>(random.next() % static_cast<std::uint64_t>(n - 1))) % n;
+  if (n > 1 && robot.joints[static_cast<std::size_t>(a)].type == robot.joints[static_cast<std::size_t>(b)].type) {
+    Planted& joints = add("swapped joints", Mistake::swapped_joints, std::min(a, b), std::max(a, b));
+    for (Eigen::MatrixXd* m : {&joints.samples.q, &joints.samples.dq, &joints.samples.ddq, &joints.samples.tau})
+      m->col(a).swap(m->col(b));
+    Planted& torques = add("swapped torques", Mistake::swapped_torques, std::min(a, b), std::max(a, b));
+    torques.samples.tau.col(a).swap(torques.samples.tau.col(b));
+  }
+  const Index c = any();
+  Planted& mirrored = add("mirrored joint", Mistake::mirrored_joint, c);
+  Planted& motion = add("mirrored motion", Mistake::mirrored_motion, c);
+  for (Planted* one : {&mirrored, &motion})
+    for (Eigen::MatrixXd* m : {&one->samples.q, &one->samples.dq, &one->samples.ddq}) m->col(c) *= -1;
+  mirrored.samples.tau.col(c) *= -1;
+  add("mirrored torque", Mistake::mirrored_torque, c).samples.tau.col(c) *= -1;
+  const Index d = any();
+  if (robot.joints[static_cast<std::size_t>(d)].type == JointType::revolute) {
+    const double by = random.uniform(20, 180) * std::numbers::pi / 180 * (random.next() % 2 == 0 ? 1 : -1);
+    add("zero", Mistake::zero, d).samples.q.col(d).array() += by;
+  }
+  const Index e = any();
+  const double gain = random.uniform(1.3, 2) * 1.0;
+  add("gain", Mistake::torque_gain, e).samples.tau.col(e) *= random.next() % 2 == 0 ? gain : 1 / gain;
+  Planted& gravity = add("gravity", Mistake::gravity, 0);
+  gravity.robot.gravity = turned(robot.gravity, random);
+  const Index f = any();
+  Joint& joint = add("axis", Mistake::axis, f).robot.joints[static_cast<std::size_t>(f)];
+  joint.axis = Eigen::Vector3d(joint.axis.y(), joint.axis.z(), joint.axis.x());
+  const Index g = any();
+  const bool turns = robot.joints[static_cast<std::size_t>(g)].type == JointType::revolute;
+  Planted& units = add(turns ? "degrees" : "mm", Mistake::position_unit, g);
+  for (Eigen::MatrixXd* m : {&units.samples.q, &units.samples.dq, &units.samples.ddq})
+    m->col(g) *= turns ? 180 / std::numbers::pi : 1e3;
+  return out;
+}
+
+struct Count {
+  int told = 0, right = 0, found = 0, all = 0;
+};
+
+bool is_right(const ArrangementMove& move, const Planted& planted) {
+  return move.mistake == planted.mistake && (planted.mistake == Mistake::gravity || move.joint == planted.joint) &&
+         (planted.other < 0 || move.other == planted.other);
+}
+
+std::string words(const ArrangementMove& move) {
+  return fmt::format("{} {} {:.3g}", to_string(move.mistake), move.joint + 1, move.value);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  fxdyn::keep_freed_memory();
+  CLI::App app{"Mistakes in columns, signs, zeros, axes, gravity and gains: how many are found, and how many sound robots "
+               "are warned."};
+  std::uint64_t seed = 1000;
+  std::size_t robots = 60;
+  fs::path folder = "build/check_study";
+  double share = 0.3;
+  ArrangementOptions options;
+  app.add_option("--seed", seed, "first")->capture_default_str();
+  app.add_option("--robots", robots)->capture_default_str();
+  app.add_option("--out", folder)->capture_default_str();
+  app.add_option("--masses", share, "off by up to this share")->capture_default_str();
+  app.add_option("--gain", options.gain)->capture_default_str();
+  app.add_option("--independent", options.independent)->capture_default_str();
+  app.add_option("--mass-error", options.mass_errors[0])->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+
+  std::map<std::string, Count> counts;
+  for (campaign::Case wanted : campaign::drawn_cases(seed, robots)) {
+    const fs::path data = folder / wanted.name / "data";
+    wanted.baseline = wanted.validate = false;
+    try {
+      if (!fs::exists(data / "project.toml")) campaign::generate(wanted, data, folder / wanted.name / "truth");
+    } catch (const campaign::NotPossible&) {
+      continue;
+    }
+    const Project project = read_project(data / "project.toml");
+    const GateData gate = read_gate_data(project, data);
+    const TorqueSamples samples = sample_torque(gate.logs, options.samples);
+    Random random(wanted.seed * 7919 + 3);
+    const Robot robot = with_masses_off(project.robot, share, random);
+    std::vector<Planted> cases = plant(robot, samples, random);
+    cases.push_back({"sound", robot, samples});
+    for (const Planted& one : cases) {
+      const ArrangementEvidence evidence(one.robot, one.samples, options);
+      const auto findings = find_mistakes(evidence, options);
+      Count& count = counts[one.name];
+      ++count.all;
+      count.found += !findings.empty();
+      const bool first = !findings.empty() && is_right(findings.front().move, one);
+      bool among = first;
+      for (const auto& finding : findings) {
+        among = among || is_right(finding.move, one);
+        for (const auto& move : finding.as_good) among = among || is_right(move, one);
+      }
+      count.right += first;
+      count.told += among;
+      if (first || (one.name == "sound" && findings.empty())) continue;
+      fmt::print("{} {} joint {}:", wanted.name, one.name, one.joint + 1);
+      for (const auto& finding : findings) {
+        fmt::print(" [{:.0f} nats {}, {:.3g} -> {:.3g}", finding.nats, words(finding.move), finding.before, finding.after);
+        for (const auto& move : finding.as_good) fmt::print(" | {}", words(move));
+        fmt::print("]");
+      }
+      fmt::print("\n");
+      std::fflush(stdout);
+    }
+  }
+  fmt::print("{:<18}{:>8}{:>8}{:>8}{:>8}\n", "", "cases", "found", "first", "among");
+  for (const auto& [name, count] : counts)
+    fmt::print("{:<18}{:>8}{:>8.3f}{:>8.3f}{:>8.3f}\n", name, count.all, static_cast<double>(count.found) / count.all,
+               static_cast<double>(count.right) / count.all, static_cast<double>(count.told) / count.all);
+}
