@@ -20,6 +20,19 @@ namespace {
 constexpr auto ten = static_cast<Index>(parameters_per_link);
 Index own_columns() { return static_cast<Index>(nominal_effects().size()); }
 
+Index own_column(std::string_view effect) {
+  const std::vector<std::string>& all = nominal_effects();
+  return std::find(all.begin(), all.end(), effect) - all.begin();
+}
+Index viscous_column() { return own_column(viscous_friction_effect().name); }
+Index coulomb_column() { return own_column(dry_friction_effect().name); }
+
+/// Sum of dq times the friction of a joint's own columns; x: bodies, then those.
+double friction_power(const MatrixXd& gram, const VectorXd& x) {
+  const Index bodies = x.size() - own_columns(), dq = bodies + viscous_column(), sign = bodies + coulomb_column();
+  return x[dq] * gram(dq, dq) + x[sign] * gram(sign, dq);
+}
+
 /// The URDF's body of a link, or a sphere of the mass that the torques ask for.
 LinkInertia<Real> body_of(const Joint& joint, const Eigen::Isometry3d& pose, double mass, double radius) {
   if (joint.inertial) return to_link_inertia(possible_body(*joint.inertial), pose);
@@ -150,8 +163,9 @@ ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangem
 
   ArrangementScore out;
   VectorXd solution;
+  std::vector<bool> drives(robot_.size(), false);
   double log_determinant = 0;
-  for (int round = 0; round < 5; ++round) {
+  for (int round = 0; round < 6; ++round) {
     MatrixXd information = prior;
     VectorXd projection = prior * mean;
     for (Index j = 0; j < n; ++j) {
@@ -180,6 +194,10 @@ ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangem
                                         2 * gain[j] * x.dot(design.projection[joint].col(from[joint]))) /
                                            rows;
       variance[j] = std::max(square, options_.perfect * options_.perfect * whole[j]);
+      if (drives[joint] || !(friction_power(design.gram[joint], x) < 0)) continue;
+      // Friction brakes: from here on there is none, and what it would have explained is left.
+      drives[joint] = true;
+      for (const Index i : {viscous_column(), coulomb_column()}) prior(bodies + own * j + i, bodies + own * j + i) *= 1e8;
     }
   }
   out.rms = variance.cwiseSqrt();

@@ -92,7 +92,7 @@ std::vector<Planted> plant(const Robot& robot, const TorqueSamples& samples, Ran
   return out;
 }
 
-struct Count {
+struct Tally {
   int told = 0, right = 0, found = 0, all = 0;
 };
 
@@ -125,7 +125,7 @@ int main(int argc, char** argv) {
   app.add_option("--mass-error", options.mass_errors[0])->capture_default_str();
   CLI11_PARSE(app, argc, argv);
 
-  std::map<std::string, Count> counts;
+  std::map<std::string, Tally> counts;
   for (campaign::Case wanted : campaign::drawn_cases(seed, robots)) {
     const fs::path data = folder / wanted.name / "data";
     wanted.baseline = wanted.validate = false;
@@ -144,7 +144,7 @@ int main(int argc, char** argv) {
     for (const Planted& one : cases) {
       const ArrangementEvidence evidence(one.robot, one.samples, options);
       const auto findings = find_mistakes(evidence, options);
-      Count& count = counts[one.name];
+      Tally& count = counts[one.name];
       ++count.all;
       count.found += !findings.empty();
       const bool first = !findings.empty() && is_right(findings.front().move, one);
