@@ -25,6 +25,7 @@ Index own_column(std::string_view effect) {
   return std::find(all.begin(), all.end(), effect) - all.begin();
 }
 Index viscous_column() { return own_column(viscous_friction_effect().name); }
+Index rotor_column() { return own_column(rotor_effect().name); }
 Index coulomb_column() { return own_column(dry_friction_effect().name); }
 
 /// Sum of dq times the friction of a joint's own columns; x: bodies, then those.
@@ -163,7 +164,7 @@ ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangem
 
   ArrangementScore out;
   VectorXd solution;
-  std::vector<bool> drives(robot_.size(), false);
+  std::vector<bool> drives(robot_.size(), false), flies(robot_.size(), false);
   double log_determinant = 0;
   for (int round = 0; round < 6; ++round) {
     MatrixXd information = prior;
@@ -194,10 +195,17 @@ ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangem
                                         2 * gain[j] * x.dot(design.projection[joint].col(from[joint]))) /
                                            rows;
       variance[j] = std::max(square, options_.perfect * options_.perfect * whole[j]);
-      if (drives[joint] || !(friction_power(design.gram[joint], x) < 0)) continue;
-      // Friction brakes: from here on there is none, and what it would have explained is left.
-      drives[joint] = true;
-      for (const Index i : {viscous_column(), coulomb_column()}) prior(bodies + own * j + i, bodies + own * j + i) *= 1e8;
+      // Friction brakes and a rotor is heavy: else there is none from here on, and what it would explain is left.
+      const auto take_out = [&](Index i) { prior(bodies + own * j + i, bodies + own * j + i) *= 1e8; };
+      if (!drives[joint] && friction_power(design.gram[joint], x) < 0) {
+        drives[joint] = true;
+        take_out(viscous_column());
+        take_out(coulomb_column());
+      }
+      if (!flies[joint] && x[bodies + rotor_column()] < 0) {
+        flies[joint] = true;
+        take_out(rotor_column());
+      }
     }
   }
   out.rms = variance.cwiseSqrt();

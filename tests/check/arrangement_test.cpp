@@ -1,0 +1,166 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <kdl/chainidsolver_recursive_newton_euler.hpp>
+#include <numbers>
+
+#include "host_tools/check/arrangement_search.hpp"
+#include "host_tools/support/random.hpp"
+#include "tests/support/chains.hpp"
+#include "tests/support/kdl.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+constexpr double degree = std::numbers::pi / 180;
+
+/// Samples of a robot with KDL's inverse dynamics and a friction of another form than the check's, noise of 1 %. The
+/// URDF that the check gets has masses that are up to 30 % off.
+struct Recorded {
+  Robot robot = read_urdf(test::puma560);
+  TorqueSamples samples;
+
+  Recorded() {
+    const KDL::Chain chain = test::to_kdl(robot);
+    const Eigen::Vector3d g = robot.gravity;
+    KDL::ChainIdSolver_RNE solver(chain, KDL::Vector(g.x(), g.y(), g.z()));
+    constexpr Index rows = 300;
+    const auto n = static_cast<Index>(robot.size());
+    Random random(5);
+    for (Eigen::MatrixXd* columns : {&samples.q, &samples.dq, &samples.ddq, &samples.tau}) columns->resize(rows, n);
+    for (Index k = 0; k < rows; ++k) {
+      KDL::JntArray q(robot.size()), dq(robot.size()), ddq(robot.size()), tau(robot.size());
+      for (unsigned j = 0; j < robot.size(); ++j) {
+        q(j) = random.uniform(-2, 2);
+        dq(j) = random.uniform(-1.5, 1.5);
+        ddq(j) = random.uniform(-5, 5);
+      }
+      solver.CartToJnt(q, dq, ddq, KDL::Wrenches(chain.getNrOfSegments()), tau);
+      for (unsigned j = 0; j < robot.size(); ++j) {
+        const double scale = j < 3 ? 4 : 0.3;
+        const double friction = scale * std::copysign(std::sqrt(std::fabs(dq(j))), dq(j)) + 0.5 * scale * dq(j);
+        samples.q(k, j) = q(j);
+        samples.dq(k, j) = dq(j);
+        samples.ddq(k, j) = ddq(j);
+        samples.tau(k, j) = (tau(j) + friction) * (1 + 0.01 * random.normal());
+      }
+    }
+    samples.independent = rows;
+    for (std::size_t i = 0; i < robot.size(); ++i) {
+      robot.joints[i].inertial->mass *= i % 2 == 0 ? 1.3 : 0.7;
+      robot.joints[i].inertial->tensor *= i % 2 == 0 ? 1.3 : 0.7;
+    }
+  }
+
+  std::vector<ArrangementFinding> check() const {
+    const ArrangementOptions options;
+    return find_mistakes(ArrangementEvidence(robot, samples, options), options);
+  }
+  void scale_motion(Index joint, double by) {
+    for (Eigen::MatrixXd* columns : {&samples.q, &samples.dq, &samples.ddq}) columns->col(joint) *= by;
+  }
+};
+
+void expect_alone(const std::vector<ArrangementFinding>& found, Mistake mistake, Index joint) {
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(to_string(found[0].move.mistake), to_string(mistake));
+  EXPECT_EQ(found[0].move.joint, joint);
+  EXPECT_LT(found[0].after, 0.7 * found[0].before);
+}
+
+TEST(Arrangement, OfASoundRobotIsLeftAlone) { EXPECT_TRUE(Recorded().check().empty()); }
+
+TEST(Arrangement, SwappedJointsAreFound) {
+  Recorded recorded;
+  for (Eigen::MatrixXd* columns :
+       {&recorded.samples.q, &recorded.samples.dq, &recorded.samples.ddq, &recorded.samples.tau})
+    columns->col(1).swap(columns->col(2));
+  const auto found = recorded.check();
+  expect_alone(found, Mistake::swapped_joints, 1);
+  EXPECT_EQ(found[0].move.other, 2);
+}
+
+TEST(Arrangement, SwappedTorquesAreFound) {
+  Recorded recorded;
+  recorded.samples.tau.col(0).swap(recorded.samples.tau.col(3));
+  const auto found = recorded.check();
+  expect_alone(found, Mistake::swapped_torques, 0);
+  EXPECT_EQ(found[0].move.other, 3);
+}
+
+TEST(Arrangement, MirrorsAreToldApart) {
+  for (const auto& [mistake, motion, torque] : {std::tuple{Mistake::mirrored_joint, -1, -1},
+                                                std::tuple{Mistake::mirrored_motion, -1, 1},
+                                                std::tuple{Mistake::mirrored_torque, 1, -1}}) {
+    Recorded recorded;
+    recorded.scale_motion(2, motion);
+    recorded.samples.tau.col(2) *= torque;
+    expect_alone(recorded.check(), mistake, 2);
+  }
+}
+
+TEST(Arrangement, AZeroThatIsOffIsMeasured) {
+  Recorded recorded;
+  recorded.samples.q.col(1).array() += 37 * degree;
+  const auto found = recorded.check();
+  expect_alone(found, Mistake::zero, 1);
+  EXPECT_NEAR(found[0].move.value, -37 * degree, 3 * degree);
+}
+
+TEST(Arrangement, GravityOfAWallIsFound) {
+  Recorded recorded;
+  recorded.robot.gravity = Eigen::Vector3d(9.81, 0, 0);  // the logs: along -z
+  const auto found = recorded.check();
+  expect_alone(found, Mistake::gravity, 0);
+  EXPECT_GT(found[0].move.direction.normalized().dot(-Eigen::Vector3d::UnitZ()), std::cos(5 * degree));
+}
+
+TEST(Arrangement, AnotherAxisIsFound) {
+  Recorded recorded;
+  recorded.robot.joints[1].axis = Eigen::Vector3d::UnitX();
+  const Robot sound = read_urdf(test::puma560);
+  const auto found = recorded.check();
+  expect_alone(found, Mistake::axis, 1);
+  EXPECT_GT(found[0].move.direction.dot(sound.joints[1].axis), 0.9);
+}
+
+TEST(Arrangement, GainsAndUnitsAreFound) {
+  Recorded recorded;
+  recorded.samples.tau.col(1) /= 2;
+  const auto found = recorded.check();
+  expect_alone(found, Mistake::torque_gain, 1);
+  EXPECT_NEAR(found[0].move.value, 2, 0.3);
+  Recorded degrees;
+  degrees.scale_motion(2, 1 / degree);
+  expect_alone(degrees.check(), Mistake::position_unit, 2);
+}
+
+// Two mistakes at once, as where a driver counts both from another end.
+TEST(Arrangement, OneMistakeAfterTheOther) {
+  Recorded recorded;
+  recorded.samples.tau.col(2) *= -1;
+  recorded.samples.q.col(1).array() += 90 * degree;
+  const auto found = recorded.check();
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_NE(found[0].move.mistake, found[1].move.mistake);
+}
+
+// A URDF made for drawing: the same body in each link. It proves nothing about the logs.
+TEST(Arrangement, PlaceholdersInTheUrdfAreNoMistakeOfTheLogs) {
+  Recorded recorded;
+  for (Joint& joint : recorded.robot.joints) {
+    joint.inertial->mass = 1;
+    joint.inertial->centre.setZero();
+    joint.inertial->tensor = Eigen::Matrix3d::Identity();
+  }
+  EXPECT_TRUE(recorded.check().empty());
+  for (Joint& joint : recorded.robot.joints) joint.inertial.reset();
+  EXPECT_TRUE(recorded.check().empty());
+  recorded.samples.tau.col(2) *= -1;
+  EXPECT_FALSE(recorded.check().empty());
+}
+
+}  // namespace
+}  // namespace fxdyn
