@@ -119,7 +119,7 @@ class Moves {
 
   void units(Index j) {
     const std::vector<double> factors = joint(j).type == JointType::revolute
-                                            ? std::vector<double>{pi / 180, 180 / pi, 2 * pi, 1 / (2 * pi)}
+                                            ? std::vector<double>{pi / 180}
                                             : std::vector<double>{1e-3, 1e3};
     for (const double factor : factors) {
       ArrangementMove& move = add(Mistake::position_unit, j);

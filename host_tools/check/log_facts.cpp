@@ -107,7 +107,7 @@ std::vector<CheckFinding> findings_of(const std::vector<LogFacts>& logs, const R
                                  of_joint(robot, j), lower[j], upper[j], unit, beyond, joint.limits->lower,
                                  joint.limits->upper),
                      ""});
-    } else if (range > 0 && upper[j] - lower[j] < options.least_range * range && range < options.widest) {
+    } else if (joint.type == JointType::revolute && range > 0 && upper[j] - lower[j] < options.least_range * range && range < options.widest) {
       out.push_back({false, "little_range", at, "",
                      fmt::format("{} covers {:.2g} {} of the {:.3g} that the URDF allows: what depends on its position "
                                  "can't be told",

@@ -6,6 +6,7 @@
 
 #include "host_tools/cli/verb.hpp"
 #include "host_tools/check/check.hpp"
+#include "host_tools/check/init.hpp"
 #include "host_tools/excite/excite.hpp"
 #include "host_tools/pipeline/forward_log.hpp"
 #include "host_tools/pipeline/one_log.hpp"
@@ -50,8 +51,23 @@ Action add_check(CLI::App& verb) {
     const CheckResult result =
         check(read_project(options->project), options->out.empty() ? temporary.path() : std::filesystem::path(options->out));
     fmt::print("{}", options->as_json ? to_json(result).dump(2) + "\n" : check_table(result));
+    std::fflush(stdout);
     if (result.has_error())
       throw DataError("these logs can't be what the project says: write the lines above, then check again");
+  };
+}
+
+Action add_init(CLI::App& verb) {
+  struct Options {
+    std::vector<std::string> logs;
+    std::string urdf;
+  };
+  const auto options = std::make_shared<Options>();
+  verb.add_option("LOG", options->logs, "logs (CSV) of the robot, with or without a line of names")->required();
+  verb.add_option("--urdf", options->urdf, "the robot's URDF")->required();
+  return [options] {
+    fmt::print("{}", init_project({options->logs.begin(), options->logs.end()}, options->urdf,
+                                  std::filesystem::current_path()));
   };
 }
 

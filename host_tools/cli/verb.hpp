@@ -35,6 +35,7 @@ Action add_efficiency(CLI::App& verb);
 Action add_vibration(CLI::App& verb);
 Action add_update(CLI::App& verb);
 Action add_replay(CLI::App& verb);
+Action add_init(CLI::App& verb);
 Action add_check(CLI::App& verb);
 Action add_excite(CLI::App& verb);
 Action add_simulate(CLI::App& verb);

@@ -6,6 +6,8 @@ namespace fxdyn::cli {
 
 std::span<const Verb> verbs() {
   static constexpr std::array all{
+      Verb{"init", "A commented project file for logs of a robot, to standard output.",
+           "run1.csv run2.csv --urdf robot.urdf > robot.toml", add_init},
       Verb{"check", "Look at the logs before any fit: columns, signs, zeros, units and rest against the URDF.",
            "robot.toml", add_check},
       Verb{"run", "diagnose, train, export and report in one go.", "robot.toml --out out/robot", add_run},

@@ -1,0 +1,238 @@
+#include "host_tools/check/column_guess.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "host_tools/signals/text_file.hpp"
+#include "host_tools/support/error.hpp"
+
+namespace fxdyn {
+namespace {
+
+std::vector<std::string> split(std::string_view line) {
+  std::vector<std::string> fields;
+  for (;;) {
+    const std::size_t comma = line.find(',');
+    fields.emplace_back(trim(line.substr(0, comma)));
+    if (comma == std::string_view::npos) return fields;
+    line.remove_prefix(comma + 1);
+  }
+}
+
+double number_of(const std::string& text) {
+  double value = 0;
+  const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && stop == text.data() + text.size() ? value : std::numeric_limits<double>::quiet_NaN();
+}
+
+/// Words and numbers of a name: "actual_q_0" -> actual q 0, "tauMeasured3" -> tau measured 3.
+std::vector<std::string> words_of(const std::string& name) {
+  std::vector<std::string> words;
+  char before = 0;
+  for (const char c : name) {
+    const bool digit = std::isdigit(static_cast<unsigned char>(c)) != 0;
+    const bool letter = std::isalpha(static_cast<unsigned char>(c)) != 0;
+    if (digit || letter) {
+      const bool was_digit = std::isdigit(static_cast<unsigned char>(before)) != 0;
+      const bool was_letter = std::isalpha(static_cast<unsigned char>(before)) != 0;
+      const bool hump = letter && std::isupper(static_cast<unsigned char>(c)) != 0 &&
+                        std::islower(static_cast<unsigned char>(before)) != 0;
+      if (digit ? !was_digit : (!was_letter || hump)) words.emplace_back();
+      words.back() += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    }
+    before = c;
+  }
+  return words;
+}
+
+enum Kind : std::size_t { time, position, velocity, acceleration, torque, current, kinds };
+
+bool is_one_of(const std::string& word, std::initializer_list<const char*> list) {
+  return std::any_of(list.begin(), list.end(), [&](const char* one) { return word == one; });
+}
+
+std::optional<Kind> kind_of(const std::vector<std::string>& words) {
+  const auto has = [&](std::initializer_list<const char*> list) {
+    return std::any_of(words.begin(), words.end(), [&](const std::string& word) { return is_one_of(word, list); });
+  };
+  if (has({"ddq", "qdd", "acc", "accel", "acceleration", "accelerations"})) return acceleration;
+  if (has({"dq", "qd", "vel", "velocity", "velocities", "speed", "speeds"})) return velocity;
+  if (has({"tau", "torque", "torques", "effort", "efforts", "moment"})) return torque;
+  if (has({"current", "currents", "cur", "amps", "amp", "i", "iq"})) return current;
+  if (has({"q", "pos", "position", "positions", "angle", "angles"})) return position;
+  if (has({"t", "time", "timestamp", "stamp", "stamps", "sec", "secs", "seconds", "clock"})) return time;
+  return {};
+}
+
+/// What was asked of the robot rather than measured.
+bool is_command(const std::vector<std::string>& words) {
+  return std::any_of(words.begin(), words.end(), [](const std::string& word) {
+    return is_one_of(word, {"target", "desired", "cmd", "command", "commanded", "ref", "reference", "goal", "error", "des"});
+  });
+}
+
+struct Column {
+  std::string name;
+  Kind kind{};
+  bool command = false;
+  std::optional<std::size_t> joint;  ///< by its name
+  std::optional<int> number;         ///< the last one in its name
+};
+
+std::string plain(const std::string& name) {
+  std::string out;
+  for (const std::string& word : words_of(name)) out += word;
+  return out;
+}
+
+Column describe(const std::string& name, const Robot& robot) {
+  Column out;
+  out.name = name;
+  std::string rest = plain(name);
+  std::size_t longest = 0;
+  for (std::size_t j = 0; j < robot.size(); ++j) {
+    const std::string joint = plain(robot.joints[j].name);
+    if (joint.size() <= longest || rest.find(joint) == std::string::npos) continue;
+    longest = joint.size();
+    out.joint = j;
+  }
+  const std::vector<std::string> words = words_of(name);
+  for (const std::string& word : words) {
+    int value = 0;
+    if (std::from_chars(word.data(), word.data() + word.size(), value).ec == std::errc()) out.number = value;
+  }
+  const auto kind = kind_of(words);
+  out.kind = kind.value_or(kinds);
+  out.command = is_command(words);
+  return out;
+}
+
+/// One column a joint of a kind: by the joints' names, else by numbers from 0 or 1. Measured ones before commands.
+std::vector<std::string> columns_of(const std::vector<Column>& all, Kind kind, std::size_t joints) {
+  for (const bool command : {false, true}) {
+    std::vector<std::string> named(joints), counted(joints);
+    for (const int first : {1, 0}) {
+      std::fill(counted.begin(), counted.end(), "");
+      for (const Column& column : all) {
+        if (column.kind != kind || column.command != command) continue;
+        if (column.joint && named[*column.joint].empty()) named[*column.joint] = column.name;
+        const int at = column.number ? *column.number - first : (joints == 1 ? 0 : -1);
+        if (at >= 0 && at < static_cast<int>(joints) && counted[static_cast<std::size_t>(at)].empty())
+          counted[static_cast<std::size_t>(at)] = column.name;
+      }
+      for (const auto& names : {named, counted})
+        if (std::none_of(names.begin(), names.end(), [](const std::string& name) { return name.empty(); })) return names;
+    }
+  }
+  return {};
+}
+
+const char* signal_of(Kind kind) {
+  constexpr std::array names{"t", "q", "dq", "ddq", "tau", "tau"};
+  return names[kind];
+}
+
+ColumnGuess by_names(const CsvHead& head, const Robot& robot) {
+  ColumnGuess out;
+  std::vector<Column> all;
+  for (const std::string& name : head.names) all.push_back(describe(name, robot));
+  const auto t = std::find_if(all.begin(), all.end(), [](const Column& column) { return column.kind == time; });
+  if (t != all.end()) {
+    out.format.columns["t"] = t->name;
+  } else {
+    out.missing.push_back("t");
+  }
+  for (const Kind kind : {position, velocity, acceleration, torque}) {
+    std::vector<std::string> names = columns_of(all, kind, robot.size());
+    if (kind == torque && names.empty()) {
+      names = columns_of(all, current, robot.size());
+      out.torque_is_current = !names.empty();
+    }
+    if (!names.empty()) {
+      out.format.joint_columns[signal_of(kind)] = names;
+    } else if (kind == position || kind == torque) {
+      out.missing.push_back(signal_of(kind));
+    }
+  }
+  return out;
+}
+
+/// Whether column b is the time derivative of column a.
+bool is_derivative(const CsvHead& head, std::size_t a, std::size_t b) {
+  double error = 0, size = 0;
+  for (std::size_t k = 1; k < head.rows.size(); ++k) {
+    const double step = head.rows[k][0] - head.rows[k - 1][0];
+    const double speed = (head.rows[k][a] - head.rows[k - 1][a]) / step;
+    const double mean = (head.rows[k][b] + head.rows[k - 1][b]) / 2;
+    error += (speed - mean) * (speed - mean);
+    size += mean * mean;
+  }
+  return size > 0 && error < 0.25 * size;
+}
+
+/// t, then blocks of one column a joint: q, dq where it is the derivative of q, tau.
+ColumnGuess by_numbers(const CsvHead& head, const Robot& robot) {
+  ColumnGuess out;
+  const std::size_t n = robot.size();
+  if (head.columns < 1 + 2 * n) {
+    out.missing = {"t", "q", "tau"};
+    out.notes.push_back(fmt::format("{} columns are too few for t and q, tau of {} joints", head.columns, n));
+    return out;
+  }
+  const auto block = [&](std::size_t first) {
+    std::vector<std::string> names;
+    for (std::size_t j = 0; j < n; ++j) names.push_back(fmt::format("#{}", first + j));
+    return names;
+  };
+  out.format.columns["t"] = "#0";
+  out.format.joint_columns["q"] = block(1);
+  std::size_t next = 1 + n;
+  std::size_t derivatives = 0;
+  for (std::size_t j = 0; j < n && next + n < head.columns; ++j) derivatives += is_derivative(head, 1 + j, next + j);
+  if (2 * derivatives > n && head.columns >= next + 2 * n) {
+    out.format.joint_columns["dq"] = block(next);
+    next += n;
+  }
+  out.format.joint_columns["tau"] = block(next);
+  out.notes.push_back("the file names no columns: their order t, q, (dq,) tau is a guess; check it");
+  if (head.columns > next + n)
+    out.notes.push_back(fmt::format("columns from {} on are not used", next + n));
+  return out;
+}
+
+}  // namespace
+
+CsvHead read_head(const std::filesystem::path& file, std::size_t rows) {
+  CsvHead head;
+  MappedFile mapped(file.string());
+  LineReader lines(mapped.text());
+  std::string_view line;
+  while (head.rows.size() < rows && lines.next(line)) {
+    const std::vector<std::string> fields = split(line);
+    if (head.columns == 0) {
+      head.columns = fields.size();
+      if (std::isnan(number_of(fields.front()))) {
+        head.names = fields;
+        continue;
+      }
+    }
+    if (fields.size() != head.columns) break;
+    std::vector<double>& row = head.rows.emplace_back();
+    for (const std::string& field : fields) row.push_back(number_of(field));
+  }
+  if (head.rows.size() < 2) throw InputError(file.string() + ": no rows of numbers with commas between them");
+  return head;
+}
+
+ColumnGuess guess_columns(const CsvHead& head, const Robot& robot) {
+  return head.names.empty() ? by_numbers(head, robot) : by_names(head, robot);
+}
+
+}  // namespace fxdyn
