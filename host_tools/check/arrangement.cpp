@@ -122,8 +122,7 @@ ArrangementEvidence::Design ArrangementEvidence::design(const Arrangement& arran
 
     const bool known = robot.joints[j].inertial.has_value();
     const double vague = known ? 1 : options_.vague;
-    const Eigen::Matrix4d body =
-        pseudo_inertia(body_of(robot.joints[j], chain.urdf_in_dh[j], mass, length / 4));
+    const Eigen::Matrix4d body = pseudo_inertia(body_of(robot.joints[j], chain.urdf_in_dh[j], mass, length / 4));
     out.mean.segment(ten * joint, ten) = pseudo_inertia_parameters(body);
     out.information.block(ten * joint, ten * joint, ten, ten) = barrier_hessian(body.inverse()) / (vague * vague);
   }
@@ -191,9 +190,9 @@ ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangem
       const auto joint = static_cast<std::size_t>(j);
       VectorXd x(bodies + own);
       x << solution.head(bodies), solution.segment(bodies + own * j, own);
-      const double square = whole[j] + (x.dot(design.gram[joint] * x) -
-                                        2 * gain[j] * x.dot(design.projection[joint].col(from[joint]))) /
-                                           rows;
+      const double square =
+          whole[j] +
+          (x.dot(design.gram[joint] * x) - 2 * gain[j] * x.dot(design.projection[joint].col(from[joint]))) / rows;
       variance[j] = std::max(square, options_.perfect * options_.perfect * whole[j]);
       // Friction brakes and a rotor is heavy: else there is none from here on, and what it would explain is left.
       const auto take_out = [&](Index i) { prior(bodies + own * j + i, bodies + own * j + i) *= 1e8; };

@@ -45,7 +45,7 @@ class ArrangementEvidence {
     std::vector<Eigen::MatrixXd> gram, projection;  ///< per joint: X^T X; X^T tau of all torque columns
     Eigen::MatrixXd information;                    ///< of the bodies before any log, for a mass error of 1
     Eigen::VectorXd mean;                           ///< likewise
-    std::vector<Eigen::VectorXd> own_square;  ///< per joint: mean squares of its own columns
+    std::vector<Eigen::VectorXd> own_square;        ///< per joint: mean squares of its own columns
   };
   Design design(const Arrangement& arrangement) const;
   ArrangementScore score(const Design& design, const Arrangement& arrangement) const;

@@ -118,9 +118,8 @@ class Moves {
   }
 
   void units(Index j) {
-    const std::vector<double> factors = joint(j).type == JointType::revolute
-                                            ? std::vector<double>{pi / 180}
-                                            : std::vector<double>{1e-3, 1e3};
+    const std::vector<double> factors =
+        joint(j).type == JointType::revolute ? std::vector<double>{pi / 180} : std::vector<double>{1e-3, 1e3};
     for (const double factor : factors) {
       ArrangementMove& move = add(Mistake::position_unit, j);
       move.value = factor;
@@ -158,8 +157,8 @@ std::vector<Scored> score_all(const ArrangementEvidence& evidence, const Arrange
   const ArrangementEvidence::Design as_now = evidence.design(now);
   std::vector<Scored> out(moves.size());
   parallel_for(moves.size(), [&](std::size_t i) {
-    out[i].score = changes_motion(moves[i].mistake) ? evidence(moves[i].result)
-                                                    : evidence.score(as_now, moves[i].result);
+    out[i].score =
+        changes_motion(moves[i].mistake) ? evidence(moves[i].result) : evidence.score(as_now, moves[i].result);
     out[i].move = std::move(moves[i]);
   });
   std::sort(out.begin(), out.end(), [](const Scored& a, const Scored& b) { return a.score.nats < b.score.nats; });
@@ -230,7 +229,8 @@ std::vector<Scored> best_of_each(const ArrangementEvidence& evidence, const Arra
                                  const ArrangementOptions& options) {
   std::vector<Scored> best;
   for (Scored& one : score_all(evidence, now, Moves(evidence, now).all)) {
-    const bool known = std::any_of(best.begin(), best.end(), [&](const Scored& b) { return same_thing(b.move, one.move); });
+    const bool known =
+        std::any_of(best.begin(), best.end(), [&](const Scored& b) { return same_thing(b.move, one.move); });
     if (!known) best.push_back(std::move(one));
   }
   // A grid point beside a sharp minimum may be no better than nothing.

@@ -27,8 +27,8 @@ std::string to_string(Mistake mistake);
 /// A change of one thing that explains the torques better.
 struct ArrangementMove {
   Mistake mistake{};
-  Eigen::Index joint = 0, other = 0;  ///< `other` of the swaps
-  double value = 0;                   ///< offset [rad | m], gain, unit
+  Eigen::Index joint = 0, other = 0;                    ///< `other` of the swaps
+  double value = 0;                                     ///< offset [rad | m], gain, unit
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< axis, gravity
   Arrangement result;                                   ///< with all moves before it
 };

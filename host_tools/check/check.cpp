@@ -22,8 +22,7 @@ std::vector<CheckFinding> check_columns(const Project& project, const std::vecto
   std::vector<CheckFinding> out;
   if (!project.check.columns) return out;
   const ArrangementEvidence evidence(project.robot, sample_torque(logs, options.samples), options);
-  for (const ArrangementFinding& finding : find_mistakes(evidence, options))
-    out.push_back(in_words(finding, project));
+  for (const ArrangementFinding& finding : find_mistakes(evidence, options)) out.push_back(in_words(finding, project));
   return out;
 }
 

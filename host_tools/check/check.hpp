@@ -19,8 +19,8 @@ struct CheckOptions {
 
 /// Something that is wrong, or may be.
 struct CheckFinding {
-  bool error = false;  ///< the data can't be what the project says
-  std::string kind;    ///< "swapped_joints", "rest", ..
+  bool error = false;                ///< the data can't be what the project says
+  std::string kind;                  ///< "swapped_joints", "rest", ..
   std::optional<std::size_t> joint;  ///< from 0
   std::string log;                   ///< its name; empty: all of them
   std::string text;                  ///< one line: what, and why
@@ -33,13 +33,13 @@ struct LogFacts {
   Role role = Role::train;
   double begin_s = 0, end_s = 0;  ///< the log's own time
   double seconds = 0, rate_hz = 0;
-  bool resampled = false;              ///< its stamps were irregular
-  double rest_share = 0;               ///< of the time, all joints at rest
+  bool resampled = false;                    ///< its stamps were irregular
+  double rest_share = 0;                     ///< of the time, all joints at rest
   double rest_until_s = 0, rest_from_s = 0;  ///< the log's own time: standstill at its ends
-  Eigen::VectorXd q_lower, q_upper;    ///< [rad | m]
-  Eigen::VectorXd speed;               ///< largest [rad/s | m/s]
-  Eigen::VectorXd encoder_step;        ///< [rad | m], 0: none is seen
-  Eigen::VectorXd largest_torque;      ///< [N*m | N]
+  Eigen::VectorXd q_lower, q_upper;          ///< [rad | m]
+  Eigen::VectorXd speed;                     ///< largest [rad/s | m/s]
+  Eigen::VectorXd encoder_step;              ///< [rad | m], 0: none is seen
+  Eigen::VectorXd largest_torque;            ///< [N*m | N]
 };
 
 struct CheckResult {

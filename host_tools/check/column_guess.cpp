@@ -74,7 +74,8 @@ std::optional<Kind> kind_of(const std::vector<std::string>& words) {
 /// What was asked of the robot rather than measured.
 bool is_command(const std::vector<std::string>& words) {
   return std::any_of(words.begin(), words.end(), [](const std::string& word) {
-    return is_one_of(word, {"target", "desired", "cmd", "command", "commanded", "ref", "reference", "goal", "error", "des"});
+    return is_one_of(word,
+                     {"target", "desired", "cmd", "command", "commanded", "ref", "reference", "goal", "error", "des"});
   });
 }
 
@@ -128,7 +129,8 @@ std::vector<std::string> columns_of(const std::vector<Column>& all, Kind kind, s
           counted[static_cast<std::size_t>(at)] = column.name;
       }
       for (const auto& names : {named, counted})
-        if (std::none_of(names.begin(), names.end(), [](const std::string& name) { return name.empty(); })) return names;
+        if (std::none_of(names.begin(), names.end(), [](const std::string& name) { return name.empty(); }))
+          return names;
     }
   }
   return {};
@@ -202,8 +204,7 @@ ColumnGuess by_numbers(const CsvHead& head, const Robot& robot) {
   }
   out.format.joint_columns["tau"] = block(next);
   out.notes.push_back("the file names no columns: their order t, q, (dq,) tau is a guess; check it");
-  if (head.columns > next + n)
-    out.notes.push_back(fmt::format("columns from {} on are not used", next + n));
+  if (head.columns > next + n) out.notes.push_back(fmt::format("columns from {} on are not used", next + n));
   return out;
 }
 

@@ -20,9 +20,9 @@ CsvHead read_head(const std::filesystem::path& file, std::size_t rows = 200);
 
 /// What the columns of a CSV hold, by their names, or by their number and numbers where they have none.
 struct ColumnGuess {
-  LogFormat format;              ///< joint_columns of q and tau, of dq and ddq where they are there; columns["t"]
-  bool torque_is_current = false;  ///< the torque's columns are called currents
-  std::vector<std::string> notes;  ///< what a reader should check
+  LogFormat format;                  ///< joint_columns of q and tau, of dq and ddq where they are there; columns["t"]
+  bool torque_is_current = false;    ///< the torque's columns are called currents
+  std::vector<std::string> notes;    ///< what a reader should check
   std::vector<std::string> missing;  ///< what was not found: "t", "q of joint_3"
 };
 ColumnGuess guess_columns(const CsvHead& head, const Robot& robot);

@@ -43,8 +43,8 @@ class MoveWords {
         return fmt::format("gravity points along {} in the base frame, not along {}", vector(move.direction, 1),
                            vector(project_.robot.gravity, 1));
       case Mistake::torque_gain:
-        return fmt::format("torque of {} is about {:.2g} times too {} beside the others' and the URDF's masses", joint(j),
-                           move.value < 1 ? 1 / move.value : move.value, move.value < 1 ? "large" : "small");
+        return fmt::format("torque of {} is about {:.2g} times too {} beside the others' and the URDF's masses",
+                           joint(j), move.value < 1 ? 1 / move.value : move.value, move.value < 1 ? "large" : "small");
       case Mistake::position_unit:
         return unit(move);
     }

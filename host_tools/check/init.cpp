@@ -84,7 +84,8 @@ void write_signals(const ColumnGuess& guess, const std::vector<double>& position
     out += fmt::format("position_gain = [{:.10g}]\n", fmt::join(position_gain, ", "));
   }
   if (guess.torque_is_current) {
-    out += "# the torque's columns are currents: write torque constant x gear ratio of each joint [N*m/A], then check\n";
+    out +=
+        "# the torque's columns are currents: write torque constant x gear ratio of each joint [N*m/A], then check\n";
     out += fmt::format("torque_gain = [{}]\n", fmt::join(std::vector<std::string>(joints, "1.0"), ", "));
   }
 }
@@ -106,9 +107,10 @@ std::string init_project(const std::vector<fs::path>& logs, const fs::path& urdf
   for (const Joint& joint : robot.joints) turns.push_back(joint.type == JointType::revolute);
   const ColumnGuess guess = guess_columns(read_head(logs.front()), robot);
   if (!guess.missing.empty()) {
-    throw InputError(fmt::format("{}: no column is seen for {}; name them: columns = {{ t = \"..\", q = [\"..\", ..], tau = "
-                                 "[\"..\", ..] }}",
-                                 logs.front().string(), fmt::join(guess.missing, ", ")));
+    throw InputError(
+        fmt::format("{}: no column is seen for {}; name them: columns = {{ t = \"..\", q = [\"..\", ..], tau = "
+                    "[\"..\", ..] }}",
+                    logs.front().string(), fmt::join(guess.missing, ", ")));
   }
   LogFormat format = guess.format;
   std::vector<double> position_gain;
@@ -126,11 +128,13 @@ std::string init_project(const std::vector<fs::path>& logs, const fs::path& urdf
   }
 
   std::string out = fmt::format("# {}: {} joints ({})\n", robot.name, robot.size(),
-                                fmt::join([&] {
-                                  std::vector<std::string> names;
-                                  for (const Joint& joint : robot.joints) names.push_back(joint.name);
-                                  return names;
-                                }(), ", "));
+                                fmt::join(
+                                    [&] {
+                                      std::vector<std::string> names;
+                                      for (const Joint& joint : robot.joints) names.push_back(joint.name);
+                                      return names;
+                                    }(),
+                                    ", "));
   out += "# made by fxdyn init; go on with: fxdyn check PROJECT\n[robot]\n";
   out += fmt::format("urdf = \"{}\"\n", fs::relative(urdf, directory).generic_string());
   out += "# gravity = [0.0, 0.0, -9.81]   # in the base frame: write another where the base is not level\n";

@@ -14,7 +14,8 @@ namespace {
 
 /// Speeds over a window of at least 20 ms: single steps of a coarse encoder are no motion.
 Eigen::MatrixXd coarse_speed(const Log& log, Index& window) {
-  window = std::clamp<Index>(static_cast<Index>(std::ceil(0.02 / log.step_s)), 1, std::max<Index>(1, log.samples() / 4));
+  window =
+      std::clamp<Index>(static_cast<Index>(std::ceil(0.02 / log.step_s)), 1, std::max<Index>(1, log.samples() / 4));
   const Index rows = log.samples() - window;
   return (log.q.bottomRows(rows) - log.q.topRows(rows)) / (static_cast<double>(window) * log.step_s);
 }
@@ -93,21 +94,22 @@ std::vector<CheckFinding> findings_of(const std::vector<LogFacts>& logs, const R
     const auto at = static_cast<std::size_t>(j);
     const std::string unit = joint.position_unit();
     if (!(upper[j] > lower[j])) {
-      out.push_back({false, "never_moves", at, "", fmt::format("{} never moves: nothing of it can be told", of_joint(robot, j)),
-                     ""});
+      out.push_back({false, "never_moves", at, "",
+                     fmt::format("{} never moves: nothing of it can be told", of_joint(robot, j)), ""});
       continue;
     }
     if (!joint.limits || joint.continuous) continue;
     const double range = joint.limits->upper - joint.limits->lower;
     const double beyond = std::max(upper[j] - joint.limits->upper, joint.limits->lower - lower[j]);
     if (range > 0 && beyond > options.beyond * range) {
-      out.push_back({false, "beyond_limits", at, "",
-                     fmt::format("{} goes from {:.4g} to {:.4g} {}, up to {:.3g} beyond the URDF's limits {:.4g} to {:.4g}: "
-                                 "its zero, sign or unit, or another joint's column?",
-                                 of_joint(robot, j), lower[j], upper[j], unit, beyond, joint.limits->lower,
-                                 joint.limits->upper),
-                     ""});
-    } else if (joint.type == JointType::revolute && range > 0 && upper[j] - lower[j] < options.least_range * range && range < options.widest) {
+      out.push_back(
+          {false, "beyond_limits", at, "",
+           fmt::format("{} goes from {:.4g} to {:.4g} {}, up to {:.3g} beyond the URDF's limits {:.4g} to {:.4g}: "
+                       "its zero, sign or unit, or another joint's column?",
+                       of_joint(robot, j), lower[j], upper[j], unit, beyond, joint.limits->lower, joint.limits->upper),
+           ""});
+    } else if (joint.type == JointType::revolute && range > 0 && upper[j] - lower[j] < options.least_range * range &&
+               range < options.widest) {
       out.push_back({false, "little_range", at, "",
                      fmt::format("{} covers {:.2g} {} of the {:.3g} that the URDF allows: what depends on its position "
                                  "can't be told",
@@ -115,11 +117,12 @@ std::vector<CheckFinding> findings_of(const std::vector<LogFacts>& logs, const R
                      ""});
     }
     if (joint.limits->velocity > 0 && speed[j] > options.too_fast * joint.limits->velocity) {
-      out.push_back({false, "too_fast", at, "",
-                     fmt::format("{} reaches {:.3g} {}/s, {:.2g} times the URDF's limit: the unit of q or t, or q on the "
-                                 "motor's side of the gearbox?",
-                                 of_joint(robot, j), speed[j], unit, speed[j] / joint.limits->velocity),
-                     ""});
+      out.push_back(
+          {false, "too_fast", at, "",
+           fmt::format("{} reaches {:.3g} {}/s, {:.2g} times the URDF's limit: the unit of q or t, or q on the "
+                       "motor's side of the gearbox?",
+                       of_joint(robot, j), speed[j], unit, speed[j] / joint.limits->velocity),
+           ""});
     }
   }
   return out;

@@ -4,9 +4,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "host_tools/cli/verb.hpp"
 #include "host_tools/check/check.hpp"
 #include "host_tools/check/init.hpp"
+#include "host_tools/cli/verb.hpp"
 #include "host_tools/excite/excite.hpp"
 #include "host_tools/pipeline/forward_log.hpp"
 #include "host_tools/pipeline/one_log.hpp"
@@ -48,8 +48,8 @@ Action add_check(CLI::App& verb) {
   verb.add_option("--out", options->out, "directory for the logs of scenarios (default: none is kept)");
   return [options] {
     const TemporaryFolder temporary;
-    const CheckResult result =
-        check(read_project(options->project), options->out.empty() ? temporary.path() : std::filesystem::path(options->out));
+    const CheckResult result = check(read_project(options->project),
+                                     options->out.empty() ? temporary.path() : std::filesystem::path(options->out));
     fmt::print("{}", options->as_json ? to_json(result).dump(2) + "\n" : check_table(result));
     std::fflush(stdout);
     if (result.has_error())

@@ -14,8 +14,8 @@ struct TorqueSamples {
   Eigen::Index size() const { return tau.rows(); }
 };
 
-/// About `wanted` of them, spread over the motion. Not at even distances: those may keep step with a motion that repeats
-/// itself, and all samples would show one pose.
+/// About `wanted` of them, spread over the motion. Not at even distances: those may keep step with a motion that
+/// repeats itself, and all samples would show one pose.
 TorqueSamples sample_torque(const std::vector<ProcessedLog>& logs, Eigen::Index wanted);
 
 }  // namespace fxdyn

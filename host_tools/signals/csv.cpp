@@ -152,10 +152,10 @@ class Header {
                                    all.substr(0, 60)));
     }
     if (!has_names_) {
-      throw InputError(
-          fmt::format("{}:{}: starts with a number, so its {} columns have no names; give their numbers, counted from "
-                      "0: columns = {{ t = 0, q = [1, 2], tau = [3, 4] }}, or a first line (t,q1,...,tau1,...)",
-                      file_, line_, names_.size()));
+      throw InputError(fmt::format(
+          "{}:{}: starts with a number; the first line must name the columns (t,q1,...,tau1,...), or the "
+          "project gives the numbers of these {} columns, from 0: columns = {{ t = 0, q = [1], tau = [2] }}",
+          file_, line_, names_.size()));
     }
     throw InputError(fmt::format("{}:{}: no column '{}' ({}); nearest is '{}' (map it with columns = {{ ... }})", file_,
                                  line_, name, meaning, nearest(name, names_)));

@@ -67,9 +67,9 @@ void to_si_units(Log& log, const LogFormat& format) {
 Log read_log(const std::filesystem::path& file, std::size_t joints, const std::vector<bool>& revolute,
              const LogFormat& format, std::optional<double> from_s, std::optional<double> to_s, bool torque_required) {
   const std::string where = file.string();
-  for (const auto& [key, values] : {std::pair("torque_gain", &format.torque_gain),
-                                    std::pair("position_gain", &format.position_gain),
-                                    std::pair("position_offset", &format.position_offset)}) {
+  for (const auto& [key, values] :
+       {std::pair("torque_gain", &format.torque_gain), std::pair("position_gain", &format.position_gain),
+        std::pair("position_offset", &format.position_offset)}) {
     if (!values->empty() && values->size() != joints)
       throw InputError(fmt::format("{}: {} has {} values for {} joints", where, key, values->size(), joints));
   }

@@ -46,7 +46,8 @@ struct LogFormat {
   std::vector<double> torque_gain{};             ///< measured column -> N*m; empty: 1
   std::vector<double> position_gain{};           ///< measured position -> rad | m, velocities too; empty: 1
   std::vector<double> position_offset{};         ///< added to the position after its gain [rad | m]; empty: 0
-  /// Signal -> one column a joint, in the order of the chain; in place of a prefix. "#3": the fourth column of the file.
+  /// Signal -> one column a joint, in the order of the chain; in place of a prefix. "#3": the fourth column of the
+  /// file.
   std::map<std::string, std::vector<std::string>> joint_columns{};
   double time_unit_s = 0;  ///< of the time column [s]; 0: told from its steps
   bool operator==(const LogFormat&) const = default;

@@ -91,9 +91,9 @@ TEST(Arrangement, SwappedTorquesAreFound) {
 }
 
 TEST(Arrangement, MirrorsAreToldApart) {
-  for (const auto& [mistake, motion, torque] : {std::tuple{Mistake::mirrored_joint, -1, -1},
-                                                std::tuple{Mistake::mirrored_motion, -1, 1},
-                                                std::tuple{Mistake::mirrored_torque, 1, -1}}) {
+  for (const auto& [mistake, motion, torque] :
+       {std::tuple{Mistake::mirrored_joint, -1, -1}, std::tuple{Mistake::mirrored_motion, -1, 1},
+        std::tuple{Mistake::mirrored_torque, 1, -1}}) {
     Recorded recorded;
     recorded.scale_motion(2, motion);
     recorded.samples.tau.col(2) *= torque;

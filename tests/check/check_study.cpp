@@ -110,8 +110,9 @@ std::string words(const ArrangementMove& move) {
 
 int main(int argc, char** argv) {
   fxdyn::keep_freed_memory();
-  CLI::App app{"Mistakes in columns, signs, zeros, axes, gravity and gains: how many are found, and how many sound robots "
-               "are warned."};
+  CLI::App app{
+      "Mistakes in columns, signs, zeros, axes, gravity and gains: how many are found, and how many sound robots "
+      "are warned."};
   std::uint64_t seed = 1000;
   std::size_t robots = 60;
   fs::path folder = "build/check_study";
@@ -169,7 +170,8 @@ int main(int argc, char** argv) {
       if (first || (one.name == "sound" && findings.empty())) continue;
       fmt::print("{} {} joint {}:", wanted.name, one.name, one.joint + 1);
       for (const auto& finding : findings) {
-        fmt::print(" [{:.0f} nats {}, {:.3g} -> {:.3g}", finding.nats, words(finding.move), finding.before, finding.after);
+        fmt::print(" [{:.0f} nats {}, {:.3g} -> {:.3g}", finding.nats, words(finding.move), finding.before,
+                   finding.after);
         for (const auto& move : finding.as_good) fmt::print(" | {}", words(move));
         fmt::print("]");
       }
@@ -177,8 +179,8 @@ int main(int argc, char** argv) {
       std::fflush(stdout);
     }
   }
-  fmt::print("{:<18}{:>8}{:>8}{:>8}{:>8}{:>10}{:>8}{:>8}\n", "", "cases", "found", "first", "among", "error x", "hidden",
-             "told");
+  fmt::print("{:<18}{:>8}{:>8}{:>8}{:>8}{:>10}{:>8}{:>8}\n", "", "cases", "found", "first", "among", "error x",
+             "hidden", "told");
   for (auto& [name, count] : counts) {
     std::sort(count.ratios.begin(), count.ratios.end());
     const double most = count.ratios.empty() ? 0 : count.ratios[count.ratios.size() * 9 / 10];
