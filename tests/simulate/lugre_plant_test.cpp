@@ -154,6 +154,7 @@ TEST(LuGrePlant, SlidesOnTheStribeckCurve) {
 }
 
 TEST(LuGreEffect, FollowsTheOdeForTenMinutesOfCreepAndReversals) {
+  double largest = 0;  // of rated
   for (const Joint& joint : joints) {
     LuGreBristles bristles(fit_of(joint));
     Step<Real> real(joint);
@@ -170,8 +171,9 @@ TEST(LuGreEffect, FollowsTheOdeForTenMinutesOfCreepAndReversals) {
     EXPECT_GT(most, joint.static_friction * share);
     EXPECT_LT(of_real, 1e-4 * joint.rated);
     EXPECT_LT(of_fixed, 1e-4 * joint.rated);
-    RecordProperty("largest_error_of_rated", std::to_string(of_fixed / joint.rated));
+    largest = std::max(largest, of_fixed / joint.rated);
   }
+  RecordProperty("largest_error_per_million_of_rated", std::to_string(1e6 * largest));
 }
 
 /// What the model's step does over the whole range of velocities, with the bristles' damping and without: largest error
