@@ -31,8 +31,7 @@ struct SlidingLevel {
 /// Each tick is stepped exactly for a constant velocity, the mean of those at its ends, and n of its end:
 ///   y <- y e + n s (1 - e),   e = exp(-|mean| tick / (distance n)).
 /// It is stable for every tick, since y stays between its last value and n s. The mean makes the path of a tick right
-/// to second order; with the velocity at its end alone the error is 20 to 80 times as large. Derivation and measured
-/// errors: docs/decisions/0008-lugre.md.
+/// to second order; with the velocity at its end alone the error is 20 to 80 times as large.
 template <class N>
 struct Bristle {
   Unit<N> y{};
