@@ -2,11 +2,13 @@
 """How far the UR10 model that Petrone et al. released is off on our test window: docs/findings/benchmarks.md, "UR10".
 
   ur10_published.py DATA_FOLDER --clone FOLDER [--out FILE.json]
+  ur10_published.py DATA_FOLDER --cut FILE.csv
   ur10_published.py DATA_FOLDER --torque FILE.csv [--out FILE.json]
 
 FOLDER is a clone of github.com/unisa-acg/inverse-dynamics-solver (BSD-3-Clause). Its code is no part of this project: it is
 compiled here as it is, and its friction parameters are read from it. --torque judges another torque (t, tau1..tau6, as
-`fxdyn predict` writes it) instead, over the same window by the same filter, without theirs.
+`fxdyn predict` writes it) instead, over the same window by the same filter, without theirs. --cut writes the log's window alone,
+for friction that remembers where it starts.
 
 Window and filter are those of tests/real/published/ur10_unisa.toml: 19 to 27 s, Butterworth of order 4 forwards and backwards,
 20 Hz for the position and 12 Hz for torques, 0.25 s dropped at both ends.
@@ -110,12 +112,19 @@ def main():
     parser.add_argument('data', type=pathlib.Path, help='the folder that holds ur10_unisa')
     parser.add_argument('--clone', type=pathlib.Path)
     parser.add_argument('--torque', type=pathlib.Path)
+    parser.add_argument('--cut', type=pathlib.Path)
     parser.add_argument('--out', type=pathlib.Path)
     options = parser.parse_args()
-    if (options.clone is None) == (options.torque is None):
-        parser.error('give --clone or --torque')
+    if [options.clone, options.torque, options.cut].count(None) != 2:
+        parser.error('give --clone, --torque or --cut')
+    log_file = options.data / 'ur10_unisa' / 'exciting_trajectory.csv'
+    if options.cut:
+        head, *rows = log_file.read_text().splitlines(keepends=True)
+        at = head.strip().split(',').index('t')
+        options.cut.write_text(head + ''.join(row for row in rows if FROM_S <= float(row.split(',')[at]) < TO_S))
+        return 0
     names = [f'{kind}{j + 1}' for kind in ('q', 'tau') for j in range(JOINTS)]
-    t, *log = columns(options.data / 'ur10_unisa' / 'exciting_trajectory.csv', ['t', *names])
+    t, *log = columns(log_file, ['t', *names])
     step_s = (t[-1] - t[0]) / (len(t) - 1)
     if options.torque:
         ours_t, *torque = columns(options.torque, ['t', *names[JOINTS:]])
