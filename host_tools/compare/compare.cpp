@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "host_tools/compare/figures.hpp"
+#include "host_tools/compare/known_shapes.hpp"
 #include "host_tools/compare/mlp.hpp"
 #include "host_tools/compare/named_model.hpp"
 #include "host_tools/compare/state_bls.hpp"
@@ -122,6 +123,8 @@ class Comparison {
     if (wanted("lugre")) structural("lugre", lugre_friction, "wls");
     if (wanted("lugre_physical")) of_efficiency("lugre_physical", lugre_of_possible_bodies);
     if (wanted("named")) of_efficiency("named", named_model);
+    if (wanted("known_shapes")) known_shapes("known_shapes", {0});
+    if (wanted("bound")) known_shapes("bound", {1, 2, 3, 4, 5, 6, 7, 8});
     if (wanted("named_bls")) named_bls();
     if (against_truth_ && wanted("oracle")) oracle();
     if (against_truth_ && wanted("noise_floor")) noise_floor();
@@ -333,18 +336,6 @@ class Comparison {
     return fit;
   }
 
-  static StateBlsShape shape_at(const VectorXd& x) {
-    static const std::array<const char*, 4> activations{"tanh", "sigmoid", "relu", "sine"};
-    StateBlsShape shape;
-    shape.windows = std::lround(x[0]);
-    shape.nodes = std::lround(x[1]);
-    shape.enhancement = std::lround(x[2]);
-    shape.ridge = std::pow(10, x[3]);
-    shape.scale = std::pow(10, x[4]);
-    shape.activation = activations[static_cast<std::size_t>(std::clamp(std::floor(x[5]), 0.0, 3.0))];
-    return shape;
-  }
-
   /// The paper's: what a structure leaves, as a function of the state. Without effects that is the rigid body of its
   /// section 3; Eq. 8 has viscous and Coulomb friction in it as well.
   void state_bls(const std::string& name, const std::vector<std::string>& effects, bool by_swarm) {
@@ -383,9 +374,10 @@ class Comparison {
       }
       progress_.stage("compare: " + name + ", by particle swarm", n * (static_cast<std::size_t>(pso.iterations) + 1));
       search(
-          swarms, [&](std::size_t j, const VectorXd& at) { return fit_state(shape_at(at), j, x[j], y[j]).judged; },
+          swarms,
+          [&](std::size_t j, const VectorXd& at) { return fit_state(state_bls_shape(at), j, x[j], y[j]).judged; },
           progress_, resume);
-      for (std::size_t j = 0; j < n; ++j) shapes[j] = shape_at(swarms[j].best());
+      for (std::size_t j = 0; j < n; ++j) shapes[j] = state_bls_shape(swarms[j].best());
     }
     stage(name);
     std::vector<StateFit> fits(n);
@@ -430,6 +422,22 @@ class Comparison {
     const double spent = seconds_since(start);
     stage(name);
     add_model(name, spent);
+  }
+
+  /// Several draws: percent_rated and its mean are root mean squares over them, all else is of the last one.
+  void known_shapes(const std::string& name, const std::vector<std::uint64_t>& draws) {
+    if (!tests_.front().truth) throw DataError(name + ": no test log comes from a scenario, so no truth is known");
+    const auto start = std::chrono::steady_clock::now();
+    VectorXd squares = VectorXd::Zero(static_cast<Index>(rated_.size()));
+    for (const std::uint64_t draw : draws) {
+      if (draw != draws.front()) methods_.pop_back();
+      last_ = with_known_shapes(project_, data_, *tests_.front().truth, draw);
+      add_model(name, seconds_since(start));
+      squares += Eigen::Map<const VectorXd>(methods_.back().percent_rated.data(), squares.size()).cwiseAbs2();
+    }
+    const VectorXd rms = (squares / static_cast<double>(draws.size())).cwiseSqrt();
+    methods_.back().percent_rated.assign(rms.begin(), rms.end());
+    methods_.back().mean_percent_rated = rms.mean();
   }
 
   void named_bls() {

@@ -1,5 +1,7 @@
 #include "host_tools/compare/state_bls.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "host_tools/support/random.hpp"
@@ -31,6 +33,18 @@ MatrixXd activated(const MatrixXd& x, const std::string& activation) {
 }
 
 }  // namespace
+
+StateBlsShape state_bls_shape(const Eigen::VectorXd& particle) {
+  static const std::array<const char*, 4> activations{"tanh", "sigmoid", "relu", "sine"};
+  StateBlsShape shape;
+  shape.windows = std::lround(particle[0]);
+  shape.nodes = std::lround(particle[1]);
+  shape.enhancement = std::lround(particle[2]);
+  shape.ridge = std::pow(10, particle[3]);
+  shape.scale = std::pow(10, particle[4]);
+  shape.activation = activations[static_cast<std::size_t>(std::clamp(std::floor(particle[5]), 0.0, 3.0))];
+  return shape;
+}
 
 StateBls::StateBls(const StateBlsShape& shape, const MatrixXd& examples, std::uint64_t seed) : shape_(shape) {
   mean_ = examples.colwise().mean();

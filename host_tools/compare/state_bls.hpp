@@ -16,6 +16,9 @@ struct StateBlsShape {
   std::string activation = "tanh";      ///< of all nodes: tanh sigmoid relu sine
 };
 
+/// What a swarm's particle says: windows, nodes, enhancement, log10 of ridge and scale, activation.
+StateBlsShape state_bls_shape(const Eigen::VectorXd& particle);
+
 /// Features of standardised inputs, x within +-1 of the examples.
 ///   Z_i = phi(x W_i + b_i), H = xi(Z W_h + b_h), A = [Z, H]   (paper Eqs. 23-27)
 /// W_i, b_i: sparse autoencoder of the inputs (Chen, Liu 2018, which the paper names for its BLS); W_h, b_h random;

@@ -65,10 +65,11 @@ class Experiment {
   Experiment(const fs::path& project, const fs::path& directory, const VibrationOptions& options)
       : pipeline_(project, directory), options_(options), model_(with_tables()), plant_(scenario_plant()) {}
 
-  /// @param known of the host alone, whose controller it takes
+  /// @param known of the host alone, whose controller and encoders it takes
   VibrationResult with_drive(const VibrationResult& known, const Feedforward& drive) {
     const VibrationControl& control = known.control;
     settings_ = loop(control.bandwidth_hz, control.damping);
+    settings_.encoder_step = control.encoder_step;
     instants_ = {control.settling_band, control.late_s};
     ClosedLoopSettings settings = settings_;
     settings.drive = drive.torque;
@@ -80,14 +81,8 @@ class Experiment {
     std::vector<Move> moves = make_moves(model_, model_.tick_s, judged_moves);
     const bool all = drive.most_moves == 0 || drive.most_moves >= moves.size();
     if (!all) moves.erase(moves.begin() + static_cast<std::ptrdiff_t>(drive.most_moves), moves.end());
-    progress_.stage("vibration: the drive in the loop", moves.size() * driven.size());
-    std::vector<VibrationMethod> methods;
-    for (const VibrationMethod& method : known.methods) {
-      const std::string& name = method.feedforward;
-      const bool beside = name == "none" || std::any_of(driven.begin(), driven.end(),
-                                                        [&](const Method& other) { return other.name == name; });
-      if (beside && method.is_exact()) methods.push_back(method);
-    }
+    progress_.stage("vibration: the drive in the loop", moves.size() * (all ? driven.size() : 1 + 3 * driven.size()));
+    std::vector<VibrationMethod> methods = all ? host_rows(known, driven) : on_host(driven, moves);
     for (const Method& method : driven) {
       std::vector<Plan> plans;
       std::vector<Outcome> outcomes;
@@ -139,6 +134,30 @@ class Experiment {
   }
 
  private:
+  /// What is known of the PD alone and of what a drive has, over all moves.
+  static std::vector<VibrationMethod> host_rows(const VibrationResult& known, const std::vector<Method>& driven) {
+    std::vector<VibrationMethod> rows;
+    for (const VibrationMethod& method : known.methods) {
+      const std::string& name = method.feedforward;
+      const bool beside = name == "none" || std::any_of(driven.begin(), driven.end(),
+                                                        [&](const Method& other) { return other.name == name; });
+      if (beside && method.is_exact()) rows.push_back(method);
+    }
+    return rows;
+  }
+
+  /// The same over some moves alone: what is known are means over all of them.
+  std::vector<VibrationMethod> on_host(const std::vector<Method>& driven, const std::vector<Move>& moves) {
+    std::vector<VibrationMethod> rows{judge({.name = "none"}, moves)};
+    for (const char* numbers : {"fixed", "real"}) {
+      for (Method method : driven) {
+        method.numbers = numbers;
+        rows.push_back(judge(method, moves));
+      }
+    }
+    return rows;
+  }
+
   /// The models with their parameters off.
   struct Wrong {
     std::string off;

@@ -35,12 +35,15 @@ class Wrong(Exception):
 # --- the list ---------------------------------------------------------------------------------------------------------
 
 def spread(file, group):
-    """The figures of a [[figures]]: of a column's rows, or of a row's columns."""
+    """The figures of a [[figures]]: of a column's rows, of a row's columns, or of all cells of both."""
     which = [key for key in ('rows', 'columns') if key in group]
-    if len(which) != 1:
+    if not which:
         raise Wrong(f'{file}: figures of {group.get("page")}: give rows or columns')
-    common = {key: value for key, value in group.items() if key != which[0]}
-    return [{**common, which[0][:-1]: place, 'path': path} for place, path in group[which[0]].items()]
+    common = {key: value for key, value in group.items() if key not in which}
+    if len(which) == 1:
+        return [{**common, which[0][:-1]: place, 'path': path} for place, path in group[which[0]].items()]
+    return [{**common, 'row': row, 'column': column, 'path': begin + end}
+            for row, begin in group['rows'].items() for column, end in group['columns'].items()]
 
 
 def read_list(file):
@@ -177,12 +180,12 @@ def step_into(values, part):
     return out
 
 
-REDUCE = {'mean': lambda v: sum(v) / len(v), 'max': max, 'count': len,
+REDUCE = {'mean': lambda v: sum(v) / len(v), 'min': min, 'max': max, 'count': len,
           'geomean': lambda v: math.exp(sum(math.log(x) for x in v) / len(v))}
 
 
 def value_at(result, path):
-    """The number at a path as methods[name=lugre].rmse[0]; mean(..), max(..), count(..), geomean(..) of several."""
+    """The number at a path as methods[name=lugre].rmse[0]; mean(..), min(..), max(..), count(..), geomean(..) of several."""
     if match := re.fullmatch(r'(\w+)\((.*)\)', path):
         reduce, path = REDUCE[match.group(1)], match.group(2)
     else:

@@ -160,6 +160,11 @@ class Figures(unittest.TestCase):
             (toy.root / 'list.toml').write_text('[[project]]\nname = "toy"\ncommands = ["{out}"]\n' + group + more)
             self.assertEqual(toy.run(), complaints, more)
             self.assertEqual(toy.out.getvalue().count('page: '), 2)
+        cells = ('rows = { rigid = "methods[name=rigid]", named = "methods[name=named]" }\n'
+                 'columns = { "error, %" = ".percent", "N m" = ".rmse[1]" }')
+        (toy.root / 'list.toml').write_text('[[project]]\nname = "toy"\ncommands = ["{out}"]\n' + group + cells)
+        self.assertEqual(toy.run(), 1)  # 5 N m of `named` are worse than 1.1e-6
+        self.assertEqual(toy.out.getvalue().count('page: '), 4)
         (toy.root / 'list.toml').write_text('[[project]]\nname = "toy"\ncommands = ["{out}"]\n' + group)
         with self.assertRaisesRegex(figures.Wrong, 'rows or columns'):
             toy.run()
