@@ -13,8 +13,10 @@
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/project/log_entries.hpp"
+#include "host_tools/signals/time_unit.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
+#include "host_tools/support/pipes.hpp"
 #include "host_tools/support/toml.hpp"
 
 namespace fxdyn {
@@ -40,6 +42,7 @@ Names known_effects() {
 }
 
 const Names signal_names{"t", "q", "dq", "ddq", "tau", "qlink", "temp"};
+const Names unit_names{"s", "ms", "us", "ns"};
 const Names role_names{"baseline", "train", "validate", "test"};
 const Names method_names{"ls", "wls", "irls", "rls"};
 const Names input_names{"physical", "bristles", "extended", "state"}, feature_names{"random", "sparse"};
@@ -108,9 +111,12 @@ class ProjectReader {
     return text.replace(from, to - from + 1, set != nullptr ? set : inner.substr(split + 2));
   }
 
-  fs::path path(const Value& value) const {
-    const fs::path path = (project_.file.parent_path() / expand(value)).lexically_normal();
-    if (!fs::is_regular_file(path)) {
+  /// `pipes`: "-" (standard input) and a FIFO are files, too.
+  fs::path path(const Value& value, bool pipes = false) const {
+    const std::string text = with_home(expand(value));
+    if (pipes && text == "-") return text;
+    const fs::path path = (project_.file.parent_path() / text).lexically_normal();
+    if (!fs::is_regular_file(path) && !(pipes && is_pipe(path))) {
       value.place().fail(fmt::format("no file '{}'; paths are relative to the project file", path.string()));
     }
     return path;
@@ -166,9 +172,19 @@ class ProjectReader {
   LogFormat read_format(Table& table, LogFormat format) {
     if (auto columns = table.table("columns")) {
       for (const std::string& signal : signal_names) {
-        if (const auto value = columns->find(signal)) format.columns[signal] = value->string();
+        const auto value = columns->find(signal);
+        if (!value) continue;
+        const auto before = signal == "t" ? format.columns.find("t") : format.columns.end();
+        format.columns[signal] = before == format.columns.end()
+                                     ? value->string()
+                                     : with_name(before->second, value->string());
       }
       columns->finish();
+    }
+    if (const auto unit = table.find("time_unit")) {
+      const auto named = format.columns.find("t");
+      const std::string column = named == format.columns.end() ? "t" : without_unit(named->second).first;
+      format.columns["t"] = with_unit(column, unit->name(unit_names, "unit of time"));
     }
     set(format.torque_gain, table.find("torque_gain"), [this](const Value& v) {
       const std::vector<double> gains = v.numbers(joints(), per_joint());
@@ -336,7 +352,7 @@ class ProjectReader {
     if (file.has_value() == scenario.has_value())
       table.place().fail("needs either file or scenario (with log = \"name\")");
     if (file) {
-      entry.file = path(*file);
+      entry.file = path(*file, true);
       if (log) log->place().fail("belongs to a scenario; remove it");
     } else {
       entry.scenario = path(*scenario);
