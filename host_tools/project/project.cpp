@@ -327,6 +327,10 @@ class ProjectReader {
       project_.target.tick_s = tick->positive();
       if (project_.target.tick_s < 5e-5 || project_.target.tick_s > 0.1) tick->place().fail("expected 5e-5 .. 0.1 s");
     }
+    if (const auto error = table.find("accept_error")) {
+      project_.target.accept_error = error->positive();
+      if (project_.target.accept_error > 1) error->place().fail("expected a share of rated torque, at most 1");
+    }
     if (const auto sequence = table.find("sequence")) {
       constexpr std::int64_t highest = 0x7FFF'FFFF;  // leaves room for updates
       const std::int64_t number = sequence->integer(1);
