@@ -68,10 +68,13 @@ Finding memory() {
   }
   const double mb = available_kb / 1024;
   const bool good = mb == 0 || mb >= enough_memory_mb;  // 0: this kernel does not say
-  return {"run, diagnose, train", fmt::format("{:.0f} MB of memory", enough_memory_mb),
-          good ? (mb == 0 ? "not known" : fmt::format("{:.0f} MB free, {} threads", mb, std::thread::hardware_concurrency()))
-               : "",
-          fmt::format("ps aux --sort=-rss | head  # only {:.0f} MB are free; shorter logs (from_s, to_s) need less", mb), true};
+  return {
+      "run, diagnose, train", fmt::format("{:.0f} MB of memory", enough_memory_mb),
+      good
+          ? (mb == 0 ? "not known" : fmt::format("{:.0f} MB free, {} threads", mb, std::thread::hardware_concurrency()))
+          : "",
+      fmt::format("ps aux --sort=-rss | head  # only {:.0f} MB are free; shorter logs (from_s, to_s) need less", mb),
+      true};
 }
 
 /// fxdyn itself writes numbers with a point whatever the locale; a missing one makes other programs complain.
@@ -102,8 +105,8 @@ Finding can_interface() {
     if (type == ARPHRD_CAN) names += (names.empty() ? "" : ", ") + entry.path().filename().string();
   }
   return {used_by, "a CAN interface", names,
-          as_root("ip link set can0 up type can bitrate 1000000") + "  # without hardware: " +
-              as_root("ip link add vcan0 type vcan && ") + as_root("ip link set vcan0 up")};
+          as_root("ip link set can0 up type can bitrate 1000000") +
+              "  # without hardware: " + as_root("ip link add vcan0 type vcan && ") + as_root("ip link set vcan0 up")};
 }
 
 Finding gpio_chip() {
@@ -122,7 +125,8 @@ Finding gpio_chip() {
 }
 
 std::vector<Finding> findings() {
-  std::vector<Finding> out{needs_program("run, report, excite, forward", "gnuplot", "gnuplot-nox"), temporary_folder(), memory()};
+  std::vector<Finding> out{needs_program("run, report, excite, forward", "gnuplot", "gnuplot-nox"), temporary_folder(),
+                           memory()};
   out.front().host = true;
   out.push_back(locale());
   out.push_back(needs_program("building fxdyn", "g++", "g++"));

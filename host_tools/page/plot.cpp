@@ -31,9 +31,10 @@ class TemporaryDirectory {
     const char* set = std::getenv("TMPDIR");
     std::string name = (fs::path(set != nullptr && *set != '\0' ? set : "/tmp") / "fxdyn-plots-XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr)
-      throw InputError(fmt::format("{}: can't be made: {}; plots need a folder there: set TMPDIR to one that can be "
-                                   "written",
-                                   name, std::strerror(errno)));
+      throw InputError(
+          fmt::format("{}: can't be made: {}; plots need a folder there: set TMPDIR to one that can be "
+                      "written",
+                      name, std::strerror(errno)));
     path_ = name;
   }
   ~TemporaryDirectory() {

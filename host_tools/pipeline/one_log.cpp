@@ -49,14 +49,14 @@ std::size_t widest_name(const Robot& robot) {
 std::string payload_table(const PayloadResult& result, const Robot& robot) {
   std::string out = fmt::format("load on {}, in that link's URDF frame (+-: one standard deviation)\n", result.link);
   for (const PayloadResult::Parameter& p : result.parameters) {
-    out += fmt::format("  {:<6}{:<28}{}\n", p.name,
-                       fmt::format("{} {}", p.identifiable ? with_deviation(p.value, p.std) : fmt::format("{:.3g}", p.value),
-                                   p.unit),
-                       p.identifiable ? "" : "a guess: this motion does not tell it");
+    out += fmt::format(
+        "  {:<6}{:<28}{}\n", p.name,
+        fmt::format("{} {}", p.identifiable ? with_deviation(p.value, p.std) : fmt::format("{:.3g}", p.value), p.unit),
+        p.identifiable ? "" : "a guess: this motion does not tell it");
   }
   const std::size_t width = widest_name(robot);
-  out += fmt::format("torque that the model misses (RMS), and friction with the load\n  {:<{}}{:>10}{:>10}  {:<5}{}\n", "joint",
-                     width, "without", "with it", "", "change of Coulomb friction");
+  out += fmt::format("torque that the model misses (RMS), and friction with the load\n  {:<{}}{:>10}{:>10}  {:<5}{}\n",
+                     "joint", width, "without", "with it", "", "change of Coulomb friction");
   for (const PayloadResult::Joint& joint : result.joints) {
     out += fmt::format("  {:<{}}{:>10.4g}{:>10.4g}  {:<5}{}\n", joint.name, width, joint.residual_before,
                        joint.residual_with_model, joint.unit,
@@ -68,8 +68,8 @@ std::string payload_table(const PayloadResult& result, const Robot& robot) {
 /// Errors of a prediction: bias and standard deviation make up the RMSE.
 std::string prediction_table(const LogErrors& errors, const Robot& robot) {
   const std::size_t width = widest_name(robot);
-  std::string out = fmt::format("measured minus predicted torque over {}\n  {:<{}}{:>10}{:>10}{:>12}  {:<5}{}\n", errors.file,
-                                "joint", width, "RMSE", "bias", "deviation", "", "RMSE of the RMS torque");
+  std::string out = fmt::format("measured minus predicted torque over {}\n  {:<{}}{:>10}{:>10}{:>12}  {:<5}{}\n",
+                                errors.file, "joint", width, "RMSE", "bias", "deviation", "", "RMSE of the RMS torque");
   for (const auto& [name, unit, m] : errors.joints) {
     out += fmt::format("  {:<{}}{:>10.4g}{:>10.2g}{:>12.4g}  {:<5}{:.2f} %\n", name, width, m.rmse, m.bias,
                        std::sqrt(std::max(0.0, m.rmse * m.rmse - m.bias * m.bias)), unit, 100 * m.relative);

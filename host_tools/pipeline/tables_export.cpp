@@ -60,16 +60,18 @@ void check_errors(const IdentifiedModel& model, const Observed& observed, const 
         "narrow the project's [limits] to what the robot does, check that URDF and log are of one robot, or accept it "
         "with [target] accept_error";
     if (!(error / rated <= observed_share * accepted)) {
-      throw DataError(fmt::format("{}: fixed point is off by {:.2g} % of rated torque ({:.2g} % on the logs), more than "
-                                  "{:.2g} %: no tables are written; {} = {:.1g}",
-                                  joint, 100 * error / rated, 100 * observed.on_logs.largest[k] / rated,
-                                  100 * observed_share * accepted, advice, round_up(error / rated / observed_share)));
+      throw DataError(
+          fmt::format("{}: fixed point is off by {:.2g} % of rated torque ({:.2g} % on the logs), more than "
+                      "{:.2g} %: no tables are written; {} = {:.1g}",
+                      joint, 100 * error / rated, 100 * observed.on_logs.largest[k] / rated,
+                      100 * observed_share * accepted, advice, round_up(error / rated / observed_share)));
     }
     if (!(proof.error[k] / rated <= accepted)) {
-      throw DataError(fmt::format("{}: fixed point is proven to stay within {:.2g} % of rated torque only ({:.2g} % "
-                                  "observed), more than {:.2g} %: no tables are written; {} = {:.1g}",
-                                  joint, 100 * proof.error[k] / rated, 100 * error / rated, 100 * accepted, advice,
-                                  round_up(proof.error[k] / rated)));
+      throw DataError(
+          fmt::format("{}: fixed point is proven to stay within {:.2g} % of rated torque only ({:.2g} % "
+                      "observed), more than {:.2g} %: no tables are written; {} = {:.1g}",
+                      joint, 100 * proof.error[k] / rated, 100 * error / rated, 100 * accepted, advice,
+                      round_up(proof.error[k] / rated)));
     }
   }
 }

@@ -175,9 +175,8 @@ class ProjectReader {
         const auto value = columns->find(signal);
         if (!value) continue;
         const auto before = signal == "t" ? format.columns.find("t") : format.columns.end();
-        format.columns[signal] = before == format.columns.end()
-                                     ? value->string()
-                                     : with_name(before->second, value->string());
+        format.columns[signal] =
+            before == format.columns.end() ? value->string() : with_name(before->second, value->string());
       }
       columns->finish();
     }

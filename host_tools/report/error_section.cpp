@@ -34,7 +34,8 @@ std::string error_section(const ReportInput& input, const json& result) {
   }
   std::string out = section(fmt::format("Error on the {} logs", input.results.role)) + table.html();
   out += paragraph(
-      "RMSE between measured and predicted torque, both filtered alike, over all logs of the role. Of RMS torque: 100 % "
+      "RMSE between measured and predicted torque, both filtered alike, over all logs of the role. Of RMS torque: 100 "
+      "% "
       "is what predicting zero would give. White noise: what white noise of the torque signal leaves after the filter, "
       "from what lies above the cut-off. An error close to it leaves little to learn; noise that is not white is not "
       "in it (see the noise floor under Diagnosis).");

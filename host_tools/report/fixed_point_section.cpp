@@ -82,7 +82,8 @@ std::string fixed_point_section(const ReportInput& input, const json& file) {
   }
   return out + limits(input.model) + "<h3>Formats</h3>\n" + formats.html() +
          paragraph(
-             "How each kind of number is stored: an integer of so many bits, of which the fractional ones come after the "
+             "How each kind of number is stored: an integer of so many bits, of which the fractional ones come after "
+             "the "
              "point. Step: the smallest difference it can hold. Range: the largest number, in the quantity's SI unit.");
 }
 

@@ -44,7 +44,8 @@ std::string replay_section(const ReportInput&, const nlohmann::json& file) {
   return out + table.html() +
          paragraph(
              "Different: ticks in which a torque is not the host's bit for bit. Saturations: numbers that left their "
-             "format and were held at its end; perturbed streams are made to do that. Instructions are counted by QEMU and "
+             "format and were held at its end; perturbed streams are made to do that. Instructions are counted by QEMU "
+             "and "
              "are no cycles. The last column: largest difference from the model in double, of rated torque.");
 }
 

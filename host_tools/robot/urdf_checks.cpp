@@ -49,7 +49,8 @@ class Checker {
         }
       }
     }
-    for (const TiXmlElement* e = root_.FirstChildElement("joint"); e; e = e->NextSiblingElement("joint")) check_joint(*e);
+    for (const TiXmlElement* e = root_.FirstChildElement("joint"); e; e = e->NextSiblingElement("joint"))
+      check_joint(*e);
     for (const TiXmlElement* e = root_.FirstChildElement("link"); e; e = e->NextSiblingElement("link")) check_link(*e);
   }
 
@@ -65,8 +66,8 @@ class Checker {
       macro = macro || value.find("${") != std::string_view::npos || value.find("$(") != std::string_view::npos;
     }
     if (macro) {
-      throw InputError(fmt::format("{}:{}: is a xacro file, not yet a URDF: expand it, as in xacro {} > robot.urdf", file_,
-                                   element.Row(), file_));
+      throw InputError(fmt::format("{}:{}: is a xacro file, not yet a URDF: expand it, as in xacro {} > robot.urdf",
+                                   file_, element.Row(), file_));
     }
     for (const TiXmlElement* e = element.FirstChildElement(); e; e = e->NextSiblingElement()) refuse_macros(*e);
   }
@@ -74,9 +75,10 @@ class Checker {
   void check_joint(const TiXmlElement& joint) const {
     const std::string_view type = text_of(joint, "type");
     if ((type == "revolute" || type == "prismatic") && joint.FirstChildElement("limit") == nullptr) {
-      throw InputError(fmt::format("{}: is {} and has no <limit>; add its limits, as in <limit lower=\"-3\" upper=\"3\"/>"
-                                   "{}",
-                                   where(joint, joint), type, type == "revolute" ? ", or make it continuous" : ""));
+      throw InputError(
+          fmt::format("{}: is {} and has no <limit>; add its limits, as in <limit lower=\"-3\" upper=\"3\"/>"
+                      "{}",
+                      where(joint, joint), type, type == "revolute" ? ", or make it continuous" : ""));
     }
     const TiXmlElement* origin = joint.FirstChildElement("origin");
     check_angles(origin, joint);
@@ -84,9 +86,10 @@ class Checker {
     for (const double x : numbers(origin, "xyz")) squares += x * x;
     // The first one's may be where the robot stands in a hall.
     if (std::sqrt(squares) > longest_m && !stands_on_root(joint)) {
-      throw InputError(fmt::format("{}: origin is {:.4g} m from the joint before: millimetres? Lengths of a URDF are "
-                                   "metres: divide by 1000",
-                                   where(*origin, joint), std::sqrt(squares)));
+      throw InputError(
+          fmt::format("{}: origin is {:.4g} m from the joint before: millimetres? Lengths of a URDF are "
+                      "metres: divide by 1000",
+                      where(*origin, joint), std::sqrt(squares)));
     }
   }
 
@@ -123,9 +126,10 @@ class Checker {
     for (const char* moment : {"ixx", "iyy", "izz"}) {
       const std::vector<double> value = numbers(tensor, moment);
       if (value.empty() || !(std::sqrt(value[0] / kg[0]) > longest_m)) continue;
-      throw InputError(fmt::format("{}: {} of {:.4g} kg m^2 at {:.4g} kg is {:.4g} m of radius: kg mm^2? Inertias of a "
-                                   "URDF are kg m^2: divide by 1e6",
-                                   where(*tensor, link), moment, value[0], kg[0], std::sqrt(value[0] / kg[0])));
+      throw InputError(
+          fmt::format("{}: {} of {:.4g} kg m^2 at {:.4g} kg is {:.4g} m of radius: kg mm^2? Inertias of a "
+                      "URDF are kg m^2: divide by 1e6",
+                      where(*tensor, link), moment, value[0], kg[0], std::sqrt(value[0] / kg[0])));
     }
   }
 

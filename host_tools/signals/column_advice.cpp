@@ -28,7 +28,8 @@ std::vector<Names> families(const Names& columns, std::size_t joints) {
   for (const std::string& name : columns) {
     const std::string family = family_of(name);
     if (family.empty()) continue;
-    const auto found = std::find_if(out.begin(), out.end(), [&](const Names& one) { return family_of(one[0]) == family; });
+    const auto found =
+        std::find_if(out.begin(), out.end(), [&](const Names& one) { return family_of(one[0]) == family; });
     if (found == out.end())
       out.push_back({name});
     else

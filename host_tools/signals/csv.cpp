@@ -265,17 +265,19 @@ Header header_of(LineReader& lines, const std::string& where) {
   if (!ahead.next(first))
     throw InputError(where + ":1: empty file; the first line must name the columns (t,q1,...,tau1,...)");
   const std::string_view comment = ahead.comment();
-  const bool named_before = starts_with_number(trim(first)) && comment.find(',') != std::string_view::npos &&
-                            std::count(comment.begin(), comment.end(), ',') == std::count(first.begin(), first.end(), ',');
+  const bool named_before =
+      starts_with_number(trim(first)) && comment.find(',') != std::string_view::npos &&
+      std::count(comment.begin(), comment.end(), ',') == std::count(first.begin(), first.end(), ',');
   if (named_before) return Header(where, ahead.number() - 1, comment);
   lines = ahead;
   return Header(where, lines.number(), first);
 }
 
 void note_unit(const std::string& where, const TimeUnit& unit) {
-  note_once(fmt::format("{}: time stamps read as {}, by their steps; time_unit = \"{}\" in its [[log]] says it, or "
-                        "another of s, ms, us, ns",
-                        where, unit.name, unit.name));
+  note_once(
+      fmt::format("{}: time stamps read as {}, by their steps; time_unit = \"{}\" in its [[log]] says it, or "
+                  "another of s, ms, us, ns",
+                  where, unit.name, unit.name));
 }
 
 }  // namespace

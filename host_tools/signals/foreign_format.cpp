@@ -16,10 +16,12 @@ struct Format {
 constexpr std::array formats{
     Format{"PK\x03\x04"sv, "is a spreadsheet (xlsx, ods) or another zip archive: save it as CSV, or unzip it"},
     Format{"\xD0\xCF\x11\xE0"sv, "is an old spreadsheet (xls): save it as CSV"},
-    Format{"PAR1"sv, "is Parquet: write it as CSV, as in python3 -c \"import pandas; "
-                     "pandas.read_parquet('IN').to_csv('OUT.csv', index=False)\""},
-    Format{"ARROW1"sv, "is Feather (Arrow): write it as CSV, as in python3 -c \"import pandas; "
-                       "pandas.read_feather('IN').to_csv('OUT.csv', index=False)\""},
+    Format{"PAR1"sv,
+           "is Parquet: write it as CSV, as in python3 -c \"import pandas; "
+           "pandas.read_parquet('IN').to_csv('OUT.csv', index=False)\""},
+    Format{"ARROW1"sv,
+           "is Feather (Arrow): write it as CSV, as in python3 -c \"import pandas; "
+           "pandas.read_feather('IN').to_csv('OUT.csv', index=False)\""},
     Format{"\xFF\xFE"sv, "is UTF-16: convert it, as in iconv -f UTF-16 -t UTF-8 IN > OUT.csv"},
     Format{"\xFE\xFF"sv, "is UTF-16: convert it, as in iconv -f UTF-16 -t UTF-8 IN > OUT.csv"},
     Format{"\x89HDF\r\n"sv, "is HDF5 (a .mat file of MATLAB 7.3 is, too): write its signals as columns of a CSV"},

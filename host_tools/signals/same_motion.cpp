@@ -6,7 +6,8 @@
 namespace fxdyn {
 namespace {
 
-/// Steps of what is compared [rad | m], [N*m | N]: coarser than the rounding of an interpolation, finer than an encoder.
+/// Steps of what is compared [rad | m], [N*m | N]: coarser than the rounding of an interpolation, finer than an
+/// encoder.
 constexpr double position_step = 1e-7, torque_step = 1e-5;
 
 class Mixer {

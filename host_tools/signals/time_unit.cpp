@@ -80,12 +80,12 @@ TimeUnit unit_of_stamps(const std::vector<double>& stamps, const std::string& fi
     words.push_back(fmt::format("{} at {:.3g} samples a second", unit.name, unit.per_second / step));
   }
   if (possible.size() == 1) return possible.front();
-  throw InputError(fmt::format("{}: time stamps {:.6g} apart {}; write time_unit = \"{}\" (or another of s, ms, us, "
-                               "ns) into its [[log]], or into [signals]",
-                               file, step,
-                               possible.empty() ? "are in no unit of a robot's log"
-                                                : fmt::format("may be {}", fmt::join(words, " or ")),
-                               possible.empty() ? "s" : possible.front().name));
+  throw InputError(fmt::format(
+      "{}: time stamps {:.6g} apart {}; write time_unit = \"{}\" (or another of s, ms, us, "
+      "ns) into its [[log]], or into [signals]",
+      file, step,
+      possible.empty() ? "are in no unit of a robot's log" : fmt::format("may be {}", fmt::join(words, " or ")),
+      possible.empty() ? "s" : possible.front().name));
 }
 
 }  // namespace fxdyn

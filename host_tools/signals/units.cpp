@@ -77,10 +77,10 @@ void check_ranges(const Log& log, const std::vector<bool>& revolute, const std::
   }
   const auto count = static_cast<std::size_t>(std::count(revolute.begin(), revolute.end(), true));
   if (count < 3 || turning + 1 < count || widest > 800) return;
-  throw InputError(
-      fmt::format("{}: q looks like degrees ({} of {} joints turn more than twice), multiply by pi/180; or, if they are "
-                  "the motors' angles, divide by the gear ratios",
-                  where, turning, count));
+  throw InputError(fmt::format(
+      "{}: q looks like degrees ({} of {} joints turn more than twice), multiply by pi/180; or, if they are "
+      "the motors' angles, divide by the gear ratios",
+      where, turning, count));
 }
 
 /// Rows that are far apart while nothing moves faster than a crawl: milliseconds at a high rate.
@@ -98,10 +98,10 @@ void check_crawl(const Log& log, const std::vector<bool>& revolute, const std::s
     fastest = std::max(fastest, quantile((q.tail(n) - q.head(n)).cwiseAbs() / log.step_s, 0.99));
   }
   if (widest < moved || fastest > crawl) return;
-  throw InputError(
-      fmt::format("{}: t looks like milliseconds (as seconds no joint turns faster than {:.2g} rad/s); write time_unit = "
-                  "\"ms\" into its [[log]], or \"s\" if it is so slow",
-                  where, fastest));
+  throw InputError(fmt::format(
+      "{}: t looks like milliseconds (as seconds no joint turns faster than {:.2g} rad/s); write time_unit = "
+      "\"ms\" into its [[log]], or \"s\" if it is so slow",
+      where, fastest));
 }
 
 }  // namespace

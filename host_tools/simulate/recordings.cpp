@@ -71,9 +71,10 @@ class ReadLogs {
       const std::size_t common = rows_in_common(found->second, prints);
       const std::size_t shorter = std::min(found->second.size(), prints.size());
       if (common < fewest || static_cast<double>(common) < share_of_copy * static_cast<double>(shorter)) continue;
-      throw InputError(fmt::format("{}:{}: {} of its {} moving rows are those of the log in line {}, under other time "
-                                   "stamps: a copy can't judge what was fitted on it; record another motion",
-                                   project.file.string(), entry.line, common, prints.size(), other.line));
+      throw InputError(
+          fmt::format("{}:{}: {} of its {} moving rows are those of the log in line {}, under other time "
+                      "stamps: a copy can't judge what was fitted on it; record another motion",
+                      project.file.string(), entry.line, common, prints.size(), other.line));
     }
     known[entry.line] = std::move(prints);
   }
@@ -100,10 +101,10 @@ void check_turns(const Log& log, const Robot& robot) {
       throw InputError(fmt::format("{}: q{} looks like the motor's angle ({}), divide by the gear ratio",
                                    log.file.string(), i + 1, seen));
     }
-    throw InputError(
-        fmt::format("{}: q{} looks like degrees ({}), multiply by pi/180; or, if it is the motor's angle, divide by the "
-                    "gear ratio",
-                    log.file.string(), i + 1, seen));
+    throw InputError(fmt::format(
+        "{}: q{} looks like degrees ({}), multiply by pi/180; or, if it is the motor's angle, divide by the "
+        "gear ratio",
+        log.file.string(), i + 1, seen));
   }
 }
 

@@ -64,8 +64,8 @@ void check_writable(const std::filesystem::path& directory) {
     }
     why = errno == EACCES ? "is not yours to write to" : fmt::format("takes no folder ({})", std::strerror(errno));
   }
-  throw InputError(fmt::format("{}: can't be written: {} {}; choose another --out", directory.string(), there.string(),
-                               why));
+  throw InputError(
+      fmt::format("{}: can't be written: {} {}; choose another --out", directory.string(), there.string(), why));
 }
 
 namespace {

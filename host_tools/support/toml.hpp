@@ -31,7 +31,8 @@ inline std::string other_file(const std::filesystem::path& file) {
   if (line.find('<') < 4) return "is XML (a URDF?)";
   if (line.find('\0') != std::string::npos) return "is no text";
   if (line.starts_with('{')) return "is JSON";
-  if (std::count(line.begin(), line.end(), ',') > 1 && line.find('=') == std::string::npos) return "is a table (a log?)";
+  if (std::count(line.begin(), line.end(), ',') > 1 && line.find('=') == std::string::npos)
+    return "is a table (a log?)";
   return "";
 }
 

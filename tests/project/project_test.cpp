@@ -244,8 +244,7 @@ TEST(Project, JointsWithStopsDoNotTurnFarBeyondThem) {
   std::string csv = "t,q1,q2,tau1,tau2\n";
   const auto expect_named = [&](int range, const std::string& words) {
     std::string text = csv;
-    for (int i = 0; i < 100; ++i)
-      text += std::to_string(0.1 * i) + ",0," + std::to_string(i % range) + ",0,0\n";
+    for (int i = 0; i < 100; ++i) text += std::to_string(0.1 * i) + ",0," + std::to_string(i % range) + ",0,0\n";
     write("degrees.csv", text);
     const auto file = write_project("degrees", robot + "[[log]]\nfile = \"degrees.csv\"\nrole = \"train\"\n");
     test::expect_refused("degrees.csv", {words, "'j2' has 2 rad"},

@@ -86,7 +86,10 @@ TEST(TextFile, OtherFormatsAreNamed) {
   using namespace std::string_view_literals;
   holds("PAR1\x15\x04"sv, "Parquet");
   holds("\xFF\xFEt\0,\0"sv, "UTF-16");
-  holds("t\0,\0q\0" "1\0\n\0"sv, "UTF-16 without a mark");
+  holds(
+      "t\0,\0q\0"
+      "1\0\n\0"sv,
+      "UTF-16 without a mark");
   holds("t,q1\n\0\0\1"sv, "binary");
   EXPECT_EQ(foreign_format("t,q1\n0,1\n"), "");
   EXPECT_EQ(foreign_format(""), "");
