@@ -98,8 +98,9 @@ void check_turns(const Log& log, const Robot& robot) {
     if (allowed <= 0 || range < 4 * std::numbers::pi || range < 1.5 * allowed) continue;
     const std::string seen = fmt::format("range {:.3g}, joint '{}' has {:.3g} rad", range, joint.name, allowed);
     if (range * std::numbers::pi / 180 > 1.2 * allowed) {  // too far in degrees, too
-      throw InputError(fmt::format("{}: q{} looks like the motor's angle ({}), divide by the gear ratio (position_gain)",
-                                   log.file.string(), i + 1, seen));
+      throw InputError(
+          fmt::format("{}: q{} looks like the motor's angle ({}), divide by the gear ratio (position_gain)",
+                      log.file.string(), i + 1, seen));
     }
     throw InputError(fmt::format(
         "{}: q{} looks like degrees ({}), multiply by pi/180; or, if it is the motor's angle, divide by the "
