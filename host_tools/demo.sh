@@ -21,7 +21,8 @@ step "packages"
 "$root/toolchains/setup.sh"
 
 step "building fxdyn"
-(cd "$root" && cmake --preset host >/dev/null && cmake --build --preset host --target fxdyn)
+"$root/toolchains/configure.sh" host
+(cd "$root" && cmake --build --preset host --target fxdyn)
 
 step "from the logs to the tables"
 "$fxdyn" run "$project" --out "$out" >/dev/null  # its table comes again below, with the firmware's figures

@@ -20,7 +20,7 @@ jobs=$(nproc)
 # build PRESET [TARGET]
 build() {
   step "building $1"
-  cmake --preset "$1" >/dev/null
+  toolchains/configure.sh "$1"
   cmake --build --preset "$1" ${2:+--target "$2"}
 }
 

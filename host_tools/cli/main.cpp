@@ -1,20 +1,44 @@
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <map>
+#include <new>
 
 #include "host_tools/cli/verb.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/heap.hpp"
+#include "host_tools/support/pipes.hpp"
 #include "model/version.hpp"
 
 namespace {
 
 using namespace fxdyn;
 
+/// Messages quote what stands in a file: one line, and nothing that a terminal acts upon.
+std::string one_line(std::string text) {
+  for (char& c : text) {
+    if (c == '\n' || c == '\r' || c == '\t') c = ' ';
+    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = '?';
+  }
+  return text;
+}
+
+/// The arguments, with "~" as a shell has it: of "--out=~/x" it leaves that to the program.
+std::vector<std::string> words_of(int argc, char** argv) {
+  std::vector<std::string> words;
+  for (int i = argc - 1; i > 0; --i) {  // CLI11 takes them from the back
+    const std::string word = argv[i];
+    const std::size_t value = word.starts_with("--") ? word.find('=') + 1 : 0;
+    words.push_back(word.substr(0, value) + with_home(word.substr(value)));
+  }
+  return words;
+}
+
 int run(int argc, char** argv) {
   CLI::App app{
       "fxdyn: from a robot's measured log to torque feedforward on its drive controllers.\n"
-      "Example: fxdyn run robot.toml --out out/robot"};
+      "Example: fxdyn run robot.toml --out out/robot",
+      "fxdyn"};
   app.set_version_flag("--version", version);
   app.require_subcommand(1);
   app.failure_message([](const CLI::App*, const CLI::Error& error) {
@@ -28,7 +52,7 @@ int run(int argc, char** argv) {
   }
 
   try {
-    app.parse(argc, argv);
+    app.parse(words_of(argc, argv));
   } catch (const CLI::ParseError& error) {
     // What is missing is missing because of the word that is misspelt.
     const auto unknown = app.remaining(true);
@@ -48,16 +72,23 @@ int run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   fxdyn::keep_freed_memory();
+  const auto complain = [](const std::string& what) { fmt::print(stderr, "fxdyn: {}\n", one_line(what)); };
   try {
     return run(argc, argv);
   } catch (const fxdyn::InputError& error) {
-    fmt::print(stderr, "fxdyn: {}\n", error.what());
+    complain(error.what());
     return 2;
   } catch (const fxdyn::DataError& error) {
-    fmt::print(stderr, "fxdyn: {}\n", error.what());
+    complain(error.what());
     return 1;
+  } catch (const std::bad_alloc&) {
+    complain("not enough memory: cut the logs by from_s and to_s, or free some");
+    return 2;
+  } catch (const std::filesystem::filesystem_error& error) {
+    complain(fmt::format("{}: {}", error.path1().string(), error.code().message()));
+    return 2;
   } catch (const std::exception& error) {
-    fmt::print(stderr, "fxdyn: internal error: {}\n", error.what());
+    complain(fmt::format("internal error: {}", error.what()));
     return 2;
   }
 }

@@ -97,8 +97,8 @@ Action add_predict(CLI::App& verb) {
   verb.add_flag("--raw", options->raw, "torque as computed, with the noise of q; default: below the torque's cut-off");
   verb.add_option("--out", options->out, "directory for the prediction")->required();
   return [options] {
-    predict_log(options->model, options->log, {.fixed = options->numbers == "fixed", .raw = options->raw},
-                options->out);
+    fmt::print("{}", predict_log(options->model, options->log,
+                                 {.fixed = options->numbers == "fixed", .raw = options->raw}, options->out));
     fmt::print("prediction in {}\n", options->out);
   };
 }
@@ -144,7 +144,7 @@ Action add_payload(CLI::App& verb) {
   verb.add_option("--log", options->log, "log (CSV) recorded with the load")->required();
   verb.add_option("--out", options->out, "directory for the results")->required();
   return [options] {
-    identify_payload(options->model, options->log, options->out);
+    fmt::print("{}", identify_payload(options->model, options->log, options->out));
     fmt::print("load in {0}/payload.json, model with it in {0}/model.json\n", options->out);
   };
 }

@@ -47,6 +47,7 @@ std::span<const Verb> verbs() {
       Verb{"payload", "Load on the last link from a log recorded with it: payload.json, and the model with it.",
            "--model out/robot/model.json --log loaded.csv --out out/loaded", add_payload},
       Verb{"effects", "List the effects that the model knows.", "--json", add_effects},
+      Verb{"doctor", "What this machine lacks for which verb, and the command that installs it.", "", add_doctor},
   };
   return all;
 }

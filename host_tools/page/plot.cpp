@@ -28,9 +28,13 @@ namespace fs = std::filesystem;
 class TemporaryDirectory {
  public:
   TemporaryDirectory() {
-    std::string name = (fs::temp_directory_path() / "fxdyn-plots-XXXXXX").string();
+    const char* set = std::getenv("TMPDIR");
+    std::string name = (fs::path(set != nullptr && *set != '\0' ? set : "/tmp") / "fxdyn-plots-XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr)
-      throw InputError(fmt::format("{}: can't be made: {}", name, std::strerror(errno)));
+      throw InputError(
+          fmt::format("{}: can't be made: {}; plots need a folder there: set TMPDIR to one that can be "
+                      "written",
+                      name, std::strerror(errno)));
     path_ = name;
   }
   ~TemporaryDirectory() {

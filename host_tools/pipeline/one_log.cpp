@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "host_tools/effects/identified_model.hpp"
@@ -29,7 +31,62 @@ Log read_log_for(const IdentifiedModel& model, const fs::path& file, std::option
       file.string()));
 }
 
-void identify_payload(const fs::path& model_file, const fs::path& log_file, const fs::path& directory) {
+namespace {
+
+/// "0.512 +- 0.003", of digits that the deviation leaves.
+std::string with_deviation(double value, double std) {
+  if (!(std > 0)) return fmt::format("{:.4g}", value);
+  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(std))), 0, 9);
+  return fmt::format("{:.{}f} +- {:.{}f}", value, decimals, std, decimals);
+}
+
+std::size_t widest_name(const Robot& robot) {
+  std::size_t width = 6;
+  for (const Joint& joint : robot.joints) width = std::max(width, joint.name.size() + 2);
+  return width;
+}
+
+std::string payload_table(const PayloadResult& result, const Robot& robot) {
+  std::string out = fmt::format("load on {}, in that link's URDF frame (+-: one standard deviation)\n", result.link);
+  for (const PayloadResult::Parameter& p : result.parameters) {
+    out += fmt::format(
+        "  {:<6}{:<28}{}\n", p.name,
+        fmt::format("{} {}", p.identifiable ? with_deviation(p.value, p.std) : fmt::format("{:.3g}", p.value), p.unit),
+        p.identifiable ? "" : "a guess: this motion does not tell it");
+  }
+  const std::size_t width = widest_name(robot);
+  out += fmt::format("torque that the model misses (RMS), and friction with the load\n  {:<{}}{:>10}{:>10}  {:<5}{}\n",
+                     "joint", width, "without", "with it", "", "change of Coulomb friction");
+  for (const PayloadResult::Joint& joint : result.joints) {
+    out += fmt::format("  {:<{}}{:>10.4g}{:>10.4g}  {:<5}{}\n", joint.name, width, joint.residual_before,
+                       joint.residual_with_model, joint.unit,
+                       with_deviation(joint.coulomb_change, joint.coulomb_change_std));
+  }
+  return out;
+}
+
+/// Errors of a prediction: bias and standard deviation make up the RMSE.
+std::string prediction_table(const LogErrors& errors, const Robot& robot) {
+  const std::size_t width = widest_name(robot);
+  std::string out = fmt::format("measured minus predicted torque over {}\n  {:<{}}{:>10}{:>10}{:>12}  {:<5}{}\n",
+                                errors.file, "joint", width, "RMSE", "bias", "deviation", "", "RMSE of the RMS torque");
+  for (const auto& [name, unit, m] : errors.joints) {
+    out += fmt::format("  {:<{}}{:>10.4g}{:>10.2g}{:>12.4g}  {:<5}{:.2f} %\n", name, width, m.rmse, m.bias,
+                       std::sqrt(std::max(0.0, m.rmse * m.rmse - m.bias * m.bias)), unit, 100 * m.relative);
+  }
+  return out;
+}
+
+/// Of the prediction: CSV, whatever the log was packed in.
+fs::path prediction_name(const fs::path& log_file) {
+  if (log_file == "-") return "stdin.csv";
+  const fs::path name = log_file.filename();
+  return name.extension() == ".gz" ? name.stem() : name;
+}
+
+}  // namespace
+
+std::string identify_payload(const fs::path& model_file, const fs::path& log_file, const fs::path& directory) {
   IdentifiedModel model = read_model(model_file);
   std::error_code ignored;
   if (fs::equivalent(directory / "model.json", model_file, ignored)) {
@@ -43,10 +100,11 @@ void identify_payload(const fs::path& model_file, const fs::path& log_file, cons
   const PayloadResult report = payload_result(fit, model.robot);
   write_file(directory / "model.json", to_json(model).dump(1) + "\n");
   write_file(directory / "payload.json", to_json(report).dump(1) + "\n");
+  return payload_table(report, model.robot);
 }
 
-void predict_log(const fs::path& model_file, const fs::path& log_file, const Prediction& how,
-                 const fs::path& directory) {
+std::string predict_log(const fs::path& model_file, const fs::path& log_file, const Prediction& how,
+                        const fs::path& directory) {
   const IdentifiedModel model = read_model(model_file);
   // The run's own metrics.json must survive.
   if (fs::exists(directory / "model.json")) {
@@ -70,7 +128,7 @@ void predict_log(const fs::path& model_file, const fs::path& log_file, const Pre
   } else {
     torque = predict(model, processed);
   }
-  const fs::path out = directory / log_file.filename();
+  const fs::path out = directory / prediction_name(log_file);
   std::error_code ignored;
   if (fs::equivalent(out, log_file, ignored)) {
     throw InputError(fmt::format("{}: would be overwritten by its prediction; choose another --out", out.string()));
@@ -84,6 +142,7 @@ void predict_log(const fs::path& model_file, const fs::path& log_file, const Pre
   if (processed.tau.size() > 0) errors.push_back(errors_of(processed, model.robot, torque));
   const MetricsResult metrics{.logs = errors, .numbers = how.fixed ? "fixed" : "real"};
   write_file(directory / "metrics.json", to_json(metrics).dump(1) + "\n");
+  return errors.empty() ? "no torque in the log: nothing to compare with\n" : prediction_table(errors[0], model.robot);
 }
 
 }  // namespace fxdyn

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "host_tools/effects/forward.hpp"
 #include "host_tools/signals/log.hpp"
@@ -18,12 +19,12 @@ struct Prediction {
   bool raw = false;    ///< as computed; else below the torque's cut-off, which the fit saw: above it is noise of q
 };
 
-/// `fxdyn predict`: torque of the model over one log.
-void predict_log(const std::filesystem::path& model, const std::filesystem::path& log, const Prediction& how,
-                 const std::filesystem::path& directory);
+/// `fxdyn predict`: torque of the model over one log, in DIR/<name of the log>.csv; the errors as a table for people.
+std::string predict_log(const std::filesystem::path& model, const std::filesystem::path& log, const Prediction& how,
+                        const std::filesystem::path& directory);
 
-/// `fxdyn payload`: the load of a second log, payload.json and the model with it, model.json.
-void identify_payload(const std::filesystem::path& model, const std::filesystem::path& log,
-                      const std::filesystem::path& directory);
+/// `fxdyn payload`: the load of a second log, payload.json and the model with it, model.json; its figures as a table.
+std::string identify_payload(const std::filesystem::path& model, const std::filesystem::path& log,
+                             const std::filesystem::path& directory);
 
 }  // namespace fxdyn

@@ -278,8 +278,15 @@ void Pipeline::export_tables() {
 }
 
 void Pipeline::write_export(IdentifiedModel& model, const Formats& formats, const fs::path& directory) {
-  const ExportResult result = fxdyn::export_tables(model, formats, project_.target, data().logs, directory,
-                                                   directory_ / "model.json", progress_);
+  ExportResult result;
+  try {
+    result = fxdyn::export_tables(model, formats, project_.target, data().logs, directory, directory_ / "model.json",
+                                  progress_);
+  } catch (const DataError&) {
+    // Those of a model before this one would be taken for its own.
+    for (const char* name : {"tables.hpp", "tables.bin", "export.json"}) fs::remove(directory / name);
+    throw;
+  }
   write_file(directory / "export.json", to_json(result).dump(1) + "\n");
 }
 
@@ -287,9 +294,14 @@ void Pipeline::report() {
   // A diagnosis that training refuses is drawn as it is.
   const auto diagnosed = written({"diagnosed"});
   IdentifiedModel model = diagnosed && not_excited() ? *diagnosed : this->model();
+  std::optional<DataError> refused;  // drawn all the same: it shows why
   if (model.stage == "trained" && (!model.formats || !fs::exists(directory_ / "export.json"))) {
-    export_tables();
-    model = this->model();
+    try {
+      export_tables();
+      model = this->model();
+    } catch (const DataError& error) {
+      refused = error;
+    }
   }
   progress_.stage("drawing the report", 1);
   std::vector<ProcessedLog> shown = logs(Role::test);
@@ -298,6 +310,7 @@ void Pipeline::report() {
   write_report(model, shown, directory_);
   progress_.step();
   progress_.done();
+  if (refused) throw DataError(*refused);
 }
 
 void Pipeline::run() {
@@ -305,8 +318,7 @@ void Pipeline::run() {
   check_motion();
   diagnose();
   train();
-  export_tables();
-  report();
+  report();  // after the export that it needs
 }
 
 }  // namespace fxdyn

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
@@ -14,8 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// |fixed - double| on the logs beyond which tables are refused, of rated torque.
-constexpr double largest_error = 1e-3;
+/// |fixed - double| that is observed, of what is accepted as its proven bound.
+constexpr double observed_share = 0.1;
 /// The proven range of the rigid body's torque is refined until it is no more than this times what is attained ...
 constexpr double tight_enough = 2;
 /// ... or this many boxes were looked at.
@@ -37,23 +38,40 @@ Observed observe(const IdentifiedModel& model, const Formats& formats, const std
   return {quantisation_error(model, formats, states), quantisation_error(model, formats, judged)};
 }
 
-void check_errors(const IdentifiedModel& model, const Observed& observed, const Proof& proof,
+/// A value that is enough, as one writes it: 0.0234 -> 0.03.
+double round_up(double share) {
+  const double decade = std::pow(10.0, std::floor(std::log10(share)));
+  return std::ceil(share / decade) * decade;
+}
+
+/// @throws DataError: the error is above what was proven, or above what is accepted
+void check_errors(const IdentifiedModel& model, const Observed& observed, const Proof& proof, double accepted,
                   const fs::path& reported) {
   for (std::size_t j = 0; j < model.joints.size(); ++j) {
     const auto k = static_cast<Eigen::Index>(j);
-    const double error = observed.anywhere.largest[k];
+    const std::string joint = fmt::format("joint {} ({})", j + 1, model.robot.joints[j].name);
+    const double error = observed.anywhere.largest[k], rated = model.joints[j].rated_torque;
     if (error > proof.error[k]) {
-      throw DataError(
-          fmt::format("joint {} ({}): fixed point is off by {:.3g}, more than the {:.3g} that were proven: please "
-                      "report this with {}",
-                      j + 1, model.robot.joints[j].name, error, proof.error[k], reported.string()));
-    }
-    const double share = observed.on_logs.largest[k] / model.joints[j].rated_torque;
-    if (!(share <= largest_error)) {
       throw DataError(fmt::format(
-          "joint {} ({}): fixed point is off by {:.1g} of rated torque on the logs, more than {:.0g}: narrow the "
-          "project's limits to what the robot does",
-          j + 1, model.robot.joints[j].name, share, largest_error));
+          "{}: fixed point is off by {:.3g}, more than the {:.3g} that were proven: please report this with {}", joint,
+          error, proof.error[k], reported.string()));
+    }
+    constexpr const char* advice =
+        "narrow the project's [limits] to what the robot does, check that URDF and log are of one robot, or accept it "
+        "with [target] accept_error";
+    if (!(error / rated <= observed_share * accepted)) {
+      throw DataError(
+          fmt::format("{}: fixed point is off by {:.2g} % of rated torque ({:.2g} % on the logs), more than "
+                      "{:.2g} %: no tables are written; {} = {:.1g}",
+                      joint, 100 * error / rated, 100 * observed.on_logs.largest[k] / rated,
+                      100 * observed_share * accepted, advice, round_up(error / rated / observed_share)));
+    }
+    if (!(proof.error[k] / rated <= accepted)) {
+      throw DataError(
+          fmt::format("{}: fixed point is proven to stay within {:.2g} % of rated torque only ({:.2g} % "
+                      "observed), more than {:.2g} %: no tables are written; {} = {:.1g}",
+                      joint, 100 * proof.error[k] / rated, 100 * error / rated, 100 * accepted, advice,
+                      round_up(proof.error[k] / rated)));
     }
   }
 }
@@ -87,7 +105,7 @@ ExportResult export_tables(IdentifiedModel& model, const Formats& formats, const
   const Observed observed = observe(model, formats, logs);
   const QuantisationError& error = observed.anywhere;
   progress.step();
-  check_errors(model, observed, proof, reported);
+  check_errors(model, observed, proof, target.accept_error, reported);
   model.tables_crc = write_tables(model, formats, error, proof.error, all_joints(model), directory);
   ExportResult out{model.tick_s,
                    target.board,

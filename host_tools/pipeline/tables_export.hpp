@@ -14,7 +14,7 @@ namespace fxdyn {
 
 /// Proves ranges and errors, and writes the tables of all joints and of the drives that the project asks for. The model
 /// learns formats, layout, lineage and CRC. `reported`: a file for a bug report.
-/// @throws DataError: fixed point is off by more than was proven, or by more than 1e-3 of rated torque on the logs
+/// @throws DataError: fixed point is off by more than was proven, or by more than the project accepts (`target`)
 ExportResult export_tables(IdentifiedModel& model, const Formats& formats, const TargetSettings& target,
                            const std::vector<ProcessedLog>& logs, const std::filesystem::path& directory,
                            const std::filesystem::path& reported, Progress& progress);

@@ -13,8 +13,10 @@
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/project/log_entries.hpp"
+#include "host_tools/signals/time_unit.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
+#include "host_tools/support/pipes.hpp"
 #include "host_tools/support/toml.hpp"
 
 namespace fxdyn {
@@ -40,6 +42,7 @@ Names known_effects() {
 }
 
 const Names signal_names{"t", "q", "dq", "ddq", "tau", "qlink", "temp"};
+const Names unit_names{"s", "ms", "us", "ns"};
 const Names role_names{"baseline", "train", "validate", "test"};
 const Names method_names{"ls", "wls", "irls", "rls"};
 const Names input_names{"physical", "bristles", "extended", "state"}, feature_names{"random", "sparse"};
@@ -112,9 +115,12 @@ class ProjectReader {
     return text.replace(from, to - from + 1, set != nullptr ? set : inner.substr(split + 2));
   }
 
-  fs::path path(const Value& value) const {
-    const fs::path path = (project_.file.parent_path() / expand(value)).lexically_normal();
-    if (!fs::is_regular_file(path)) {
+  /// `pipes`: "-" (standard input) and a FIFO are files, too.
+  fs::path path(const Value& value, bool pipes = false) const {
+    const std::string text = with_home(expand(value));
+    if (pipes && text == "-") return text;
+    const fs::path path = (project_.file.parent_path() / text).lexically_normal();
+    if (!fs::is_regular_file(path) && !(pipes && is_pipe(path))) {
       value.place().fail(fmt::format("no file '{}'; paths are relative to the project file", path.string()));
     }
     return path;
@@ -200,6 +206,8 @@ class ProjectReader {
       }
       columns->finish();
     }
+    if (const auto unit = table.find("time_unit"))
+      format.time_unit_s = 1 / time_unit(unit->name(unit_names, "unit of time")).per_second;
     set(format.torque_gain, table.find("torque_gain"), [this](const Value& v) {
       const std::vector<double> gains = v.numbers(joints(), per_joint());
       if (std::count(gains.begin(), gains.end(), 0.0) > 0) v.place().fail("a gain of 0 leaves no torque");
@@ -348,6 +356,10 @@ class ProjectReader {
       project_.target.tick_s = tick->positive();
       if (project_.target.tick_s < 5e-5 || project_.target.tick_s > 0.1) tick->place().fail("expected 5e-5 .. 0.1 s");
     }
+    if (const auto error = table.find("accept_error")) {
+      project_.target.accept_error = error->positive();
+      if (project_.target.accept_error > 1) error->place().fail("expected a share of rated torque, at most 1");
+    }
     if (const auto sequence = table.find("sequence")) {
       constexpr std::int64_t highest = 0x7FFF'FFFF;  // leaves room for updates
       const std::int64_t number = sequence->integer(1);
@@ -373,7 +385,7 @@ class ProjectReader {
     if (file.has_value() == scenario.has_value())
       table.place().fail("needs either file or scenario (with log = \"name\")");
     if (file) {
-      entry.file = path(*file);
+      entry.file = path(*file, true);
       if (log) log->place().fail("belongs to a scenario; remove it");
     } else {
       entry.scenario = path(*scenario);

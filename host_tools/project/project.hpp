@@ -73,6 +73,7 @@ struct TargetSettings {
   double tick_s = 0.002;
   std::vector<std::size_t> joints;  ///< one image for each of these (from 0); empty: one image for all
   std::uint32_t sequence = 1;       ///< of the exported tables, at least
+  double accept_error = 0.01;       ///< proven |fixed - double| at most, of rated torque; observed: a tenth of it
 };
 
 struct LimitSettings {

@@ -96,7 +96,7 @@ std::string comparison_section(const ReportInput& input, const json& result) {
       row.push_back({fmt::format("{:.3g}, {:.3g}", method.rmse[j], method.peak[j]), "n"});
     absolute.add(row);
   }
-  out += absolute.html();
+  out += absolute.html() + paragraph("RMSE of each joint, and its largest error at any sample.");
   if (comparison.paper) out += paper_table(methods);
   for (const ComparisonPlot& plot : comparison_plots) {
     const std::filesystem::path file = input.directory / "plots" / plot.file;

@@ -77,9 +77,9 @@ std::string joint_table(const json& joints) {
   return table.html() +
          paragraph(
              "The gap is the RMS of measured minus model torque on held-out logs, both filtered alike, noise not "
-             "subtracted. Left unexplained: the share of the gap's power above the noise that no finding explains, "
-             "with its "
-             "95 % interval.");
+             "subtracted. Noise floor: what of the gap after has no structure, on the data that accepted the names: no "
+             "model could explain it. Left unexplained: the share of the gap's power above the noise that no finding "
+             "explains, with its 95 % interval. Not identifiable: effects that this motion could not show.");
 }
 
 std::string effect_table(const json& diagnosis) {
@@ -115,7 +115,7 @@ std::string effect_table(const json& diagnosis) {
              "± is one standard deviation. Established: 1000 to 1 against nothing and against the closest rival, on "
              "data "
              "that did not fit it. Likely: 20 to 1; it is not in the model. Closes: the share of the gap that comes "
-             "back when this effect alone is taken out.");
+             "back when this effect alone is taken out. Could as well be: what these logs don't tell apart from it.");
 }
 
 std::string evidence_section(const json& evidence) {
@@ -123,7 +123,7 @@ std::string evidence_section(const json& evidence) {
   std::string out = subsection("On held-out logs");
   if (joints.empty()) return out + paragraph("No log was held out.");
   Table table(
-      {{"joint"}, {"unit"}, {"RMS before", "n"}, {"after", "n"}, {"after, fixed point", "n"}, {"noise floor", "n"}});
+      {{"joint"}, {"unit"}, {"RMS before", "n"}, {"after", "n"}, {"after, fixed point", "n"}, {"white noise", "n"}});
   for (std::size_t j = 0; j < joints.size(); ++j) {
     table.add({{words::joint(joints[j], j)},
                {joints[j].value("unit", "")},
@@ -140,6 +140,9 @@ std::string evidence_section(const json& evidence) {
                                             words::figure(log, "from_s"), words::figure(log, "to_s")));
   }
   out += table.html();
+  out += paragraph(
+      "RMS of measured minus model torque over these logs, before and after what diagnosis found, and after as the "
+      "firmware computes it. White noise: as under Error.");
   if (!files.empty()) out += paragraph("Logs: " + files + ".");
   if (evidence.contains("note")) out += paragraph("Note: " + evidence.value("note", "") + ".");
   const json fixed = evidence.value("fixed_point", json::object());

@@ -14,7 +14,7 @@ std::string error_section(const ReportInput& input, const json& result) {
   std::vector<Cell> head{{"joint"},         {"unit"},
                          {"rated", "n"},    {"model"},
                          {"RMSE", "n"},     {"of RMS torque", "n"},
-                         {"of rated", "n"}, {"noise floor", "n"}};
+                         {"of rated", "n"}, {"white noise", "n"}};
   Table table(head);
   const json& joints = input.model.at("joints");
   for (std::size_t j = 0; j < joints.size(); ++j) {
@@ -34,9 +34,11 @@ std::string error_section(const ReportInput& input, const json& result) {
   }
   std::string out = section(fmt::format("Error on the {} logs", input.results.role)) + table.html();
   out += paragraph(
-      "RMSE between measured and predicted torque, both filtered alike, over all logs of the role. The noise floor is "
-      "an estimate of what white noise of the torque signal leaves after the filter: an error close to it leaves "
-      "little to learn.");
+      "RMSE between measured and predicted torque, both filtered alike, over all logs of the role. Of RMS torque: 100 "
+      "% "
+      "is what predicting zero would give. White noise: what white noise of the torque signal leaves after the filter, "
+      "from what lies above the cut-off. An error close to it leaves little to learn; noise that is not white is not "
+      "in it (see the noise floor under Diagnosis).");
   Table per_log(
       {{"log"}, {"joint"}, {"unit"}, {"RMSE", "n"}, {"of RMS torque", "n"}, {"unfiltered RMSE", "n"}, {"bias", "n"}});
   for (const json& log : result.at("logs")) {
@@ -51,7 +53,11 @@ std::string error_section(const ReportInput& input, const json& result) {
                    number(joint.at("bias"), 2)});
     }
   }
-  return out + "<h3>The final model, log by log</h3>\n" + per_log.html();
+  return out + "<h3>The final model, log by log</h3>\n" + per_log.html() +
+         paragraph(
+             "Unfiltered RMSE: the same against the measured torque as it was recorded, with the noise that the filter "
+             "takes away: it can't fall below that noise. Bias: mean of measured minus predicted torque, which a wrong "
+             "offset or gravity leaves.");
 }
 
 }  // namespace fxdyn

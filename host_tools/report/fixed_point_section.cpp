@@ -80,7 +80,11 @@ std::string fixed_point_section(const ReportInput& input, const json& file) {
                  number(std::ldexp(1.0, -bits), 3),
                  {fmt::format("±{:.4g}", std::ldexp(1.0, width - 1 - bits)), "n"}});
   }
-  return out + limits(input.model) + "<h3>Formats</h3>\n" + formats.html();
+  return out + limits(input.model) + "<h3>Formats</h3>\n" + formats.html() +
+         paragraph(
+             "How each kind of number is stored: an integer of so many bits, of which the fractional ones come after "
+             "the "
+             "point. Step: the smallest difference it can hold. Range: the largest number, in the quantity's SI unit.");
 }
 
 }  // namespace fxdyn

@@ -10,6 +10,7 @@
 #include <iterator>
 
 #include "host_tools/robot/robot.hpp"
+#include "host_tools/robot/urdf_checks.hpp"
 #include "host_tools/support/error.hpp"
 
 namespace fxdyn {
@@ -62,10 +63,31 @@ class Lines {
       throw InputError(
           fmt::format("{}:{}: malformed XML: {}", file, std::max(document_.ErrorRow(), 1), document_.ErrorDesc()));
     }
-    if (!root()) {
-      throw InputError(
-          fmt::format("{}: no <robot> element; is this a URDF? (xacro files must be expanded first)", file));
+    check_urdf(document_, file);
+  }
+
+  /// What urdfdom gets to read.
+  std::string completed(const std::string& text) const {
+    TiXmlDocument document = document_;
+    if (!complete_limits(document)) return text;
+    TiXmlPrinter printer;
+    document.Accept(&printer);
+    return printer.CStr();
+  }
+
+  /// "file:line: " of the joint or link that urdfdom's complaint names in brackets or quotes; else "file: ".
+  std::string place_of(const std::string& complaint) const {
+    for (const char* element : {"joint", "link"}) {
+      for (const TiXmlElement* e = root()->FirstChildElement(element); e; e = e->NextSiblingElement(element)) {
+        const char* name = e->Attribute("name");
+        if (name == nullptr) continue;
+        for (const char* quotes : {"[{}]", "'{}'", "`{}'", "\"{}\""}) {
+          if (complaint.find(fmt::format(fmt::runtime(quotes), name)) != std::string::npos)
+            return fmt::format("{}:{}: {} '{}': ", file_, e->Row(), element, name);
+        }
+      }
     }
+    return file_ + ": ";
   }
 
   /// "file:line: joint 'name'"
@@ -148,11 +170,11 @@ class Reader {
   void parse() {
     const FirstError errors;
     try {
-      model_ = urdf::parseURDF(text_);
+      model_ = urdf::parseURDF(lines_.completed(text_));
     } catch (const std::exception& error) {
-      throw InputError(fmt::format("{}: not a valid URDF: {}", file_, error.what()));
+      throw InputError(fmt::format("{}not a valid URDF: {}", lines_.place_of(error.what()), error.what()));
     }
-    if (!model_) throw InputError(fmt::format("{}: not a valid URDF: {}", file_, errors.text()));
+    if (!model_) throw InputError(fmt::format("{}not a valid URDF: {}", lines_.place_of(errors.text()), errors.text()));
   }
 
   static bool moves(const urdf::Joint& joint) { return joint.type != urdf::Joint::FIXED; }

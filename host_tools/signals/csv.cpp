@@ -5,10 +5,13 @@
 #include <charconv>
 #include <cmath>
 
+#include "host_tools/signals/column_advice.hpp"
+#include "host_tools/signals/foreign_format.hpp"
 #include "host_tools/signals/log_reader.hpp"
 #include "host_tools/signals/text_file.hpp"
+#include "host_tools/signals/time_unit.hpp"
 #include "host_tools/support/error.hpp"
-#include "host_tools/support/nearest.hpp"
+#include "host_tools/support/notes.hpp"
 
 namespace fxdyn {
 namespace {
@@ -27,12 +30,18 @@ std::vector<std::string> split(std::string_view line) {
   }
 }
 
+bool starts_with_number(std::string_view text) {
+  double number = 0;
+  return std::from_chars(text.data(), text.data() + text.size(), number).ec == std::errc();
+}
+
 /// Which field of a row holds what.
 struct Layout {
   std::size_t fields = 0;
   std::vector<int> target;                             ///< field -> column of the table of values, -1: not needed
   std::vector<std::string> names;                      ///< of the columns of that table
   std::array<std::vector<int>, signal_count> columns;  ///< signal, joint -> column of that table, -1: none
+  std::optional<TimeUnit> unit;                        ///< of the stamps, where it is written down
   /// Whether two signals are read from the column.
   bool is_shared(int column) const {
     std::ptrdiff_t uses = 0;
@@ -46,9 +55,7 @@ class Header {
   Header(const std::string& file, int line, std::string_view text) : file_(file), line_(line), names_(split(text)) {
     layout_.fields = names_.size();
     layout_.target.assign(names_.size(), -1);
-    double number = 0;
-    const std::string& name = names_.front();
-    has_names_ = std::from_chars(name.data(), name.data() + name.size(), number).ec != std::errc();
+    has_names_ = !starts_with_number(names_.front());
     if (has_names_) return;
     for (std::size_t field = 0; field < names_.size(); ++field) names_[field] = fmt::format("#{}", field);
   }
@@ -56,7 +63,10 @@ class Header {
   bool has_names() const { return has_names_; }
 
   Layout layout(std::size_t joints, const LogFormat& format, bool torque_required) {
-    if (!take(prefix(format, "t"))) missing(prefix(format, "t"), "time stamps in s");
+    joints_ = joints;
+    const std::string time = prefix(format, "t");
+    if (!take(time)) missing(time, "time stamps");
+    layout_.unit = format.time_unit_s > 0 ? unit_of_seconds(format.time_unit_s) : unit_in_name(time);
     for (std::size_t signal = 0; signal < signal_count; ++signal) {
       const std::string name = signal_names[signal];
       if (const auto given = format.joint_columns.find(name); given != format.joint_columns.end()) {
@@ -157,14 +167,15 @@ class Header {
           "project gives the numbers of these {} columns, from 0: columns = {{ t = 0, q = [1], tau = [2] }}",
           file_, line_, names_.size()));
     }
-    throw InputError(fmt::format("{}:{}: no column '{}' ({}); nearest is '{}' (map it with columns = {{ ... }})", file_,
-                                 line_, name, meaning, nearest(name, names_)));
+    throw InputError(fmt::format("{}:{}: no column '{}' ({}); {}", file_, line_, name, meaning,
+                                 column_advice(name, names_, joints_)));
   }
 
   std::string file_;
   int line_;
   std::vector<std::string> names_;
   bool has_names_ = true;
+  std::size_t joints_ = 0;
   Layout layout_;
 };
 
@@ -179,7 +190,18 @@ class Rows {
  public:
   Rows(const std::string& file, const Layout& layout) : file_(file), layout_(layout), values_(layout.names.size()) {}
 
-  Table read(MappedFile& file, LineReader& lines, double from, double to) {
+  /// Stamps as they stand, of the first rows.
+  std::vector<double> first_stamps(LineReader lines) {
+    constexpr std::size_t most = 2000;
+    std::vector<double> stamps;
+    for (std::string_view line; stamps.size() < most && lines.next(line);) {
+      parse(line, lines.number());
+      stamps.push_back(values_[0]);
+    }
+    return stamps;
+  }
+
+  Table read(MappedFile& file, LineReader& lines, double from, double to, const TimeUnit& unit) {
     Table table;
     table.columns.resize(layout_.names.size());
     // Columns that grow are held twice for a moment: room for as many rows as the first one says, and some more.
@@ -193,6 +215,7 @@ class Rows {
     std::size_t count = 0;
     while (lines.next(line)) {
       parse(line, lines.number());
+      values_[0] /= unit.per_second;
       const double t = values_[0];
       if (!(t > previous)) {
         fail(lines.number(), fmt::format("time {} at {} s; sort the rows and remove doubles",
@@ -270,21 +293,47 @@ Log to_log(Table table, const Layout& layout, std::size_t joints) {
   return log;
 }
 
+/// The line that names the columns: the first one, or the comment in front of it where that is a row of numbers (as
+/// numpy and rostopic write it).
+Header header_of(LineReader& lines, const std::string& where) {
+  LineReader ahead = lines;
+  std::string_view first;
+  if (!ahead.next(first))
+    throw InputError(where + ":1: empty file; the first line must name the columns (t,q1,...,tau1,...)");
+  const std::string_view comment = ahead.comment();
+  const bool named_before =
+      starts_with_number(trim(first)) && comment.find(',') != std::string_view::npos &&
+      std::count(comment.begin(), comment.end(), ',') == std::count(first.begin(), first.end(), ',');
+  if (named_before) return Header(where, ahead.number() - 1, comment);
+  lines = ahead;
+  return Header(where, lines.number(), first);
+}
+
+void note_unit(const std::string& where, const TimeUnit& unit) {
+  note_once(
+      fmt::format("{}: time stamps read as {}, by their steps; time_unit = \"{}\" in its [[log]] says it, or "
+                  "another of s, ms, us, ns",
+                  where, unit.name, unit.name));
+}
+
 }  // namespace
 
 RecordedLog read_csv(const LogRequest& request) {
   const std::string where = request.file.string();
   MappedFile mapped(where);
+  if (const std::string other = foreign_format(mapped.text()); !other.empty())
+    throw InputError(fmt::format("{}: {}", where, other));
   LineReader lines(mapped.text());
-  std::string_view first;
-  if (!lines.next(first))
-    throw InputError(where + ":1: empty file; the first line must name the columns (t,q1,...,tau1,...)");
-  Header header(where, lines.number(), first);
+  Header header = header_of(lines, where);
   const Layout layout = header.layout(request.joints, request.columns, request.torque_required);
   if (!header.has_names()) lines = LineReader(mapped.text());
-  Table table = Rows(where, layout).read(mapped, lines, request.from, request.to);
+  Rows rows(where, layout);
+  const bool time_is_known = layout.unit.has_value();
+  const TimeUnit unit = time_is_known ? *layout.unit : unit_of_stamps(rows.first_stamps(lines), where);
+  if (!time_is_known && unit.per_second != 1) note_unit(where, unit);
+  Table table = rows.read(mapped, lines, request.from, request.to, unit);
   const double first_t = table.first_t, last_t = table.last_t;
-  return {to_log(std::move(table), layout, request.joints), first_t, last_t};
+  return {to_log(std::move(table), layout, request.joints), first_t, last_t, time_is_known};
 }
 
 }  // namespace fxdyn

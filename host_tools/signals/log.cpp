@@ -92,7 +92,7 @@ Log read_log(const std::filesystem::path& file, std::size_t joints, const std::v
     unwrap(log.q.col(joint));
     if (log.qlink.size() > 0) unwrap(log.qlink.col(joint));
   }
-  check_units(log, revolute, where);
+  check_units(log, revolute, where, recorded.time_is_known);
   if (log.resampled) {
     log.stamps = log.t;
     log.encoder_step.resize(log.joints());  // between samples there are no steps

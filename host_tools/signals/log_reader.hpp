@@ -34,6 +34,8 @@ struct LogRequest {
 struct RecordedLog {
   Log log;                         ///< t and the signals in the window
   double first_t = 0, last_t = 0;  ///< of the whole file [s]
+  /// The unit of the stamps is known: it was written down, by the project or in the column's name.
+  bool time_is_known = false;
 };
 
 /// A file format. One more: a file with its `read`, and a line in log_reader.cpp.

@@ -40,9 +40,10 @@ void check_velocity(const Log& log, Index joint, bool revolute, const std::strin
                     joint + 1, joint + 1, ratio));
   }
   if (near(1e-3)) {
-    throw InputError(fmt::format(
-        "{}: t looks like milliseconds (q{} changes only {:.3g} times as fast as dq{} says); divide by 1000", where,
-        joint + 1, ratio, joint + 1));
+    throw InputError(
+        fmt::format("{}: t looks like milliseconds (q{} changes only {:.3g} times as fast as dq{} says); write "
+                    "time_unit = \"ms\" into its [[log]]",
+                    where, joint + 1, ratio, joint + 1));
   }
 }
 
@@ -58,8 +59,10 @@ void check_range(const Log& log, Index joint, const std::string& where) {
       (log.q.col(joint).tail(n) - log.q.col(joint).head(n)).cwiseAbs() / (static_cast<double>(stride) * log.step_s);
   const double fast = quantile(speed, 0.9);
   if (fast < 25) return;
-  throw InputError(fmt::format("{}: q{} looks like degrees (range {:.3g}, {:.3g} per second), multiply by pi/180",
-                               where, joint + 1, range, fast));
+  throw InputError(fmt::format(
+      "{}: q{} looks like degrees (range {:.3g}, {:.3g} per second), multiply by pi/180; or, if it is the motor's "
+      "angle, divide by the gear ratio (position_gain)",
+      where, joint + 1, range, fast));
 }
 
 /// Slow logs: one joint may turn more than twice, but not nearly every joint of an arm.
@@ -74,19 +77,43 @@ void check_ranges(const Log& log, const std::vector<bool>& revolute, const std::
   }
   const auto count = static_cast<std::size_t>(std::count(revolute.begin(), revolute.end(), true));
   if (count < 3 || turning + 1 < count || widest > 800) return;
-  throw InputError(fmt::format("{}: q looks like degrees ({} of {} joints turn more than twice), multiply by pi/180",
-                               where, turning, count));
+  throw InputError(fmt::format(
+      "{}: q looks like degrees ({} of {} joints turn more than twice), multiply by pi/180; or, if they are "
+      "the motors' angles, divide by the gear ratios (position_gain)",
+      where, turning, count));
+}
+
+/// Rows that are far apart while nothing moves faster than a crawl: milliseconds at a high rate.
+void check_crawl(const Log& log, const std::vector<bool>& revolute, const std::string& where) {
+  constexpr double slowest_rate_s = 0.02;  // of which seconds are beyond doubt
+  constexpr double crawl = 0.02;           // [rad/s]: less than any recorded motion's top speed
+  constexpr double moved = 0.1;            // [rad]
+  if (log.step_s < slowest_rate_s) return;
+  double fastest = 0, widest = 0;
+  for (Index joint = 0; joint < log.joints(); ++joint) {
+    if (!revolute[static_cast<std::size_t>(joint)]) continue;
+    const Eigen::VectorXd q = log.q.col(joint);
+    const Index n = q.size() - 1;
+    widest = std::max(widest, q.maxCoeff() - q.minCoeff());
+    fastest = std::max(fastest, quantile((q.tail(n) - q.head(n)).cwiseAbs() / log.step_s, 0.99));
+  }
+  if (widest < moved || fastest > crawl) return;
+  throw InputError(fmt::format(
+      "{}: t looks like milliseconds (as seconds no joint turns faster than {:.2g} rad/s); write time_unit = "
+      "\"ms\" into its [[log]], or \"s\" if it is so slow",
+      where, fastest));
 }
 
 }  // namespace
 
-void check_units(const Log& log, const std::vector<bool>& revolute, const std::string& where) {
+void check_units(const Log& log, const std::vector<bool>& revolute, const std::string& where, bool time_is_known) {
   for (Index joint = 0; joint < log.joints(); ++joint) {
     const bool turns = revolute[static_cast<std::size_t>(joint)];
     if (log.dq.size() > 0) check_velocity(log, joint, turns, where);
     if (turns) check_range(log, joint, where);
   }
   check_ranges(log, revolute, where);
+  if (!time_is_known) check_crawl(log, revolute, where);
 }
 
 }  // namespace fxdyn

@@ -2,9 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <map>
+#include <mutex>
 #include <numbers>
 
 #include "host_tools/project/log_entries.hpp"
+#include "host_tools/project/provenance.hpp"
+#include "host_tools/signals/same_motion.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
@@ -50,17 +55,57 @@ void check_copies(const Project& project, const fs::path& directory) {
   }
 }
 
+/// Prints of the logs that this process has read for a project: what judges is read after what is fitted.
+class ReadLogs {
+ public:
+  /// @throws InputError: the log holds rows of one with another role, under other time stamps
+  void check(const Project& project, const LogEntry& entry, const Log& log) {
+    constexpr std::size_t fewest = 50;     // rows that are no coincidence
+    constexpr double share_of_copy = 0.1;  // of the shorter log's rows
+    std::vector<std::uint64_t> prints = row_prints(log);
+    const std::lock_guard lock(reading_);
+    std::map<int, std::vector<std::uint64_t>>& known = prints_[project_hash(project)];
+    for (const LogEntry& other : project.logs) {
+      const auto found = known.find(other.line);
+      if (found == known.end() || other.role == entry.role || is_source(other, entry)) continue;
+      const std::size_t common = rows_in_common(found->second, prints);
+      const std::size_t shorter = std::min(found->second.size(), prints.size());
+      if (common < fewest || static_cast<double>(common) < share_of_copy * static_cast<double>(shorter)) continue;
+      throw InputError(
+          fmt::format("{}:{}: {} of its {} moving rows are those of the log in line {}, under other time "
+                      "stamps: a copy can't judge what was fitted on it; record another motion",
+                      project.file.string(), entry.line, common, prints.size(), other.line));
+    }
+    known[entry.line] = std::move(prints);
+  }
+
+ private:
+  /// Windows of one log are told apart by their times.
+  static bool is_source(const LogEntry& a, const LogEntry& b) {
+    return a.file == b.file && a.scenario == b.scenario && a.scenario_log == b.scenario_log;
+  }
+  std::map<std::string, std::map<int, std::vector<std::uint64_t>>> prints_;  ///< project's hash, line of the [[log]]
+  std::mutex reading_;
+};
+
 /// A joint with end stops can't turn far beyond them.
 void check_turns(const Log& log, const Robot& robot) {
   for (std::size_t i = 0; i < robot.size(); ++i) {
     const Joint& joint = robot.joints[i];
     if (joint.type != JointType::revolute || joint.continuous || !joint.limits) continue;
     const auto q = log.q.col(static_cast<Eigen::Index>(i));
-    const double range = q.maxCoeff() - q.minCoeff();
-    if (range < 4 * std::numbers::pi || range < 1.5 * (joint.limits->upper - joint.limits->lower)) continue;
-    throw InputError(
-        fmt::format("{}: q{} looks like degrees (range {:.3g}, joint '{}' has {:.3g} rad), multiply by pi/180",
-                    log.file.string(), i + 1, range, joint.name, joint.limits->upper - joint.limits->lower));
+    const double range = q.maxCoeff() - q.minCoeff(), allowed = joint.limits->upper - joint.limits->lower;
+    if (allowed <= 0 || range < 4 * std::numbers::pi || range < 1.5 * allowed) continue;
+    const std::string seen = fmt::format("range {:.3g}, joint '{}' has {:.3g} rad", range, joint.name, allowed);
+    if (range * std::numbers::pi / 180 > 1.2 * allowed) {  // too far in degrees, too
+      throw InputError(
+          fmt::format("{}: q{} looks like the motor's angle ({}), divide by the gear ratio (position_gain)",
+                      log.file.string(), i + 1, seen));
+    }
+    throw InputError(fmt::format(
+        "{}: q{} looks like degrees ({}), multiply by pi/180; or, if it is the motor's angle, divide by the "
+        "gear ratio (position_gain)",
+        log.file.string(), i + 1, seen));
   }
 }
 
@@ -82,6 +127,8 @@ std::vector<Log> read_logs(const Project& project, Role role, const fs::path& di
     logs.back().role = role;
     logs.back().load = entry.load;
     check_turns(logs.back(), project.robot);
+    static ReadLogs read;
+    read.check(project, entry, logs.back());
   }
   return logs;
 }

@@ -1,6 +1,7 @@
 #include "host_tools/support/files.hpp"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -11,10 +12,12 @@
 #include <vector>
 
 #include "host_tools/support/error.hpp"
+#include "host_tools/support/pipes.hpp"
 
 namespace fxdyn {
 
 std::string read_file(const std::filesystem::path& file) {
+  if (const std::string* bytes = piped(file)) return *bytes;
   std::ifstream in(file, std::ios::binary);
   std::ostringstream text;
   // Inserting nothing, from an empty file, sets the fail bit.
@@ -51,10 +54,18 @@ void check_writable(const std::filesystem::path& directory) {
   std::filesystem::path there = std::filesystem::absolute(directory);
   while (!std::filesystem::exists(there, error) && there.has_parent_path() && there != there.parent_path())
     there = there.parent_path();
-  const bool is_directory = std::filesystem::is_directory(there, error);
-  if (is_directory && ::access(there.c_str(), W_OK | X_OK) == 0) return;
-  throw InputError(fmt::format("{}: can't be written: {} {}; choose another --out", directory.string(), there.string(),
-                               is_directory ? "is not yours to write to" : "is a file"));
+  std::string why = "is a file";
+  if (std::filesystem::is_directory(there, error)) {
+    // Permissions alone do not say it: of root, on a full or read-only disk, below /proc.
+    const std::string probe = (there / fmt::format(".fxdyn.{}", ::getpid())).string();
+    if (::mkdir(probe.c_str(), 0700) == 0) {
+      ::rmdir(probe.c_str());
+      return;
+    }
+    why = errno == EACCES ? "is not yours to write to" : fmt::format("takes no folder ({})", std::strerror(errno));
+  }
+  throw InputError(
+      fmt::format("{}: can't be written: {} {}; choose another --out", directory.string(), there.string(), why));
 }
 
 namespace {
@@ -79,6 +90,7 @@ std::string hash_of(std::string_view content) {
 }
 
 std::string hash_of_file(const std::filesystem::path& file) {
+  if (const std::string* bytes = piped(file)) return hash_of(*bytes);
   std::ifstream stream(file, std::ios::binary);
   std::vector<char> piece(std::size_t{1} << 20);
   Fnv1a hash;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <optional>
 #include <string>
@@ -22,6 +23,19 @@ namespace fxdyn::toml_input {
 
 using Names = std::vector<std::string>;
 
+/// What was named in place of a TOML file, as far as its first line shows; else empty.
+inline std::string other_file(const std::filesystem::path& file) {
+  std::string line;
+  std::ifstream in(file);
+  std::getline(in, line);
+  if (line.find('<') < 4) return "is XML (a URDF?)";
+  if (line.find('\0') != std::string::npos) return "is no text";
+  if (line.starts_with('{')) return "is JSON";
+  if (std::count(line.begin(), line.end(), ',') > 1 && line.find('=') == std::string::npos)
+    return "is a table (a log?)";
+  return "";
+}
+
 /// @throws InputError with file and line.
 inline toml::table parse(const std::filesystem::path& file) {
   if (std::filesystem::is_directory(file)) throw InputError(file.string() + ": is a folder; name the TOML file in it");
@@ -30,6 +44,8 @@ inline toml::table parse(const std::filesystem::path& file) {
   } catch (const toml::parse_error& error) {
     const auto line = error.source().begin.line;
     if (line == 0) throw InputError(file.string() + ": can't be read; check the path");
+    if (const std::string other = other_file(file); !other.empty())
+      throw InputError(fmt::format("{}: {}: name the TOML file that speaks of it", file.string(), other));
     throw InputError(fmt::format("{}:{}: not valid TOML: {}", file.string(), line, error.description()));
   }
 }

@@ -11,7 +11,7 @@ else
   project=$(realpath "${1:-$root/tests/golden/project.toml}")
 fi
 cd "$root"
-cmake --preset host >/dev/null
+toolchains/configure.sh host
 cmake --build --preset host --target make_golden "${targets[@]}" -j "${JOBS:-$(nproc)}"
 out=$root/out/golden/$which
 if [ $which = remembers ]; then

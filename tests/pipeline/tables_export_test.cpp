@@ -29,6 +29,15 @@ class TablesExport : public testing::Test {
     return export_tables(model_, choose_formats(model_), target_, logs_, directory_, directory_ / "model.json",
                          progress);
   }
+  /// What the refusal says; empty: there are tables.
+  std::string refused() {
+    try {
+      run();
+    } catch (const DataError& error) {
+      return error.what();
+    }
+    return "";
+  }
 
   IdentifiedModel model_ =
       test::model_of(test::pendulum(2), {test::effect_fit("viscous", {}, {1.5}), test::effect_fit("coulomb", {}, {2})});
@@ -96,14 +105,28 @@ TEST_F(TablesExport, DrivesHaveTheirOwnPagesWhereTheProjectAsksForThem) {
 
 TEST_F(TablesExport, TooCoarseTablesAreRefused) {
   model_.joints[1].rated_torque = 1e-3;
-  std::string message;
-  try {
-    run();
-  } catch (const DataError& error) {
-    message = error.what();
-  }
+  const std::string message = refused();
   EXPECT_EQ(message.rfind("joint 2 (joint_2): fixed point is off by ", 0), 0U) << message;
-  EXPECT_NE(message.find("narrow the project's limits"), std::string::npos) << message;
+  EXPECT_NE(message.find("narrow the project's [limits]"), std::string::npos) << message;
+}
+
+TEST_F(TablesExport, WhatIsAcceptedIsTheBoundAndATenthOfItObserved) {
+  double needed = 0;
+  for (const ExportResult::Joint& joint : run().joints)
+    needed = std::max(needed, std::max(joint.proven_error, 10 * joint.largest_error) / joint.rated_torque);
+  EXPECT_LT(needed, TargetSettings().accept_error);
+  model_.drop_tables();
+  fs::remove(directory_ / "tables.bin");
+  target_.accept_error = 0.99 * needed;
+  const std::string message = refused();
+  EXPECT_NE(message.find("no tables are written"), std::string::npos) << message;
+  EXPECT_FALSE(fs::exists(directory_ / "tables.bin"));
+  // The value that it names is enough.
+  const std::string key = "[target] accept_error = ";
+  ASSERT_NE(message.find(key), std::string::npos) << message;
+  target_.accept_error = std::stod(message.substr(message.find(key) + key.size()));
+  EXPECT_LT(target_.accept_error, 2.1 * needed);
+  EXPECT_EQ(refused(), "");
 }
 
 TEST_F(TablesExport, TheFileCountsJointsFromOne) {

@@ -23,7 +23,7 @@ std::filesystem::path write_project(const std::string& name, const std::string& 
         "<joint name=\"j2\" type=\"revolute\"><parent link=\"b\"/><child link=\"c\"/>"
         "<limit lower=\"-1\" upper=\"1\" velocity=\"1\" effort=\"1\"/></joint></robot>");
   std::string csv = "t,q1,q2,tau1,tau2\n";
-  for (int i = 0; i < 100; ++i) csv += std::to_string(i) + ",0,0,0,0\n";
+  for (int i = 0; i < 100; ++i) csv += std::to_string(0.1 * i) + ",0,0,0,0\n";
   write("a.csv", csv);
   write("copy.csv", csv);
   write("s.toml", "");
@@ -75,6 +75,8 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"copy",
             robot + log + "[[log]]\nfile = \"copy.csv\"\nrole = \"validate\"\n",
             {":6:", "overlaps the log in line 3", "same content under another name"}},
+        Bad{"time_unit", robot + log + "time_unit = \"nsec\"\n", {":6:", "unknown unit of time 'nsec'", "'ns'"}},
+        Bad{"accept_error", robot + "[target]\naccept_error = 5\n" + log, {":4:", "share of rated torque"}},
         Bad{"torque_gain", robot + log + "torque_gain = [1]\n", {":6:", "has 1 values, expected 2"}},
         Bad{"method",
             robot + "[identify]\nmethod = \"lsq\"\n" + log,
@@ -113,6 +115,7 @@ file = "a.csv"
 role = "train"
 to_s = 50
 columns = { tau = "i" }
+time_unit = "us"
 torque_gain = [12.5, 1]
 payload = { mass = 0.0 }
 [[log]]
@@ -128,6 +131,7 @@ position_cutoff_hz = 20
 torque_cutoff_hz = 12
 edge_s = 0.25
 columns = { dq = "v", tau = "torque" }
+time_unit = "ns"
 [identify]
 method = "ls"
 physical = true
@@ -159,6 +163,7 @@ noise = 0.0
 [target]
 board = "stm32g474"
 tick_s = 0.001
+accept_error = 0.02
 joints = "all"
 )");
   const Project project = read_project(file);
@@ -207,6 +212,9 @@ joints = "all"
   EXPECT_EQ(pso.windows, (std::array{2.0, 3.0}));
   EXPECT_EQ(pso.ridge, (std::array{1e-3, 1e-2}));
   EXPECT_EQ(project.target.board, "stm32g474");
+  EXPECT_EQ(project.target.accept_error, 0.02);
+  EXPECT_EQ(project.logs[0].format.time_unit_s, 1e-6);
+  EXPECT_EQ(project.logs[1].format.time_unit_s, 1e-9);  // the default of [signals]
 }
 
 TEST(Project, NeedsNoLogUntilThereIsSomethingToLearn) {
@@ -220,7 +228,7 @@ TEST(Project, NeedsNoLogUntilThereIsSomethingToLearn) {
 
 TEST(Project, ReadsTheLogsOfARole) {
   const auto file =
-      write_project("logs", robot + log + "to_s = 60\n[[log]]\nfile = \"a.csv\"\nrole = \"test\"\nfrom_s = 60\n");
+      write_project("logs", robot + log + "to_s = 6\n[[log]]\nfile = \"a.csv\"\nrole = \"test\"\nfrom_s = 6\n");
   const Project project = read_project(file);
   const auto train = read_logs(project, Role::train, testing::TempDir()),
              test = read_logs(project, Role::test, testing::TempDir());
@@ -234,11 +242,17 @@ TEST(Project, ReadsTheLogsOfARole) {
 
 TEST(Project, JointsWithStopsDoNotTurnFarBeyondThem) {
   std::string csv = "t,q1,q2,tau1,tau2\n";
-  for (int i = 0; i < 100; ++i) csv += std::to_string(i) + ",0," + std::to_string(i % 30) + ",0,0\n";
-  write("degrees.csv", csv);
-  const auto file = write_project("degrees", robot + "[[log]]\nfile = \"degrees.csv\"\nrole = \"train\"\n");
-  test::expect_refused("degrees.csv", {"q2 looks like degrees", "'j2'", "pi/180"},
-                       [&] { read_logs(read_project(file), Role::train, testing::TempDir()); });
+  const auto expect_named = [&](int range, const std::string& words) {
+    std::string text = csv;
+    for (int i = 0; i < 100; ++i) text += std::to_string(0.1 * i) + ",0," + std::to_string(i % range) + ",0,0\n";
+    write("degrees.csv", text);
+    const auto file = write_project("degrees", robot + "[[log]]\nfile = \"degrees.csv\"\nrole = \"train\"\n");
+    test::expect_refused("degrees.csv", {words, "'j2' has 2 rad"},
+                         [&] { read_logs(read_project(file), Role::train, testing::TempDir()); });
+  };
+  expect_named(30, "q2 looks like degrees");
+  // 99 degrees, the joint has 115; times a gear ratio of 100 it would be 1 rad.
+  expect_named(100, "or, if it is the motor's angle, divide by the gear ratio");
 }
 
 TEST(Project, ALogOfTheSameScenarioIsNotSimulatedAgain) {

@@ -66,7 +66,30 @@ INSTANTIATE_TEST_SUITE_P(
             {"not a valid URDF"}},
         Bad{"zero_axis", one_joint("continuous", "<axis xyz=\"0 0 0\"/>"), {":4: joint 'lift'", "axis has no length"}},
         Bad{"bad_axis", one_joint("continuous", "<axis xyz=\"0 0 up\"/>"), {"lift"}},
-        Bad{"no_limit", one_joint("revolute", z), {"lift", "limits"}},
+        Bad{"no_limit", one_joint("revolute", z), {":4: joint 'lift'", "has no <limit>", "make it continuous"}},
+        Bad{"bad_limit", one_joint("revolute", z + "<limit lower=\"low\" upper=\"1\"/>"), {":4: joint 'lift'"}},
+        Bad{"xacro", one_joint("continuous", z + "\n<origin xyz=\"${length} 0 0\"/>"), {":5:", "is a xacro file"}},
+        Bad{"xacro_element", "<robot name=\"r\">\n<xacro:arm/></robot>", {":2:", "is a xacro file"}},
+        Bad{"srdf", "<robot name=\"r\">\n<group name=\"arm\"/></robot>", {":2:", "is an SRDF", "URDF"}},
+        Bad{"sdf", "<sdf version=\"1.6\"></sdf>", {"SDF"}}, Bad{"mjcf", "<mujoco/>", {"MJCF"}},
+        Bad{"millimetres",
+            "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/><link name=\"c\"/>\n"
+            "<joint name=\"j1\" type=\"continuous\"><parent link=\"a\"/><child link=\"b\"/>"
+            "<origin xyz=\"500 0 0\"/></joint>\n"
+            "<joint name=\"j2\" type=\"continuous\"><parent link=\"b\"/><child link=\"c\"/>\n"
+            "<origin xyz=\"0 250 0\"/></joint></robot>",
+            {":4: joint 'j2'", "250 m", "millimetres?"}},
+        Bad{"degrees", one_joint("continuous", z + "<origin rpy=\"0 90 0\"/>"), {":4: joint 'lift'", "degrees?"}},
+        Bad{"kg_mm2",
+            one_joint("continuous", z,
+                      "<inertial><mass value=\"2\"/><inertia ixx=\"9e4\" iyy=\"1\" izz=\"1\" ixy=\"0\" ixz=\"0\" "
+                      "iyz=\"0\"/></inertial>"),
+            {":3: link 'tip'", "kg mm^2?", "divide by 1e6"}},
+        Bad{"grams",
+            one_joint("continuous", z,
+                      "<inertial><mass value=\"25000\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\" ixy=\"0\" ixz=\"0\" "
+                      "iyz=\"0\"/></inertial>"),
+            {":3: link 'tip'", "grams?"}},
         Bad{"floating", one_joint("floating", z), {":4: joint 'lift'", "not supported"}},
         Bad{"planar", one_joint("planar", z), {":4: joint 'lift'", "not supported"}},
         Bad{"unknown_type", one_joint("screw", z), {"lift"}},
@@ -97,6 +120,19 @@ TEST(Urdf, MissingFileIsNamed) {
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("/nowhere/arm.urdf"), std::string::npos);
   }
+}
+
+TEST(Urdf, KinematicsAreEnough) {
+  const Robot robot = read_urdf(write(one_joint("revolute", z + "<limit lower=\"-2\" upper=\"1\"/>")));
+  ASSERT_EQ(robot.size(), 1U);
+  EXPECT_EQ(robot.joints[0].limits->lower, -2);
+  EXPECT_EQ(robot.joints[0].limits->upper, 1);
+  EXPECT_EQ(robot.joints[0].limits->effort, 0);  // not known
+  EXPECT_EQ(robot.joints[0].limits->velocity, 0);
+}
+
+TEST(Urdf, ARobotMayStandFarFromTheWorldsOrigin) {
+  EXPECT_EQ(read_urdf(write(one_joint("continuous", z + "<origin xyz=\"40 25 0\"/>"))).size(), 1U);
 }
 
 TEST(Urdf, ReadsPuma560) {

@@ -64,8 +64,47 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"dq_in_degrees", sine(1, degrees), {"dq1 looks like degrees", "pi/180"}},
         Bad{"all_in_degrees", sine(degrees, degrees), {"q1 looks like degrees", "pi/180"}},
         Bad{"degrees_without_dq", sine(degrees, 1, 1, false), {"q1 looks like degrees", "pi/180"}},
-        Bad{"milliseconds", sine(1, 1, 1000), {"t looks like milliseconds"}}),
+        Bad{"two_units", sine(1, 1, 1e4), {"20 apart may be ms at 50 samples a second or us at 5e+04", "time_unit ="}},
+        Bad{"no_unit", sine(1, 1, 1e12), {"in no unit of a robot's log", "time_unit ="}},
+        Bad{"milliseconds_at_10_kHz", sine(1, 1, 50), {"t looks like milliseconds", "time_unit = \"ms\""}},
+        Bad{"other_format", "PK\x03\x04xl/workbook", {"is a spreadsheet", "save it as CSV"}},
+        Bad{"from_zero", "t,q0,tau0\n0,1,2\n", {"count from 0", "q = [\"q0\"]"}}),
     [](const auto& parameter) { return parameter.param.name; });
+
+TEST(Csv, StampsOfOtherUnitsAreSeconds) {
+  for (const double per_second : {1e3, 1e6, 1e9}) {
+    const Log log = read(write("unit.csv", sine(1, 1, per_second)));
+    EXPECT_NEAR(log.step_s, 0.002, 1e-12) << per_second;
+    EXPECT_FALSE(log.resampled);
+    EXPECT_EQ(log.t[1], 0.002) << per_second;  // windows name such instants
+  }
+}
+
+TEST(Csv, TheUnitOfStampsMayBeWrittenDown) {
+  LogFormat format;
+  format.time_unit_s = 1e-6;
+  EXPECT_NEAR(read(write("given.csv", sine(1, 1, 1e4)), 1, format).step_s, 2e-5, 1e-12);
+  format = {};
+  format.columns["t"] = "stamp_ns";
+  std::string text = sine(1, 1, 1e9);
+  text.replace(0, 1, "stamp_ns");
+  EXPECT_NEAR(read(write("named.csv", text), 1, format).step_s, 0.002, 1e-12);
+}
+
+TEST(Csv, StampsSince1970AreTakenByTheirSize) {
+  std::string text = "t,q1,tau1\n";
+  for (int i = 0; i < 200; ++i) text += fmt::format("{},0.{},1\n", 1'700'000'000'000LL + 30 * i, i);
+  const Log log = read(write("epoch_ms.csv", text));  // 30 ms: as numbers alone, ms or us
+  EXPECT_NEAR(log.step_s, 0.03, 1e-6);
+  EXPECT_NEAR(log.t[0], 1.7e9, 1e-3);
+}
+
+TEST(Csv, CommentsAreSkippedAndMayNameTheColumns) {
+  const std::string rows = "0,1,2\n# paused\n0.1,3,4\n";
+  EXPECT_EQ(read(write("commented.csv", "% robot 7\nt,q1,tau1\n" + rows)).q(1, 0), 3);
+  EXPECT_EQ(read(write("numpy.csv", "# robot 7\n# t,q1,tau1\n" + rows)).tau(1, 0), 4);
+  EXPECT_EQ(read(write("rostopic.csv", "%t,q1,tau1\n" + rows)).tau(1, 0), 4);
+}
 
 TEST(Csv, SineInRadiansIsFine) {
   EXPECT_EQ(read(write("sine.csv", sine(1, 1))).samples(), 4000);

@@ -1,0 +1,186 @@
+#!/usr/bin/env python3
+"""mistakes_test.py FXDYN [NAME..]: makes each mistake of mistakes.toml out of the good project, runs fxdyn on it, and
+looks at what it says: the exit code, the right cause in one line, no crash, nothing half-written.
+
+Keys of a [[mistake]]:
+  name, exit        its name and the exit code; said: parts of what is printed; unsaid: what must not be
+  run               arguments, default: identify robot.toml --out out
+  rows, of          new values of columns of a log, as expressions of the row's columns and k; of: default train.csv
+  where             a condition: the other rows stay as they are; drop: rows that go
+  columns           the line of names; front: text in front of the file; separator
+  replace           [[file, old, new], ..] in the texts; write: other files
+  bytes             a name of make_bytes(): what the log is packed in
+  stdin, fifo       a file that comes through standard input, or through a FIFO of its name
+  env               variables of the environment; gone: a file that is removed
+  leaves            results are written though the exit code is not 0
+"""
+import bz2
+import gzip
+import lzma
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import tomllib
+import zipfile
+
+import good
+
+HERE = pathlib.Path(__file__).resolve().parent
+TIMEOUT_S = 60
+
+
+def make_bytes(kind, text, file):
+    """The log's text as other programs would store it; None: `file` was written."""
+    data = text.encode()
+    if kind == "gzip":
+        return gzip.compress(data, 1)
+    if kind == "gzip, cut":
+        return gzip.compress(data, 1)[:-5000]
+    if kind == "gzip, damaged":
+        packed = bytearray(gzip.compress(data, 1))
+        packed[len(packed) // 2:len(packed) // 2 + 200] = b"\xff" * 200
+        return bytes(packed)
+    if kind == "spreadsheet":
+        with zipfile.ZipFile(file, "w") as archive:
+            archive.writestr("xl/worksheets/sheet1.xml", text)
+        return None
+    magic = {"parquet": b"PAR1\x15\x04\x15\x80", "hdf5": b"\x89HDF\r\n\x1a\n\0\0", "matlab": b"MATLAB 5.0 MAT-file\0",
+             "ros bag": b"#ROSBAG V2.0\n\x45\0\0\0", "sqlite": b"SQLite format 3\0", "numpy": b"\x93NUMPY\x01\0v\0",
+             "zstd": b"\x28\xb5\x2f\xfd\x04\x58"}
+    if kind in magic:
+        return magic[kind] + bytes(range(256)) * 8
+    return {"utf-16": lambda: text.encode("utf-16"), "utf-16 without mark": lambda: text.encode("utf-16-le"),
+            "bzip2": lambda: bz2.compress(data), "xz": lambda: lzma.compress(data),
+            "floats": lambda: bytes(4) + bytes(range(256)) * 20, "carriage returns": lambda: data.replace(b"\n", b"\r\n"),
+            "nothing": lambda: b""}[kind]()
+
+
+def changed_rows(mistake, rows):
+    """The rows with the mistake's expressions in them."""
+    new, where = mistake.get("rows", {}), mistake.get("where", "True")
+    code = {good.COLUMNS.index(column): compile(text, column, "eval") for column, text in new.items()}
+    condition, dropped = compile(where, "where", "eval"), compile(mistake.get("drop", "False"), "drop", "eval")
+    out = []
+    for k, row in enumerate(rows):
+        names = dict(zip(good.COLUMNS, row), k=k)
+        if eval(dropped, {}, names):
+            continue
+        row = list(row)
+        if eval(condition, {}, names):
+            for column, expression in code.items():
+                row[column] = eval(expression, {}, names)
+        out.append([value if isinstance(value, str) else format(value, ".19g" if value > 1e12 else ".10g") for value in row])
+    return out
+
+
+def log_text(mistake, phase):
+    separator = mistake.get("separator", ",")
+    rows = changed_rows(mistake, good.log(phase))
+    lines = [separator.join(row) for row in rows]
+    columns = mistake.get("columns", separator.join(good.COLUMNS))
+    return mistake.get("front", "") + (columns + "\n" if columns else "") + "\n".join(lines) + "\n"
+
+
+def prepare(mistake, files, folder):
+    """Writes the project with the mistake in it."""
+    files = dict(files)
+    of = mistake.get("of", "train.csv")
+    if any(key in mistake for key in ("rows", "drop", "columns", "front", "separator")):
+        files[of] = log_text(mistake, 0.3 if of == "train.csv" else mistake.get("phase", 1.4))
+    files.update(mistake.get("write", {}))
+    for name, old, new in mistake.get("replace", []):
+        if old not in files[name]:
+            raise SystemExit(f"mistakes: {mistake['name']}: {name} has no '{old}'")
+        files[name] = files[name].replace(old, new)
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    if "bytes" in mistake:
+        data = make_bytes(mistake["bytes"], files[of], folder / of)
+        if data is not None:
+            (folder / of).write_bytes(data)
+    if "gone" in mistake:
+        (folder / mistake["gone"]).unlink()
+
+
+def feed(file, data):
+    """Writes into a FIFO, as long as somebody reads."""
+    try:
+        file.write_bytes(data)
+    except BrokenPipeError:
+        pass
+
+
+def run(fxdyn, mistake, folder):
+    command = [fxdyn, *mistake.get("run", "identify robot.toml --out out").split()]
+    environment = {"HOME": str(folder), "PATH": os.environ["PATH"], "LC_ALL": "C", **mistake.get("env", {})}
+    for name in ("ASAN_OPTIONS", "UBSAN_OPTIONS"):
+        if name in os.environ:
+            environment[name] = os.environ[name]
+    given = (folder / mistake["stdin"]).read_bytes() if "stdin" in mistake else None
+    if "fifo" in mistake:
+        fifo = folder / mistake["fifo"]
+        data = fifo.read_bytes()
+        fifo.unlink()
+        os.mkfifo(fifo)
+        threading.Thread(target=feed, args=(fifo, data), daemon=True).start()
+    options = {"input": given} if given is not None else {"stdin": subprocess.DEVNULL}
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, timeout=TIMEOUT_S, check=False, **options)
+
+
+def complaints(mistake, done, folder):
+    """What is wrong with what it did."""
+    out = []
+    code = mistake["exit"]
+    said = done.stderr.decode(errors="replace") + done.stdout.decode(errors="replace")
+    if done.returncode != code:
+        out.append(f"exit code {done.returncode}, not {code}")
+    for part in mistake["said"]:
+        if part not in said:
+            out.append(f"does not say '{part}'")
+    for part in mistake.get("unsaid", []) + ["internal error"]:
+        if part in said:
+            out.append(f"says '{part}'")
+    lines = [line for line in done.stderr.decode(errors="replace").splitlines() if line.startswith("fxdyn: ")]
+    if len(lines) != (0 if code == 0 else 1):
+        out.append(f"{len(lines)} lines begin with 'fxdyn:'")
+    if any(byte < 32 and byte not in b"\n\r\t" for byte in done.stderr + done.stdout) or b"\xff" in done.stderr:
+        out.append("bytes on the terminal that are no text")
+    left = [str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()]
+    results = [name for name in left if name.startswith("out/") or name.endswith(".tmp")]
+    if code != 0 and results and not mistake.get("leaves"):
+        out.append(f"left behind: {', '.join(results)}")
+    return out
+
+
+def main():
+    fxdyn, wanted = os.path.abspath(sys.argv[1]), sys.argv[2:]
+    mistakes = tomllib.loads((HERE / "mistakes.toml").read_text())["mistake"]
+    names = [mistake["name"] for mistake in mistakes]
+    if len(set(names)) != len(names):
+        raise SystemExit("mistakes: two have the same name")
+    files, failed, slowest, start = good.files(), 0, (0, ""), time.monotonic()
+    for mistake in mistakes:
+        if wanted and mistake["name"] not in wanted:
+            continue
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            prepare(mistake, files, folder)
+            begin = time.monotonic()
+            done = run(fxdyn, mistake, folder)
+            slowest = max(slowest, (time.monotonic() - begin, mistake["name"]))
+            wrong = complaints(mistake, done, folder)
+        if wrong or wanted:
+            output = (done.stderr + done.stdout).decode(errors="backslashreplace").strip()
+            print(f"{'FAILED' if wrong else 'as it should'}: {mistake['name']}: {'; '.join(wrong)}\n    "
+                  + output.replace("\n", "\n    "))
+        failed += bool(wrong)
+    print(f"{len(mistakes)} mistakes, {failed} failed; {time.monotonic() - start:.1f} s, the slowest {slowest[0]:.2f} s ({slowest[1]})")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
