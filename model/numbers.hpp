@@ -16,6 +16,8 @@
 //     w as a stored number of type T, rounded half up, no check: the export has proven that it fits (host_tools/export)
 //   N::narrow<T>(w, s)
 //     the same, saturated and counted in s: for what no proof covers
+//   N::narrow_with_room<T>(w, s)
+//     the same; no motion within the limits saturates it: the export chooses formats that hold it
 //   N::clamp<T>(w)
 //     the same where saturation is meant, not counted
 //   N::convert<T>(x)
@@ -68,6 +70,10 @@ struct Real {
   static constexpr double one() { return 1; }
   template <class T>
   static constexpr T narrow(double x, Saturations&) {
+    return x;
+  }
+  template <class T>
+  static constexpr T narrow_with_room(double x, Saturations&) {
     return x;
   }
   template <class T>
@@ -191,6 +197,10 @@ struct FixedNumbers {
     const T result{raw::narrow(x.raw, bits - T::bits, outside)};
     saturations.count += outside;
     return result;
+  }
+  template <class T, int bits>
+  static constexpr T narrow_with_room(Wide<bits> x, Saturations& saturations) {
+    return narrow<T>(x, saturations);
   }
   template <class T, int bits>
   static constexpr T proven_narrow(Wide<bits> x) {

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/check/column_words.hpp"
+#include "host_tools/check/torque_column.hpp"
 #include "host_tools/simulate/recordings.hpp"
 
 namespace fxdyn {
@@ -21,7 +22,11 @@ std::vector<CheckFinding> check_columns(const Project& project, const std::vecto
                                         const ArrangementOptions& options) {
   std::vector<CheckFinding> out;
   if (!project.check.columns) return out;
-  const ArrangementEvidence evidence(project.robot, sample_torque(logs, options.samples), options);
+  const auto lead = find_long_torque_lead(project, logs, options);
+  if (lead) out.push_back(in_words(*lead));
+  const TorqueSamples samples =
+      sample_torque(logs, options.samples, lead ? lead->seconds : project.signals.torque_lead_s.value_or(0));
+  const ArrangementEvidence evidence(project.robot, samples, options);
   for (const ArrangementFinding& finding : find_mistakes(evidence, options)) out.push_back(in_words(finding, project));
   return out;
 }
@@ -32,8 +37,18 @@ CheckResult check(const Project& project, const std::filesystem::path& directory
     for (const Log& log : read_logs(project, role, directory)) result.logs.push_back(facts_of(log, options.facts));
   }
   if (project.has_role(Role::train)) {
-    const GateData data = read_gate_data(project, directory);
-    result.findings = check_columns(project, data.logs, options.arrangement);
+    if (project.check.columns &&
+        are_exchanged(project, read_logs(project, Role::train, directory), options.arrangement)) {
+      result.findings.push_back({true,
+                                 "exchanged",
+                                 {},
+                                 "",
+                                 "the columns of q and tau look exchanged: the URDF explains the positions as torques",
+                                 "exchange the columns of q and tau in columns = { ... }"});
+    } else {
+      const GateData data = read_gate_data(project, directory);
+      result.findings = check_columns(project, data.logs, options.arrangement);
+    }
   }
   for (CheckFinding& finding : findings_of(result.logs, project.robot, options.facts))
     result.findings.push_back(std::move(finding));

@@ -34,6 +34,7 @@ struct LogFacts {
   double begin_s = 0, end_s = 0;  ///< the log's own time
   double seconds = 0, rate_hz = 0;
   bool resampled = false;                    ///< its stamps were irregular
+  std::string time_note;                     ///< as Log's
   double rest_share = 0;                     ///< of the time, all joints at rest
   double rest_until_s = 0, rest_from_s = 0;  ///< the log's own time: standstill at its ends
   Eigen::VectorXd q_lower, q_upper;          ///< [rad | m]

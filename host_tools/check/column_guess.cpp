@@ -166,20 +166,28 @@ ColumnGuess by_names(const CsvHead& head, const Robot& robot) {
   return out;
 }
 
-/// Whether column b is the time derivative of column a.
+/// Whether column b is the time derivative of column a: over 50 ms, which a coarse encoder's steps do not hide, and
+/// over the whole file, which may begin at rest.
 bool is_derivative(const CsvHead& head, std::size_t a, std::size_t b) {
+  constexpr double span_s = 0.05;
+  constexpr double unlike = 0.1;  // share of the square that another signal exceeds by far
+  const std::size_t count = head.rows.size();
+  const double step = (head.rows[count - 1][0] - head.rows[0][0]) / static_cast<double>(count - 1);
+  const auto span = std::clamp<std::size_t>(static_cast<std::size_t>(step > 0 ? span_s / step : 1), 1,
+                                            std::max<std::size_t>(1, count / 4));
   double error = 0, size = 0;
-  for (std::size_t k = 1; k < head.rows.size(); ++k) {
-    const double step = head.rows[k][0] - head.rows[k - 1][0];
-    const double speed = (head.rows[k][a] - head.rows[k - 1][a]) / step;
-    const double mean = (head.rows[k][b] + head.rows[k - 1][b]) / 2;
-    error += (speed - mean) * (speed - mean);
-    size += mean * mean;
+  for (std::size_t first = 0; first + span < count; first += span) {
+    double moved = 0;
+    for (std::size_t k = first + 1; k <= first + span; ++k)
+      moved += (head.rows[k][b] + head.rows[k - 1][b]) / 2 * (head.rows[k][0] - head.rows[k - 1][0]);
+    const double difference = head.rows[first + span][a] - head.rows[first][a] - moved;
+    error += difference * difference;
+    size += moved * moved;
   }
-  return size > 0 && error < 0.25 * size;
+  return size > 0 && error < unlike * size;
 }
 
-/// t, then blocks of one column a joint: q, dq where it is the derivative of q, tau.
+/// t, then blocks of one column a joint: q, dq and ddq where they are derivatives, tau.
 ColumnGuess by_numbers(const CsvHead& head, const Robot& robot) {
   ColumnGuess out;
   const std::size_t n = robot.size();
@@ -196,14 +204,18 @@ ColumnGuess by_numbers(const CsvHead& head, const Robot& robot) {
   out.format.columns["t"] = "#0";
   out.format.joint_columns["q"] = block(1);
   std::size_t next = 1 + n;
-  std::size_t derivatives = 0;
-  for (std::size_t j = 0; j < n && next + n < head.columns; ++j) derivatives += is_derivative(head, 1 + j, next + j);
-  if (2 * derivatives > n && head.columns >= next + 2 * n) {
-    out.format.joint_columns["dq"] = block(next);
+  for (const char* signal : {"dq", "ddq"}) {
+    if (head.columns < next + 2 * n) break;
+    std::size_t derivatives = 0;
+    for (std::size_t j = 0; j < n; ++j) derivatives += is_derivative(head, next - n + j, next + j);
+    if (2 * derivatives <= n) break;
+    out.format.joint_columns[signal] = block(next);
     next += n;
   }
   out.format.joint_columns["tau"] = block(next);
-  out.notes.push_back("the file names no columns: their order t, q, (dq,) tau is a guess; check it");
+  out.notes.push_back("the file names no columns: this order is a guess; check it");
+  out.notes.push_back(
+      "are the last ones currents? Then write torque_gain = [..]: torque constant x gear ratio of each joint");
   if (head.columns > next + n) out.notes.push_back(fmt::format("columns from {} on are not used", next + n));
   return out;
 }

@@ -9,14 +9,14 @@
 
 namespace fxdyn {
 
-/// The first lines of a CSV.
+/// The first lines of a CSV: minutes, since a recording may begin at rest.
 struct CsvHead {
   std::vector<std::string> names;         ///< of the columns; empty: the file has none
   std::vector<std::vector<double>> rows;  ///< numbers of the first lines, NaN where a field is none
   std::size_t columns = 0;
 };
 /// @throws InputError: not readable, or no line of numbers in it
-CsvHead read_head(const std::filesystem::path& file, std::size_t rows = 200);
+CsvHead read_head(const std::filesystem::path& file, std::size_t rows = 100'000);
 
 /// What the columns of a CSV hold, by their names, or by their number and numbers where they have none.
 struct ColumnGuess {

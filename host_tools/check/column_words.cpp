@@ -167,4 +167,16 @@ CheckFinding in_words(const ArrangementFinding& finding, const Project& project)
   return out;
 }
 
+CheckFinding in_words(const TorqueLead& lead) {
+  return {
+      false,
+      "torque_lead",
+      {},
+      "",
+      fmt::format("torque is recorded {:.0f} ms {} the motion: {:.0f} % of it is not explained, {:.0f} % with it moved",
+                  1000 * std::fabs(lead.seconds), lead.seconds > 0 ? "ahead of" : "behind", 100 * lead.before,
+                  100 * lead.after),
+      fmt::format("[signals] torque_lead_s = {:.3g}", lead.seconds)};
+}
+
 }  // namespace fxdyn

@@ -50,6 +50,7 @@ LogFacts facts_of(const Log& log, const LogFactOptions& options) {
   facts.seconds = static_cast<double>(log.samples()) * log.step_s;
   facts.rate_hz = 1 / log.step_s;
   facts.resampled = log.resampled;
+  facts.time_note = log.time_note;
   facts.q_lower = log.q.colwise().minCoeff().transpose();
   facts.q_upper = log.q.colwise().maxCoeff().transpose();
   Index window = 1;
@@ -85,6 +86,7 @@ std::vector<CheckFinding> findings_of(const std::vector<LogFacts>& logs, const R
   VectorXd lower = VectorXd::Constant(n, 1e300), upper = -lower, speed = VectorXd::Zero(n);
   for (const LogFacts& log : logs) {
     add_rest(log, options, log.begin_s, log.end_s, out);
+    if (!log.time_note.empty()) out.push_back({false, "time_unit", {}, "", log.time_note, ""});
     lower = lower.cwiseMin(log.q_lower);
     upper = upper.cwiseMax(log.q_upper);
     speed = speed.cwiseMax(log.speed);

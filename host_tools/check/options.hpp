@@ -32,6 +32,13 @@ struct ArrangementOptions {
   double least_gain = 0.2;
   /// rad; gravity turned by less is a tilt, which diagnosis names; hand
   double least_turn = 0.35;
+  /// s; torque further from the motion's time is told; theory: identify tries up to StructureOptions::longest_lead_s
+  double least_lead_s = 0.010;
+  /// s; longest one that is tried; that of [signals] torque_lead_s
+  double longest_lead_s = 0.1;
+  /// share of the torque's RMS; q and tau are exchanged where more than the first stays as given and less than the
+  /// second exchanged; hand
+  double unexplained = 0.5, explained = 0.3;
   /// findings in one set of logs, at most
   int most = 4;
 };

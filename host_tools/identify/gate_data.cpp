@@ -82,6 +82,7 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
   for (const Log& log : logs) samples += log.samples();
   if (static_cast<double>(samples) > options.long_logs) data.threads = 1;
   for (Log& log : logs) {
+    if (!log.time_note.empty()) data.notes.push_back(log.time_note);
     if (log.resampled) {
       data.notes.push_back(
           fmt::format("{}: irregular time stamps, resampled to {:.6g} s", log.file.filename().string(), log.step_s));

@@ -26,7 +26,7 @@ std::vector<Index> spread_samples(Index first, Index last, Index stride) {
 
 }  // namespace
 
-TorqueSamples sample_torque(const std::vector<ProcessedLog>& logs, Index wanted) {
+TorqueSamples sample_torque(const std::vector<ProcessedLog>& logs, Index wanted, double lead_s) {
   TorqueSamples samples;
   Index available = 0;
   for (const ProcessedLog& log : logs) {
@@ -46,6 +46,8 @@ TorqueSamples sample_torque(const std::vector<ProcessedLog>& logs, Index wanted)
   Index to = 0;
   for (std::size_t l = 0; l < logs.size(); ++l) {
     if (at[l].empty()) continue;
+    const auto lead = static_cast<Index>(std::llround(lead_s / logs[l].step_s));
+    const auto torque_at = [&](Index k) { return std::clamp(k - lead, logs[l].first, logs[l].last - 1); };
     for (std::size_t k = 0; k < at[l].size(); ++k) {
       const MotionRows motion = logs[l].motion(at[l][k], 1);
       const Index row = to + static_cast<Index>(k);
@@ -56,7 +58,8 @@ TorqueSamples sample_torque(const std::vector<ProcessedLog>& logs, Index wanted)
     // Column by column: a long log's filtered torque is not held for a few hundred of its samples.
     for (Index j = 0; j < joints; ++j) {
       const MatrixXd filtered = logs[l].filter_columns(logs[l].tau.col(j));
-      for (std::size_t k = 0; k < at[l].size(); ++k) samples.tau(to + static_cast<Index>(k), j) = filtered(at[l][k], 0);
+      for (std::size_t k = 0; k < at[l].size(); ++k)
+        samples.tau(to + static_cast<Index>(k), j) = filtered(torque_at(at[l][k]), 0);
     }
     to += static_cast<Index>(at[l].size());
   }

@@ -15,7 +15,7 @@ struct TorqueSamples {
 };
 
 /// About `wanted` of them, spread over the motion. Not at even distances: those may keep step with a motion that
-/// repeats itself, and all samples would show one pose.
-TorqueSamples sample_torque(const std::vector<ProcessedLog>& logs, Eigen::Index wanted);
+/// repeats itself, and all samples would show one pose. Torques are those of `lead_s` before the motion [s].
+TorqueSamples sample_torque(const std::vector<ProcessedLog>& logs, Eigen::Index wanted, double lead_s = 0);
 
 }  // namespace fxdyn

@@ -172,6 +172,10 @@ struct BoundedNumbers {
     return see(T{rounded<T>(x.value)});
   }
   template <class T>
+  static T narrow_with_room(BoundedWide x, Saturations&) {
+    return proven_narrow<T>(x);
+  }
+  template <class T>
   static T narrow(BoundedWide x, Saturations&) {
     // saturates, so that its range is no demand on the format
     if (current_bounding.formats == nullptr) return {x.value};

@@ -144,6 +144,10 @@ struct RunTimeNumbers {
     return result;
   }
   template <class T>
+  static T narrow_with_room(RunTimeWide x, Saturations& saturations) {
+    return narrow<T>(x, saturations);
+  }
+  template <class T>
   static T proven_narrow(RunTimeWide x) {
     assert(x.bits >= T::bits());
     std::uint32_t outside = 0;

@@ -22,10 +22,15 @@ Log read_log_for(const IdentifiedModel& model, const fs::path& file, std::option
                  std::optional<double> to_s, bool torque_required) {
   std::vector<bool> revolute;
   for (const Joint& joint : model.robot.joints) revolute.push_back(joint.type == JointType::revolute);
+  const auto read = [&](const LogFormat& format) {
+    Log log = read_log(file, model.robot.size(), revolute, format, from_s, to_s, torque_required);
+    if (!log.time_note.empty()) fmt::print(stderr, "note: {}\n", log.time_note);
+    return log;
+  };
   for (const std::string& name : {file.filename().string(), std::string()}) {
-    if (const auto found = model.log_formats.find(name); found != model.log_formats.end())
-      return read_log(file, model.robot.size(), revolute, found->second, from_s, to_s, torque_required);
+    if (const auto found = model.log_formats.find(name); found != model.log_formats.end()) return read(found->second);
   }
+  if (model.log_formats.empty()) return read({});  // of a simulated robot
   throw InputError(fmt::format(
       "{}: the project's logs have different columns or gains, and this one is none of them; name it like one",
       file.string()));

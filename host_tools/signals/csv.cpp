@@ -11,7 +11,6 @@
 #include "host_tools/signals/text_file.hpp"
 #include "host_tools/signals/time_unit.hpp"
 #include "host_tools/support/error.hpp"
-#include "host_tools/support/notes.hpp"
 
 namespace fxdyn {
 namespace {
@@ -309,11 +308,11 @@ Header header_of(LineReader& lines, const std::string& where) {
   return Header(where, lines.number(), first);
 }
 
-void note_unit(const std::string& where, const TimeUnit& unit) {
-  note_once(
-      fmt::format("{}: time stamps read as {}, by their steps; time_unit = \"{}\" in its [[log]] says it, or "
-                  "another of s, ms, us, ns",
-                  where, unit.name, unit.name));
+std::string unit_note(const std::string& file, const TimeUnit& unit) {
+  return fmt::format(
+      "{}: time stamps read as {}, by their steps; time_unit = \"{}\" in its [[log]] says it, or another of s, ms, "
+      "us, ns",
+      file, unit.name, unit.name);
 }
 
 }  // namespace
@@ -330,10 +329,11 @@ RecordedLog read_csv(const LogRequest& request) {
   Rows rows(where, layout);
   const bool time_is_known = layout.unit.has_value();
   const TimeUnit unit = time_is_known ? *layout.unit : unit_of_stamps(rows.first_stamps(lines), where);
-  if (!time_is_known && unit.per_second != 1) note_unit(where, unit);
   Table table = rows.read(mapped, lines, request.from, request.to, unit);
   const double first_t = table.first_t, last_t = table.last_t;
-  return {to_log(std::move(table), layout, request.joints), first_t, last_t, time_is_known};
+  Log log = to_log(std::move(table), layout, request.joints);
+  if (!time_is_known && unit.per_second != 1) log.time_note = unit_note(request.file.filename().string(), unit);
+  return {std::move(log), first_t, last_t, time_is_known};
 }
 
 }  // namespace fxdyn

@@ -36,6 +36,7 @@ struct Log {
   Eigen::MatrixXd q, dq, ddq, tau, qlink;
   Eigen::VectorXd encoder_step;  ///< of a resampled log: encoder_step() of the q that was recorded; empty: of q
   std::optional<Load> load;      ///< known from the project
+  std::string time_note;         ///< the unit of its stamps, where it was told from their steps and is not s
   Eigen::Index samples() const { return t.size(); }
   Eigen::Index joints() const { return q.cols(); }
 };

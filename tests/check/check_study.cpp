@@ -9,8 +9,10 @@
 #include <numbers>
 
 #include "host_tools/check/arrangement_search.hpp"
+#include "host_tools/check/torque_column.hpp"
 #include "host_tools/identify/gate_data.hpp"
 #include "host_tools/project/project.hpp"
+#include "host_tools/simulate/recordings.hpp"
 #include "host_tools/support/heap.hpp"
 #include "host_tools/support/parallel.hpp"
 #include "host_tools/support/random.hpp"
@@ -102,6 +104,39 @@ bool is_right(const ArrangementMove& move, const Planted& planted) {
          (planted.other < 0 || move.other == planted.other);
 }
 
+/// Torque that was recorded 20 to 80 ms before or after the motion, and positions in the torque's columns.
+void judge_columns(Project project, const Robot& robot, const fs::path& data, const std::vector<ProcessedLog>& logs,
+                   const ArrangementOptions& options, std::map<std::string, Tally>& counts) {
+  project.robot = robot;
+  const auto count = [&](const std::string& name, bool found, bool right, const std::string& seen) {
+    Tally& tally = counts[name];
+    ++tally.all;
+    tally.found += found;
+    tally.right += right;
+    tally.told += right;
+    if (!right) fmt::print("{}: {}: {}\n", data.parent_path().filename().string(), name, seen);
+  };
+  const auto told = find_long_torque_lead(project, logs, options);
+  count("sound times", told.has_value(), !told, told ? fmt::format("{:.3g} s", told->seconds) : "");
+  Random random(project.seed * 31 + 7);
+  const double off = random.uniform(0.02, 0.08) * (random.next() % 2 == 0 ? 1 : -1);
+  project.signals.torque_lead_s = off;
+  const auto late = find_long_torque_lead(project, logs, options);
+  count("late torque", late.has_value(), late && std::fabs(late->seconds) < 0.01,
+        fmt::format("{:.3g} s off, told {:.3g}", off, late ? late->seconds : 0));
+  project.signals.torque_lead_s.reset();
+  std::vector<Log> train = read_logs(project, Role::train, data);
+  const bool sound = are_exchanged(project, train, options);
+  count("sound columns", sound, !sound, "exchanged?");
+  for (Log& log : train) {
+    std::swap(log.q, log.tau);
+    for (Eigen::MatrixXd* rates : {&log.dq, &log.ddq, &log.qlink}) rates->resize(0, 0);
+    log.encoder_step.resize(0);
+  }
+  const bool exchanged = are_exchanged(project, train, options);
+  count("q and tau", exchanged, exchanged, "not seen");
+}
+
 std::string words(const ArrangementMove& move) {
   return fmt::format("{} {} {:.3g}", to_string(move.mistake), move.joint + 1, move.value);
 }
@@ -142,6 +177,7 @@ int main(int argc, char** argv) {
     const TorqueSamples samples = sample_torque(gate.logs, options.samples);
     Random random(wanted.seed * 7919 + 3);
     const Robot robot = with_masses_off(project.robot, share, random);
+    judge_columns(project, robot, data, gate.logs, options, counts);
     std::vector<Planted> cases = plant(robot, samples, random);
     cases.push_back({"sound", robot, samples});
     const double sound = ArrangementEvidence(robot, samples, options)(as_given(robot)).nats;

@@ -1,0 +1,86 @@
+#include "host_tools/check/torque_column.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "host_tools/check/arrangement.hpp"
+
+namespace fxdyn {
+namespace {
+
+struct Explained {
+  double nats = 0, left = 0;
+  bool enough = false;
+};
+
+/// How well the URDF as it is explains the samples; `left`: share of the torque's RMS that stays, mean over joints.
+Explained explain(const Robot& robot, const TorqueSamples& samples, const ArrangementOptions& options) {
+  const ArrangementEvidence evidence(robot, samples, options);
+  Explained out;
+  out.enough = evidence.enough();
+  if (!out.enough) return out;
+  const ArrangementScore score = evidence(as_given(robot));
+  out.nats = score.nats;
+  double joints = 0;
+  for (Eigen::Index j = 0; j < score.rms.size(); ++j) {
+    const double size = std::sqrt(samples.tau.col(j).squaredNorm() / static_cast<double>(samples.size()));
+    if (!evidence.moves(j) || !(size > 0)) continue;
+    out.left += score.rms[j] / size;
+    ++joints;
+  }
+  out.left /= std::max(1.0, joints);
+  return out;
+}
+
+}  // namespace
+
+std::optional<TorqueLead> find_long_torque_lead(const Project& project, const std::vector<ProcessedLog>& logs,
+                                                const ArrangementOptions& options) {
+  const double known = project.signals.torque_lead_s.value_or(0);
+  const auto at = [&](double more) {
+    return explain(project.robot, sample_torque(logs, options.samples, known + more), options);
+  };
+  const Explained given = at(0);
+  if (!given.enough) return {};
+  Explained best = given;
+  double lead = 0;
+  const auto attempt = [&](double seconds) {
+    if (std::fabs(known + seconds) > options.longest_lead_s) return;
+    const Explained next = at(seconds);
+    if (next.nats >= best.nats) return;
+    best = next;
+    lead = seconds;
+  };
+  for (double step = options.least_lead_s; step <= options.longest_lead_s; step *= 2)
+    for (const double sign : {1.0, -1.0}) attempt(sign * step);
+  if (lead == 0) return {};
+  for (double step = std::fabs(lead) / 2; step > options.least_lead_s / 10; step /= 2) {
+    const double centre = lead;
+    attempt(centre + step);
+    attempt(centre - step);
+  }
+  if (given.nats - best.nats < options.gain || std::fabs(lead) < options.least_lead_s) return {};
+  return TorqueLead{known + lead, given.left, best.left};
+}
+
+bool are_exchanged(const Project& project, const std::vector<Log>& train, const ArrangementOptions& options) {
+  const auto left = [&](bool exchanged) {
+    std::vector<Log> logs = train;
+    for (Log& log : logs) {
+      if (log.tau.size() == 0) return 1.0;
+      if (!exchanged) continue;
+      std::swap(log.q, log.tau);
+      for (Eigen::MatrixXd* rates : {&log.dq, &log.ddq, &log.qlink}) rates->resize(0, 0);
+      log.encoder_step.resize(0);
+    }
+    const FilterFit filter = choose_filter(logs, {});
+    std::vector<ProcessedLog> processed;
+    for (Log& log : logs) processed.push_back(process(std::move(log), filter));
+    const Explained explained = explain(project.robot, sample_torque(processed, options.samples), options);
+    return explained.enough ? explained.left : 1.0;
+  };
+  const double given = left(false);
+  return given > options.unexplained && left(true) < options.explained;
+}
+
+}  // namespace fxdyn

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "host_tools/check/options.hpp"
+#include "host_tools/project/project.hpp"
+#include "host_tools/regression/dataset.hpp"
+
+namespace fxdyn {
+
+/// Torque that was recorded at other times than the motion.
+struct TorqueLead {
+  double seconds = 0;            ///< torque ahead of the motion: [signals] torque_lead_s
+  double before = 0, after = 0;  ///< share of the torque's RMS that is not explained, mean of the joints that move
+};
+/// The shift that explains the torque best, where it gains `gain` and is longer than `least_lead_s`: shorter ones
+/// belong to identify, which finds them by itself.
+std::optional<TorqueLead> find_long_torque_lead(const Project& project, const std::vector<ProcessedLog>& logs,
+                                                const ArrangementOptions& options);
+
+/// Whether positions stand in the torque's columns and torques in the position's: the exchanged columns are explained
+/// by the URDF, the given ones are not.
+bool are_exchanged(const Project& project, const std::vector<Log>& train, const ArrangementOptions& options);
+
+}  // namespace fxdyn

@@ -1,0 +1,124 @@
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "host_tools/check/column_guess.hpp"
+#include "host_tools/check/init.hpp"
+#include "tests/support/files.hpp"
+
+namespace fxdyn {
+namespace {
+
+using test::write;
+using Names = std::vector<std::string>;
+
+std::filesystem::path two_joints() {
+  std::string text = "<robot name=\"r\"><link name=\"base\"/>";
+  std::string parent = "base";
+  for (const std::string joint : {"shoulder", "elbow"}) {
+    text += fmt::format(
+        "<link name=\"{0}_link\"><inertial><mass value=\"3\"/><inertia ixx=\".1\" iyy=\".1\" izz=\".1\" ixy=\"0\" "
+        "ixz=\"0\" iyz=\"0\"/></inertial></link><joint name=\"{0}\" type=\"revolute\"><parent link=\"{1}\"/><child "
+        "link=\"{0}_link\"/><axis xyz=\"0 1 0\"/><limit lower=\"-3\" upper=\"3\" velocity=\"3\" "
+        "effort=\"50\"/></joint>",
+        joint, parent);
+    parent = joint + "_link";
+  }
+  return write("two.urdf", text + "</robot>");
+}
+
+CsvHead head_of(const std::string& line) { return read_head(write("head.csv", line + "\n0,1,2,3,4\n1,2,3,4,5\n")); }
+
+/// Rows of t, q, dq where asked for, tau of two joints: at rest for `rest_s` at both ends. q in steps of an encoder.
+std::string recording(double speed, bool with_velocity, double rest_s, double scale = 1) {
+  std::string text;
+  for (int k = 0; k < 5000; ++k) {
+    const double t = 0.002 * k, moving = std::clamp(t - rest_s, 0.0, 10 - 2 * rest_s);
+    const bool rests = moving != t - rest_s;
+    text += fmt::format("{:.4f}", t);
+    for (const double w : {speed, 1.3 * speed})
+      text += fmt::format(",{:.4f}", scale * 1e-4 * std::round(1e4 * std::sin(w * moving)));
+    for (const double w : {speed, 1.3 * speed})
+      if (with_velocity) text += fmt::format(",{:.5f}", rests ? 0 : scale * w * std::cos(w * moving));
+    text += fmt::format(",{:.4f},{:.4f}\n", 20 * std::cos(moving), 5 * std::sin(3 * moving));
+  }
+  return text;
+}
+
+std::string init(const std::string& name, const std::string& text) {
+  return init_project({write(name, text)}, two_joints(), test::folder());
+}
+void expect_in(const std::string& part, const std::string& text) {
+  EXPECT_NE(text.find(part), std::string::npos) << part << "\nis not in\n" << text;
+}
+
+TEST(ColumnGuess, TakesNamesOfJointsAndNumbersFromZeroOrOne) {
+  const Robot robot = read_urdf(two_joints());
+  const ColumnGuess by_joint =
+      guess_columns(head_of("stamp,position_elbow,position_shoulder,effort_elbow,effort_shoulder"), robot);
+  EXPECT_TRUE(by_joint.missing.empty());
+  EXPECT_EQ(by_joint.format.columns.at("t"), "stamp");
+  EXPECT_EQ(by_joint.format.joint_columns.at("q"), (Names{"position_shoulder", "position_elbow"}));
+  EXPECT_EQ(by_joint.format.joint_columns.at("tau"), (Names{"effort_shoulder", "effort_elbow"}));
+  EXPECT_FALSE(by_joint.torque_is_current);
+  const ColumnGuess from_zero = guess_columns(head_of("time,actual_q_0,actual_q_1,i_0,i_1"), robot);
+  EXPECT_EQ(from_zero.format.joint_columns.at("q"), (Names{"actual_q_0", "actual_q_1"}));
+  EXPECT_TRUE(from_zero.torque_is_current);
+  const ColumnGuess from_one = guess_columns(head_of("t,q1,q2,tau1,tau2"), robot);
+  EXPECT_EQ(from_one.format.joint_columns.at("tau"), (Names{"tau1", "tau2"}));
+}
+
+TEST(ColumnGuess, TakesWhatWasMeasuredRatherThanWhatWasAsked) {
+  const ColumnGuess guess =
+      guess_columns(head_of("t,target_q1,target_q2,actual_q1,actual_q2\n"), read_urdf(two_joints()));
+  EXPECT_EQ(guess.format.joint_columns.at("q"), (Names{"actual_q1", "actual_q2"}));
+  EXPECT_EQ(guess.missing, Names{"tau"});
+}
+
+TEST(ColumnGuess, WithoutNamesTellsVelocitiesFromTorquesByTheMotion) {
+  const Robot robot = read_urdf(two_joints());
+  const ColumnGuess with = guess_columns(read_head(write("with.csv", recording(2, true, 2))), robot);
+  EXPECT_EQ(with.format.joint_columns.at("dq"), (Names{"#3", "#4"}));
+  EXPECT_EQ(with.format.joint_columns.at("tau"), (Names{"#5", "#6"}));
+  const ColumnGuess without = guess_columns(read_head(write("without.csv", recording(2, false, 2))), robot);
+  EXPECT_EQ(without.format.joint_columns.count("dq"), 0U);
+  EXPECT_EQ(without.format.joint_columns.at("tau"), (Names{"#3", "#4"}));
+}
+
+TEST(Init, WritesColumnsByNumberAndWindowsWithoutStandstill) {
+  const std::string project = init("raw.csv", recording(2, true, 2));
+  expect_in("columns = { t = 0, dq = [3, 4], q = [1, 2], tau = [5, 6] }", project);
+  expect_in("urdf = \"two.urdf\"", project);
+  expect_in("role = \"train\"\nfrom_s = 2", project);
+  expect_in("to_s = 8", project);
+  expect_in("role = \"test\"", project);
+  expect_in("fxdyn check", project);
+}
+
+TEST(Init, WritesThatDegreesBecomeRadians) {
+  const std::string project = init("degrees.csv", recording(2, true, 0, 180 / std::numbers::pi));
+  expect_in("position_gain = [0.01745329252, 0.01745329252]", project);
+}
+
+TEST(Init, GivesEachMotionOneRole) {
+  const std::string head = "t,q1,q2,tau1,tau2\n";
+  std::vector<std::filesystem::path> logs;
+  for (const auto& [name, speed] : {std::pair{"a.csv", 0.1}, std::pair{"b.csv", 0.1}, std::pair{"c.csv", 0.14}})
+    logs.push_back(write(name, head + recording(speed, false, 0)));
+  const std::string project = init_project(logs, two_joints(), test::folder());
+  expect_in("file = \"a.csv\"\nrole = \"train\"", project);
+  expect_in("file = \"b.csv\"\nrole = \"train\"", project);
+  expect_in("file = \"c.csv\"\nrole = \"test\"", project);
+  EXPECT_EQ(project.find("[signals]"), std::string::npos);  // its names are those of a project
+}
+
+TEST(Init, SaysWhichColumnsItDoesNotFind) {
+  const auto log = write("nothing.csv", "a,b,c\n1,2,3\n4,5,6\n");
+  test::expect_refused(log, {"no column is seen for t, q, tau", "columns ="},
+                       [&] { init_project({log}, two_joints(), test::folder()); });
+}
+
+}  // namespace
+}  // namespace fxdyn
