@@ -40,9 +40,8 @@ constexpr JointInput<N> joint_input(const JointState<N>& joint, const JointConst
 }
 
 /// The link's side of a joint whose motor and link differ by a deflection delta: q - delta and, with the differences of
-/// delta from tick to tick, its derivatives, within the joint's limits. Zero derivatives in the first tick. The formats
-/// have room for the largest of these differences: what saturated before the limits cut it would be an error that no
-/// proof bounds.
+/// delta from tick to tick, its derivatives, within the joint's limits. Zero derivatives in the first tick.
+/// Setpoints that jump saturate the differences, which is counted.
 template <class N>
 struct Deflection {
   /// Ticks in a row that skip() can bridge: beyond, the differences begin anew. Extrapolated by constant
@@ -57,21 +56,21 @@ struct Deflection {
   /// @param per_second 1 / tick [1/s]
   constexpr JointState<N> step(const JointState<N>& motor, typename N::DeflectionSum sum, Count<N> per_second,
                                const JointLimits<N>& limits, Saturations& saturations) {
-    const auto now = N::template narrow_with_room<Position<N>>(sum, saturations);
-    const auto change_now = N::template narrow_with_room<Position<N>>(now - delta, saturations);
-    const auto speed = N::template narrow_with_room<Velocity<N>>(change_now * per_second, saturations);
+    const auto now = N::template narrow_counted<Position<N>>(sum, saturations);
+    const auto change_now = N::template narrow_counted<Position<N>>(now - delta, saturations);
+    const auto speed = N::template narrow_counted<Velocity<N>>(change_now * per_second, saturations);
     const auto new_rate = select(ticks > 0, speed, Velocity<N>{});
-    const auto speed_change = N::template narrow_with_room<Velocity<N>>(new_rate - rate, saturations);
-    const auto push = N::template narrow_with_room<Acceleration<N>>(speed_change * per_second, saturations);
+    const auto speed_change = N::template narrow_counted<Velocity<N>>(new_rate - rate, saturations);
+    const auto push = N::template narrow_counted<Acceleration<N>>(speed_change * per_second, saturations);
     const auto acceleration = select(ticks > 1, push, Acceleration<N>{});
     delta = now;
     change_before = change;
     change = select(ticks > 0, change_now, Position<N>{});
     rate = new_rate;
     ticks += static_cast<std::uint32_t>(ticks < 4);
-    return limit_setpoint<N>({N::template narrow_with_room<Position<N>>(motor.q - now, saturations),
-                              N::template narrow_with_room<Velocity<N>>(motor.dq - new_rate, saturations),
-                              N::template narrow_with_room<Acceleration<N>>(motor.ddq - acceleration, saturations)},
+    return limit_setpoint<N>({N::template narrow_counted<Position<N>>(motor.q - now, saturations),
+                              N::template narrow_counted<Velocity<N>>(motor.dq - new_rate, saturations),
+                              N::template narrow_counted<Acceleration<N>>(motor.ddq - acceleration, saturations)},
                              limits, saturations);
   }
 

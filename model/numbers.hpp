@@ -16,8 +16,8 @@
 //     w as a stored number of type T, rounded half up, no check: the export has proven that it fits (host_tools/export)
 //   N::narrow<T>(w, s)
 //     the same, saturated and counted in s: for what no proof covers
-//   N::narrow_with_room<T>(w, s)
-//     the same; no motion within the limits saturates it: the export chooses formats that hold it
+//   N::narrow_counted<T>(w, s)
+//     the same; a tick in which it saturates is counted and no longer within the proven error
 //   N::clamp<T>(w)
 //     the same where saturation is meant, not counted
 //   N::convert<T>(x)
@@ -73,7 +73,7 @@ struct Real {
     return x;
   }
   template <class T>
-  static constexpr T narrow_with_room(double x, Saturations&) {
+  static constexpr T narrow_counted(double x, Saturations&) {
     return x;
   }
   template <class T>
@@ -199,7 +199,7 @@ struct FixedNumbers {
     return result;
   }
   template <class T, int bits>
-  static constexpr T narrow_with_room(Wide<bits> x, Saturations& saturations) {
+  static constexpr T narrow_counted(Wide<bits> x, Saturations& saturations) {
     return narrow<T>(x, saturations);
   }
   template <class T, int bits>

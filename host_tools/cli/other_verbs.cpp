@@ -54,6 +54,10 @@ Action add_check(CLI::App& verb) {
     std::fflush(stdout);
     if (result.has_error())
       throw DataError("these logs can't be what the project says: write the lines above, then check again");
+    if (!options->as_json) {
+      const std::filesystem::path project = options->project;
+      fmt::print("next: fxdyn run {} --out out/{}\n", project.string(), project.stem().string());
+    }
   };
 }
 
@@ -68,6 +72,7 @@ Action add_init(CLI::App& verb) {
   return [options] {
     fmt::print("{}", init_project({options->logs.begin(), options->logs.end()}, options->urdf,
                                   std::filesystem::current_path()));
+    fmt::print(stderr, "next, if this is written to robot.toml: fxdyn check robot.toml\n");
   };
 }
 

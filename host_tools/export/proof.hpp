@@ -9,7 +9,8 @@
 
 namespace fxdyn {
 
-/// What holds for every motion within the joint limits.
+/// What holds for every motion within the joint limits; the error only while no saturation is counted (setpoints that
+/// jump let the differences of a deflection saturate).
 struct Proof {
   Ranges ranges;                ///< of every kind of number: formats that hold them can't overflow
   Eigen::VectorXd torque;       ///< |tau| of each joint before its torque limit, at most [N*m | N]

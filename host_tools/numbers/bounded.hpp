@@ -172,8 +172,10 @@ struct BoundedNumbers {
     return see(T{rounded<T>(x.value)});
   }
   template <class T>
-  static T narrow_with_room(BoundedWide x, Saturations&) {
-    return proven_narrow<T>(x);
+  static T narrow_counted(BoundedWide x, Saturations&) {
+    if (current_bounding.formats == nullptr) return {x.value};
+    const double most = 2147483647 * unit<T>();
+    return {rounded<T>(x.value).cut(-most, most)};
   }
   template <class T>
   static T narrow(BoundedWide x, Saturations&) {

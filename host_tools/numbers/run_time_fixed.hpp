@@ -144,7 +144,7 @@ struct RunTimeNumbers {
     return result;
   }
   template <class T>
-  static T narrow_with_room(RunTimeWide x, Saturations& saturations) {
+  static T narrow_counted(RunTimeWide x, Saturations& saturations) {
     return narrow<T>(x, saturations);
   }
   template <class T>

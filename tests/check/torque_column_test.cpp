@@ -1,0 +1,89 @@
+#include "host_tools/check/torque_column.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <kdl/chainidsolver_recursive_newton_euler.hpp>
+#include <numbers>
+
+#include "host_tools/support/random.hpp"
+#include "tests/support/chains.hpp"
+#include "tests/support/kdl.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::Index;
+
+/// Twenty seconds of a robot with KDL's inverse dynamics and friction of another form than the check's. Its torque is
+/// of `late_s` before its motion's time stamps.
+struct Recording {
+  Project project;
+  Log log;
+
+  explicit Recording(double late_s = 0) {
+    project.robot = read_urdf(test::puma560);
+    const Robot& robot = project.robot;
+    const KDL::Chain chain = test::to_kdl(robot);
+    KDL::ChainIdSolver_RNE solver(chain, KDL::Vector(robot.gravity.x(), robot.gravity.y(), robot.gravity.z()));
+    constexpr Index samples = 5000;
+    const auto n = static_cast<Index>(robot.size());
+    log.file = "run.csv";
+    log.step_s = 0.004;
+    log.t = Eigen::VectorXd::LinSpaced(samples, 0, log.step_s * (samples - 1));
+    log.q.resize(samples, n);
+    log.tau.resize(samples, n);
+    Random random(11);
+    const auto angle = [&](double t, unsigned j, int derivative) {
+      double sum = 0;
+      for (int k = 1; k <= 3; ++k) {
+        const double w = (0.7 + 0.21 * j) * k;
+        sum += 0.6 / k * std::pow(w, derivative) * std::sin(w * t + j + k + derivative * std::numbers::pi / 2);
+      }
+      return sum;
+    };
+    KDL::JntArray q(robot.size()), dq(robot.size()), ddq(robot.size()), tau(robot.size());
+    for (Index i = 0; i < samples; ++i) {
+      for (unsigned j = 0; j < robot.size(); ++j) {
+        log.q(i, j) = angle(log.t[i], j, 0);
+        q(j) = angle(log.t[i] - late_s, j, 0);
+        dq(j) = angle(log.t[i] - late_s, j, 1);
+        ddq(j) = angle(log.t[i] - late_s, j, 2);
+      }
+      solver.CartToJnt(q, dq, ddq, KDL::Wrenches(chain.getNrOfSegments()), tau);
+      for (unsigned j = 0; j < robot.size(); ++j) {
+        const double scale = j < 3 ? 4 : 0.3;
+        log.tau(i, j) =
+            tau(j) + scale * std::copysign(std::sqrt(std::fabs(dq(j))), dq(j)) + 0.1 * scale * random.normal();
+      }
+    }
+  }
+
+  std::optional<TorqueLead> lead() const {
+    return find_long_torque_lead(project, {process(log, choose_filter({log}, {}))}, {});
+  }
+};
+
+TEST(TorqueColumn, OfTheMotionsTimeIsLeftAlone) { EXPECT_FALSE(Recording().lead().has_value()); }
+
+TEST(TorqueColumn, OfAnotherTimeIsMeasured) {
+  for (const double late : {0.04, -0.025}) {
+    const auto lead = Recording(late).lead();
+    ASSERT_TRUE(lead.has_value());
+    EXPECT_NEAR(lead->seconds, -late, 0.003);
+    EXPECT_LT(lead->after, lead->before);
+    Recording known(late);
+    known.project.signals.torque_lead_s = -late;
+    EXPECT_FALSE(known.lead().has_value());
+  }
+}
+
+TEST(TorqueColumn, ExchangedWithThePositionIsSeen) {
+  Recording recording;
+  EXPECT_FALSE(are_exchanged(recording.project, {recording.log}, {}));
+  std::swap(recording.log.q, recording.log.tau);
+  EXPECT_TRUE(are_exchanged(recording.project, {recording.log}, {}));
+}
+
+}  // namespace
+}  // namespace fxdyn
