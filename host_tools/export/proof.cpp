@@ -56,24 +56,31 @@ bool delays(const IdentifiedModel& model) {
 
 /// The error bound of one joint's torque. A state that moves fast rounds coarsely and forgets fast, one that creeps
 /// does neither; over all velocities at once the bound would be that of a state which rounds coarsely and forgets
-/// slowly. So the joint's velocity is cut into octaves. States keep the largest error of all octaves, which the first
-/// round collects; then comes a creep, which adds to it, and after it the octaves again.
-double error_of(Evaluator<BoundedNumbers>& evaluator, std::vector<State> box, std::size_t joint) {
+/// slowly. So the joint's velocity is cut into octaves, one direction after the other: within its acceleration limit it
+/// turns from tick to tick only at velocities below that of a tick's acceleration. States keep the largest error of all
+/// octaves, which the first round collects; then comes a creep, which adds to it, and after it the octaves again.
+/// @param turning largest velocity at which the joint may turn from tick to tick [rad/s | m/s]
+double error_of(Evaluator<BoundedNumbers>& evaluator, std::vector<State> box, std::size_t joint, double turning) {
   constexpr int octaves = 28;
   const double most = box[joint].dq.value.high;
   Saturations none;
   double error = 0;
-  const auto at = [&](double low, double high, int ticks) {
-    for (const Bound dq : {Bound{low, high, 0}, Bound{-high, -low, 0}}) {
-      box[joint].dq.value = dq;
-      for (int tick = 0; tick < ticks; ++tick) error = std::max(error, evaluator.tick(box, none)[joint].value.error);
-    }
+  const auto at = [&](double low, double high, double sign, int ticks) {
+    box[joint].dq.value = sign > 0 ? Bound{low, high, 0} : Bound{-high, -low, 0};
+    for (int tick = 0; tick < ticks; ++tick) error = std::max(error, evaluator.tick(box, none)[joint].value.error);
   };
+  const auto octave = [&](int i, double sign) { at(std::ldexp(most, -i - 1), std::ldexp(most, -i), sign, 2); };
   evaluator.reset();
   for (int round = 0; round < 3; ++round) {
-    for (int octave = 0; octave < octaves; ++octave) at(std::ldexp(most, -octave - 1), std::ldexp(most, -octave), 2);
+    for (const double sign : {1.0, -1.0})
+      for (int i = 0; i < octaves; ++i) octave(i, sign);
+    for (int i = 0; i < octaves; ++i) {
+      if (std::ldexp(most, -i - 1) > turning) continue;
+      for (const double sign : {1.0, -1.0}) octave(i, sign);
+    }
     current_bounding.creeps = round == 1;
-    if (round == 1) at(0, std::ldexp(most, -octaves), 1);
+    if (round == 1)
+      for (const double sign : {1.0, -1.0}) at(0, std::ldexp(most, -octaves), sign, 1);
     current_bounding.creeps = false;
   }
   return error;
@@ -107,7 +114,10 @@ Proof prove(const IdentifiedModel& identified, const Formats* formats) {
   }
   // What a delay has kept may come from any velocity: then only the bound over all of them at once holds.
   if (formats != nullptr && !delays(model)) {
-    for (Eigen::Index j = 0; j < n; ++j) proof.error[j] = error_of(evaluator, box, static_cast<std::size_t>(j));
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const auto i = static_cast<std::size_t>(j);
+      proof.error[j] = error_of(evaluator, box, i, model.joints[i].ddq_limit * model.tick_s);
+    }
   }
   if (formats == nullptr) return proof;
   for (std::size_t g = 0; g < group_count; ++g) {

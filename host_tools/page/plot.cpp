@@ -8,15 +8,15 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <string_view>
 
-#include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
+#include "host_tools/support/temporary_folder.hpp"
 
 extern char** environ;
 
@@ -25,32 +25,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class TemporaryDirectory {
- public:
-  TemporaryDirectory() {
-    const char* set = std::getenv("TMPDIR");
-    std::string name = (fs::path(set != nullptr && *set != '\0' ? set : "/tmp") / "fxdyn-plots-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr)
-      throw InputError(
-          fmt::format("{}: can't be made: {}; plots need a folder there: set TMPDIR to one that can be "
-                      "written",
-                      name, std::strerror(errno)));
-    path_ = name;
-  }
-  ~TemporaryDirectory() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  TemporaryDirectory(const TemporaryDirectory&) = delete;
-  TemporaryDirectory& operator=(const TemporaryDirectory&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
-
-/// Runs gnuplot on script.gp inside the directory: no shell, no user settings, no input.
-void run_gnuplot(const fs::path& directory) {
+/// Runs gnuplot on script.gp inside the directory: no shell, no user settings, no input. Returns what went wrong, or
+/// nothing.
+std::string run_gnuplot(const fs::path& directory) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addchdir_np(&actions, directory.c_str());
@@ -62,14 +39,14 @@ void run_gnuplot(const fs::path& directory) {
   pid_t child = -1;
   const int failed = posix_spawnp(&child, "gnuplot", &actions, nullptr, arguments.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
-  if (failed == ENOENT) throw InputError("gnuplot not found: run toolchains/setup.sh");
-  if (failed != 0) throw InputError(fmt::format("gnuplot can't be started: {}", std::strerror(failed)));
+  if (failed == ENOENT) return "gnuplot not found: run toolchains/setup.sh";
+  if (failed != 0) return fmt::format("gnuplot can't be started: {}", std::strerror(failed));
   int status = 0;
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {}
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return;
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return {};
   std::string errors = read_file(directory / "errors.txt");
   std::replace(errors.begin(), errors.end(), '\n', ' ');
-  throw InputError(fmt::format("gnuplot failed: {}", errors));
+  return fmt::format("gnuplot failed: {}", errors);
 }
 
 /// Where an axis of time begins: 0, or the first stamp where six digits don't resolve what follows (seconds since
@@ -190,14 +167,37 @@ void cut(std::string& text, std::string_view from, std::string_view to) {
 
 /// The <svg> element as it can stand in a page with others: no XML prolog, no title (a tooltip everywhere), no ids.
 std::string element(const std::string& file) {
-  const std::size_t start = file.find("<svg");
-  if (start == std::string::npos) throw InputError("gnuplot wrote no svg: run toolchains/setup.sh");
-  std::string svg = file.substr(start);
+  std::string svg = file.substr(std::min(file.size(), file.find("<svg")));
   cut(svg, "<title>", "</title>");
   cut(svg, "<desc>", "</desc>");
   cut(svg, "<defs>", "</defs>");
   cut(svg, " id=\"", "\"");
   return svg;
+}
+
+/// In place of a plot: hours of computing must not be lost for a picture.
+std::string no_picture(const std::string& why) {
+  std::string text;
+  for (const char c : why) text += c == '<' || c == '>' || c == '&' ? ' ' : c;
+  return fmt::format(
+      "<svg viewBox=\"0 0 1000 60\"><text x=\"10\" y=\"35\" font-size=\"14\">This plot could not be drawn: "
+      "{}</text></svg>",
+      text);
+}
+
+/// Plots 0.svg, 1.svg, .. of script.gp in the directory.
+std::vector<std::string> pictures(const fs::path& directory, std::size_t count) {
+  const std::string wrong = run_gnuplot(directory);
+  static std::atomic<bool> said = false;  // a page has many plots
+  if (!wrong.empty() && !said.exchange(true)) fmt::print(stderr, "note: plots are missing: {}\n", wrong);
+  std::vector<std::string> out;
+  for (std::size_t i = 0; i < count; ++i) {
+    const fs::path file = directory / fmt::format("{}.svg", i);
+    const std::string svg = fs::exists(file) ? element(read_file(file)) : "";
+    out.push_back(svg.find("</svg>") != std::string::npos ? svg
+                                                          : no_picture(wrong.empty() ? "gnuplot wrote no svg" : wrong));
+  }
+  return out;
 }
 
 }  // namespace
@@ -206,7 +206,7 @@ std::vector<std::string> draw(const std::vector<TorquePlot>& plots) {
   if (plots.empty()) return {};
   // Three curves a plot, about 15 bytes a point: the page stays below 4 MB.
   const auto points = std::clamp<Eigen::Index>(4'000'000 / (45 * static_cast<Eigen::Index>(plots.size())), 100, 2000);
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   std::string script = settings;
   for (std::size_t i = 0; i < plots.size(); ++i) {
     const TorquePlot& plot = plots[i];
@@ -217,18 +217,13 @@ std::vector<std::string> draw(const std::vector<TorquePlot>& plots) {
     script += commands(i, plot);
   }
   write_file(directory.path() / "script.gp", script);
-  run_gnuplot(directory.path());
-  std::vector<std::string> pictures;
-  for (std::size_t i = 0; i < plots.size(); ++i) {
-    pictures.push_back(element(read_file(directory.path() / fmt::format("{}.svg", i))));
-  }
-  return pictures;
+  return pictures(directory.path(), plots.size());
 }
 
 std::string draw(const std::vector<Panel>& panels, const std::vector<std::string>& names) {
   constexpr int panel_height = 260;
   constexpr Eigen::Index panel_points = 500;
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   std::string script = settings;
   script += fmt::format(
       "set terminal svg size 1000,{} dynamic noenhanced font 'sans-serif,13' background '#ffffff'\nset tmargin 2\nset "
@@ -251,15 +246,14 @@ std::string draw(const std::vector<Panel>& panels, const std::vector<std::string
     script += "unset key\n";  // one is enough
   }
   write_file(directory.path() / "script.gp", script + "unset multiplot\nunset output\n");
-  run_gnuplot(directory.path());
-  return element(read_file(directory.path() / "0.svg"));
+  return pictures(directory.path(), 1).front();
 }
 
 std::string draw(const std::vector<Chart>& charts, int columns) {
   constexpr int row_height = 300;
   constexpr Eigen::Index chart_points = 1500;
   const int rows = (static_cast<int>(charts.size()) + columns - 1) / columns;
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   std::string script = settings;
   script += fmt::format(
       "set terminal svg size 1000,{} dynamic noenhanced font 'sans-serif,12' background '#ffffff'\nset tmargin 2\nset "
@@ -283,8 +277,7 @@ std::string draw(const std::vector<Chart>& charts, int columns) {
                           quoted(label_of(chart.x_label, origin)), quoted(chart.y_label), lines);
   }
   write_file(directory.path() / "script.gp", script + "unset multiplot\nunset output\n");
-  run_gnuplot(directory.path());
-  return element(read_file(directory.path() / "0.svg"));
+  return pictures(directory.path(), 1).front();
 }
 
 }  // namespace fxdyn

@@ -14,7 +14,7 @@ struct TorquePlot {
 
 /// Each plot as an <svg> element, drawn by one run of gnuplot. Curves have at most 2000 points, fewer where many plots
 /// would make the page heavy; the extremes of what is left out are kept.
-/// @throws InputError where gnuplot is missing or fails.
+/// Where gnuplot is missing or fails, a picture that says so, and a note on stderr.
 std::vector<std::string> draw(const std::vector<TorquePlot>& plots);
 
 /// Curves over time, one colour each, as a panel of a picture.
@@ -25,7 +25,7 @@ struct Panel {
 };
 
 /// Panels one above the other over the same time, as an <svg> element; `names` of the curves are the key.
-/// @throws InputError where gnuplot is missing or fails.
+/// Where gnuplot is missing or fails, a picture that says so, and a note on stderr.
 std::string draw(const std::vector<Panel>& panels, const std::vector<std::string>& names);
 
 /// One curve of a chart. Of curves over a growing abscissa the extremes of what is left out are kept; a `path` may go
@@ -45,7 +45,7 @@ struct Chart {
 };
 
 /// Charts side by side, `columns` in a row, as an <svg> element.
-/// @throws InputError where gnuplot is missing or fails.
+/// Where gnuplot is missing or fails, a picture that says so, and a note on stderr.
 std::string draw(const std::vector<Chart>& charts, int columns);
 
 }  // namespace fxdyn

@@ -80,6 +80,8 @@ class Checker {
                       "{}",
                       where(joint, joint), type, type == "revolute" ? ", or make it continuous" : ""));
     }
+    for (const char* name : {"lower", "upper", "velocity", "effort"})
+      check_number(joint.FirstChildElement("limit"), name, joint);
     const TiXmlElement* origin = joint.FirstChildElement("origin");
     check_angles(origin, joint);
     double squares = 0;
@@ -91,6 +93,16 @@ class Checker {
                       "metres: divide by 1000",
                       where(*origin, joint), std::sqrt(squares)));
     }
+  }
+
+  /// urdfdom says neither line nor joint.
+  void check_number(const TiXmlElement* element, const char* attribute, const TiXmlElement& named) const {
+    if (element == nullptr || element->Attribute(attribute) == nullptr) return;
+    const std::string text = element->Attribute(attribute);
+    char* end = nullptr;
+    std::strtod(text.c_str(), &end);
+    if (end != text.c_str() && *end == '\0') return;
+    throw InputError(fmt::format("{}: {} = \"{}\" is no number", where(*element, named), attribute, text));
   }
 
   /// Whether the joint's parent is no other joint's child.
