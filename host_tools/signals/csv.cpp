@@ -155,6 +155,10 @@ class Header {
   }
 
   [[noreturn]] void missing(const std::string& name, const std::string& meaning) const {
+    if (name.starts_with('#')) {
+      throw InputError(fmt::format("{}:{}: no column {} ({}): the file has {}, counted from 0", file_, line_,
+                                   name.substr(1), meaning, names_.size()));
+    }
     const std::string all = fmt::format("{}", fmt::join(names_, ","));
     if (names_.size() == 1 && all.find_first_of(";\t ") != std::string::npos) {
       throw InputError(fmt::format("{}:{}: no commas in the header '{}'; separate columns by commas", file_, line_,

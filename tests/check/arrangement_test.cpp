@@ -31,7 +31,8 @@ struct Recorded {
     Random random(5);
     for (Eigen::MatrixXd* columns : {&samples.q, &samples.dq, &samples.ddq, &samples.tau}) columns->resize(rows, n);
     for (Index k = 0; k < rows; ++k) {
-      KDL::JntArray q(robot.size()), dq(robot.size()), ddq(robot.size()), tau(robot.size());
+      const auto size = static_cast<unsigned>(robot.size());
+      KDL::JntArray q(size), dq(size), ddq(size), tau(size);
       for (unsigned j = 0; j < robot.size(); ++j) {
         q(j) = random.uniform(-2, 2);
         dq(j) = random.uniform(-1.5, 1.5);

@@ -106,7 +106,7 @@ bool is_right(const ArrangementMove& move, const Planted& planted) {
 
 /// Torque that was recorded 20 to 80 ms before or after the motion, and positions in the torque's columns.
 void judge_columns(Project project, const Robot& robot, const fs::path& data, const std::vector<ProcessedLog>& logs,
-                   const ArrangementOptions& options, std::map<std::string, Tally>& counts) {
+                   std::uint64_t wanted_seed, const ArrangementOptions& options, std::map<std::string, Tally>& counts) {
   project.robot = robot;
   const auto count = [&](const std::string& name, bool found, bool right, const std::string& seen) {
     Tally& tally = counts[name];
@@ -118,7 +118,7 @@ void judge_columns(Project project, const Robot& robot, const fs::path& data, co
   };
   const auto told = find_long_torque_lead(project, logs, options);
   count("sound times", told.has_value(), !told, told ? fmt::format("{:.3g} s", told->seconds) : "");
-  Random random(project.seed * 31 + 7);
+  Random random(wanted_seed * 31 + 7);
   const double off = random.uniform(0.02, 0.08) * (random.next() % 2 == 0 ? 1 : -1);
   project.signals.torque_lead_s = off;
   const auto late = find_long_torque_lead(project, logs, options);
@@ -177,7 +177,7 @@ int main(int argc, char** argv) {
     const TorqueSamples samples = sample_torque(gate.logs, options.samples);
     Random random(wanted.seed * 7919 + 3);
     const Robot robot = with_masses_off(project.robot, share, random);
-    judge_columns(project, robot, data, gate.logs, options, counts);
+    judge_columns(project, robot, data, gate.logs, wanted.seed, options, counts);
     std::vector<Planted> cases = plant(robot, samples, random);
     cases.push_back({"sound", robot, samples});
     const double sound = ArrangementEvidence(robot, samples, options)(as_given(robot)).nats;

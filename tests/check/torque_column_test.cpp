@@ -42,7 +42,8 @@ struct Recording {
       }
       return sum;
     };
-    KDL::JntArray q(robot.size()), dq(robot.size()), ddq(robot.size()), tau(robot.size());
+    const auto size = static_cast<unsigned>(robot.size());
+    KDL::JntArray q(size), dq(size), ddq(size), tau(size);
     for (Index i = 0; i < samples; ++i) {
       for (unsigned j = 0; j < robot.size(); ++j) {
         log.q(i, j) = angle(log.t[i], j, 0);
@@ -70,7 +71,7 @@ TEST(TorqueColumn, OfAnotherTimeIsMeasured) {
   for (const double late : {0.04, -0.025}) {
     const auto lead = Recording(late).lead();
     ASSERT_TRUE(lead.has_value());
-    EXPECT_NEAR(lead->seconds, -late, 0.003);
+    EXPECT_NEAR(lead->seconds, -late, 1.5 * 0.004);  // samples: the rest is left to identify
     EXPECT_LT(lead->after, lead->before);
     Recording known(late);
     known.project.signals.torque_lead_s = -late;

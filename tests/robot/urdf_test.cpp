@@ -67,8 +67,10 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"zero_axis", one_joint("continuous", "<axis xyz=\"0 0 0\"/>"), {":4: joint 'lift'", "axis has no length"}},
         Bad{"bad_axis", one_joint("continuous", "<axis xyz=\"0 0 up\"/>"), {"lift"}},
         Bad{"no_limit", one_joint("revolute", z), {":4: joint 'lift'", "has no <limit>", "make it continuous"}},
-        Bad{"bad_limit", one_joint("revolute", z + "<limit lower=\"low\" upper=\"1\"/>"), {":4: joint 'lift'"}},
-        Bad{"xacro", one_joint("continuous", z + "\n<origin xyz=\"${length} 0 0\"/>"), {":5:", "is a xacro file"}},
+        Bad{"bad_limit",
+            one_joint("revolute", z + "<limit lower=\"low\" upper=\"1\"/>"),
+            {":5: joint 'lift'", "is no number"}},
+        Bad{"xacro", one_joint("continuous", z + "\n<origin xyz=\"${length} 0 0\"/>"), {":6:", "is a xacro file"}},
         Bad{"xacro_element", "<robot name=\"r\">\n<xacro:arm/></robot>", {":2:", "is a xacro file"}},
         Bad{"srdf", "<robot name=\"r\">\n<group name=\"arm\"/></robot>", {":2:", "is an SRDF", "URDF"}},
         Bad{"sdf", "<sdf version=\"1.6\"></sdf>", {"SDF"}}, Bad{"mjcf", "<mujoco/>", {"MJCF"}},
@@ -79,7 +81,7 @@ INSTANTIATE_TEST_SUITE_P(
             "<joint name=\"j2\" type=\"continuous\"><parent link=\"b\"/><child link=\"c\"/>\n"
             "<origin xyz=\"0 250 0\"/></joint></robot>",
             {":4: joint 'j2'", "250 m", "millimetres?"}},
-        Bad{"degrees", one_joint("continuous", z + "<origin rpy=\"0 90 0\"/>"), {":4: joint 'lift'", "degrees?"}},
+        Bad{"degrees", one_joint("continuous", z + "<origin rpy=\"0 90 0\"/>"), {":5: joint 'lift'", "degrees?"}},
         Bad{"kg_mm2",
             one_joint("continuous", z,
                       "<inertial><mass value=\"2\"/><inertia ixx=\"9e4\" iyy=\"1\" izz=\"1\" ixy=\"0\" ixz=\"0\" "

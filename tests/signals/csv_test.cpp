@@ -66,7 +66,7 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"degrees_without_dq", sine(degrees, 1, 1, false), {"q1 looks like degrees", "pi/180"}},
         Bad{"two_units", sine(1, 1, 1e4), {"20 apart may be ms at 50 samples a second or us at 5e+04", "time_unit ="}},
         Bad{"no_unit", sine(1, 1, 1e12), {"in no unit of a robot's log", "time_unit ="}},
-        Bad{"milliseconds_at_10_kHz", sine(1, 1, 50), {"t looks like milliseconds", "time_unit = \"ms\""}},
+        Bad{"milliseconds_at_10_kHz", sine(1, 20, 50), {"t looks like milliseconds", "time_unit = \"ms\""}},
         Bad{"other_format", "PK\x03\x04xl/workbook", {"is a spreadsheet", "save it as CSV"}},
         Bad{"from_zero", "t,q0,tau0\n0,1,2\n", {"count from 0", "q = [\"q0\"]"}}),
     [](const auto& parameter) { return parameter.param.name; });
@@ -173,6 +173,45 @@ TEST(Csv, MapsColumnsAndScalesTorque) {
   test::expect_refused(file, {":1:", "no column 'v1'", "dq of joint 1"}, [&] { read(file, 2, format); });
   format.torque_gain = {1};
   test::expect_refused(file, {"torque_gain has 1 values for 2 joints"}, [&] { read(file, 2, format); });
+}
+
+TEST(Csv, ColumnsByNumberNeedNoNames) {
+  const std::string rows = "0,1,2,3,4\n0.1,5,6,7,8\n";
+  LogFormat format;
+  format.columns["t"] = "#0";
+  format.joint_columns = {{"q", {"#2", "#1"}}, {"tau", {"#4", "#3"}}};
+  for (const std::string& text : {rows, "t,a,b,c,d\n" + rows}) {
+    const Log log = read(write("numbers.csv", text), 2, format);
+    ASSERT_EQ(log.samples(), 2);
+    EXPECT_EQ(log.q.row(1), Eigen::RowVector2d(6, 5));
+    EXPECT_EQ(log.tau.row(0), Eigen::RowVector2d(4, 3));
+  }
+  format.joint_columns["tau"] = {"#4", "#9"};
+  const auto file = write("few_numbers.csv", rows);
+  test::expect_refused(file, {":1:", "no column 9", "the file has 5"}, [&] { read(file, 2, format); });
+}
+
+TEST(Csv, ColumnsJointByJointStandInTheChainsOrder) {
+  const auto file = write("joints.csv", "t,elbow,shoulder,i_elbow,i_shoulder\n0,1,2,3,4\n1,1,2,3,4\n");
+  LogFormat format;
+  format.joint_columns = {{"q", {"shoulder", "elbow"}}, {"tau", {"i_shoulder", "i_elbow"}}};
+  const Log log = read(file, 2, format);
+  EXPECT_EQ(log.q.row(0), Eigen::RowVector2d(2, 1));
+  EXPECT_EQ(log.tau.row(0), Eigen::RowVector2d(4, 3));
+}
+
+TEST(Csv, GainsAndOffsetsOfPositions) {
+  const auto file = write("gains.csv", "t,q1,q2,dq1,dq2,tau1,tau2\n0,10,2,10,2,1,1\n1,20,2,10,2,1,1\n");
+  LogFormat format;
+  format.position_gain = {0.1, -1};
+  format.position_offset = {0, 0.5};
+  const Log log = read(file, 2, format);
+  EXPECT_DOUBLE_EQ(log.q(1, 0), 2);
+  EXPECT_DOUBLE_EQ(log.dq(1, 0), 1);
+  EXPECT_DOUBLE_EQ(log.q(1, 1), -1.5);
+  EXPECT_DOUBLE_EQ(log.dq(1, 1), -2);
+  format.position_gain = {0.1};
+  test::expect_refused(file, {"position_gain has 1 values for 2 joints"}, [&] { read(file, 2, format); });
 }
 
 TEST(Csv, TorqueMayBeMissingForPrediction) {
