@@ -32,6 +32,8 @@ std::string to_string(Mistake mistake) {
       return "gravity";
     case Mistake::torque_gain:
       return "torque_gain";
+    case Mistake::torque_unit:
+      return "torque_unit";
     case Mistake::position_unit:
       return "position_unit";
   }
@@ -42,8 +44,10 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 
+bool is_gain(Mistake mistake) { return mistake == Mistake::torque_gain || mistake == Mistake::torque_unit; }
+
 bool changes_motion(Mistake mistake) {
-  return mistake != Mistake::swapped_torques && mistake != Mistake::mirrored_torque && mistake != Mistake::torque_gain;
+  return mistake != Mistake::swapped_torques && mistake != Mistake::mirrored_torque && !is_gain(mistake);
 }
 
 /// All single changes of an arrangement, continuous ones on a grid.
@@ -59,10 +63,21 @@ class Moves {
       units(j);
     }
     directions_of_gravity();
+    units_of_torque();
   }
   std::vector<ArrangementMove> all;
 
  private:
+  void units_of_torque() {
+    const std::vector<Joint>& joints = evidence_.robot().joints;
+    // Without masses there is nothing to compare with.
+    if (!std::all_of(joints.begin(), joints.end(), [](const Joint& one) { return one.inertial.has_value(); })) return;
+    for (const double gain : {1e-3, 0.01, 0.03, 0.1, 0.3, 3.0, 10.0, 30.0, 100.0, 1e3}) {
+      ArrangementMove& move = add(Mistake::torque_unit, 0);
+      move.value = gain;
+      move.result.torque_gain *= gain;
+    }
+  }
   ArrangementMove& add(Mistake mistake, Index joint) {
     all.push_back({mistake, joint, joint, 0, Vector3d::Zero(), now_});
     return all.back();
@@ -172,7 +187,7 @@ void refine(const ArrangementEvidence& evidence, const Arrangement& now, Scored&
   const Mistake mistake = best.move.mistake;
   if (mistake == Mistake::zero) {
     step = pi / 12;
-  } else if (mistake == Mistake::torque_gain) {
+  } else if (is_gain(mistake)) {
     step = 0.2;  // of the logarithm
   } else if (mistake == Mistake::gravity) {
     step = pi / 8;
@@ -188,6 +203,9 @@ void refine(const ArrangementEvidence& evidence, const Arrangement& now, Scored&
     } else if (mistake == Mistake::torque_gain) {
       move.value *= std::exp(by);
       move.result.torque_gain[j] = now.torque_gain[j] * move.value;
+    } else if (mistake == Mistake::torque_unit) {
+      move.value *= std::exp(by);
+      move.result.torque_gain = now.torque_gain * move.value;
     } else {
       move.direction = Eigen::AngleAxisd(by, Vector3d::Unit(axis)) * move.direction;
       move.result.gravity = move.direction;
@@ -212,6 +230,8 @@ bool is_small(const ArrangementMove& move, const Arrangement& now, const Arrange
       return std::fabs(std::remainder(move.value, 2 * pi)) < options.least_zero;
     case Mistake::torque_gain:
       return std::fabs(std::log(move.value)) < std::log1p(options.least_gain);
+    case Mistake::torque_unit:
+      return std::fabs(std::log(move.value)) < std::log(options.least_unit);
     case Mistake::gravity:
       return std::acos(std::clamp(move.direction.normalized().dot(now.gravity.normalized()), -1.0, 1.0)) <
              options.least_turn;

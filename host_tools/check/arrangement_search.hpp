@@ -20,6 +20,7 @@ enum class Mistake {
   axis,             ///< the URDF's axis
   gravity,          ///< its direction
   torque_gain,
+  torque_unit,  ///< one gain for all joints: currents, or the URDF's masses are placeholders
   position_unit
 };
 std::string to_string(Mistake mistake);

@@ -27,7 +27,8 @@ std::vector<CheckFinding> check_columns(const Project& project, const std::vecto
   const TorqueSamples samples =
       sample_torque(logs, options.samples, lead ? lead->seconds : project.signals.torque_lead_s.value_or(0));
   const ArrangementEvidence evidence(project.robot, samples, options);
-  for (const ArrangementFinding& finding : find_mistakes(evidence, options)) out.push_back(in_words(finding, project));
+  for (const ArrangementFinding& finding : find_mistakes(evidence, options))
+    out.push_back(in_words(finding, project, options));
   return out;
 }
 

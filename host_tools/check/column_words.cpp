@@ -45,6 +45,11 @@ class MoveWords {
       case Mistake::torque_gain:
         return fmt::format("torque of {} is about {:.2g} times too {} beside the others' and the URDF's masses",
                            joint(j), move.value < 1 ? 1 / move.value : move.value, move.value < 1 ? "large" : "small");
+      case Mistake::torque_unit:
+        return fmt::format(
+            "all torques are about {:.2g} times too {} for the URDF's masses: currents, another unit, or "
+            "masses that are placeholders?",
+            move.value < 1 ? 1 / move.value : move.value, move.value < 1 ? "large" : "small");
       case Mistake::position_unit:
         return unit(move);
     }
@@ -64,6 +69,7 @@ class MoveWords {
         return "[signals] " + position_gain(now);
       case Mistake::mirrored_torque:
       case Mistake::torque_gain:
+      case Mistake::torque_unit:
         return "[signals] " + torque_gain(now);
       case Mistake::mirrored_joint:
         return fmt::format("[signals] {}, {}", position_gain(now), torque_gain(now));
@@ -148,22 +154,33 @@ class MoveWords {
 
 /// A gain of other units; a smaller one may be masses that the URDF has wrong.
 bool is_sure(const ArrangementMove& move) {
+  if (move.mistake == Mistake::torque_unit) return false;
   return move.mistake != Mistake::torque_gain || move.value > 3 || move.value < 1.0 / 3;
 }
 
 }  // namespace
 
-CheckFinding in_words(const ArrangementFinding& finding, const Project& project) {
+CheckFinding in_words(const ArrangementFinding& finding, const Project& project, const ArrangementOptions& options) {
   const MoveWords words(project);
   CheckFinding out;
-  out.error = is_sure(finding.move);
+  out.error = is_sure(finding.move) && finding.after < options.sure * finding.before;
   out.kind = to_string(finding.move.mistake);
-  if (finding.move.mistake != Mistake::gravity) out.joint = static_cast<std::size_t>(finding.move.joint);
-  out.text = fmt::format("{}: with that the torque error of {} falls from {:.3g} to {:.3g} {} (odds 10^{:.0f})",
-                         words.what(finding.move), words.joint(finding.felt), finding.before, finding.after,
-                         words.torque_unit(finding.felt), finding.nats / std::numbers::ln10);
-  for (const ArrangementMove& other : finding.as_good) out.text += fmt::format("; or {}", words.what(other));
+  if (finding.move.mistake != Mistake::gravity && finding.move.mistake != Mistake::torque_unit)
+    out.joint = static_cast<std::size_t>(finding.move.joint);
+  const double odds = finding.nats / std::numbers::ln10;
+  out.text = words.what(finding.move);
+  if (finding.move.mistake == Mistake::torque_unit) {  // errors before and after are in different units
+    out.text += fmt::format(" (odds 10^{:.0f})", odds);
+  } else {
+    out.text +=
+        fmt::format(": with that the torque error of {} falls from {:.3g} to {:.3g} {} (odds 10^{:.0f})",
+                    words.joint(finding.felt), finding.before, finding.after, words.torque_unit(finding.felt), odds);
+  }
   out.fix = words.fix(finding.move);
+  for (const ArrangementMove& other : finding.as_good) {
+    out.text += fmt::format("; or {}", words.what(other));
+    if (const std::string fix = words.fix(other); !fix.empty()) out.fix += fmt::format(", or {}", fix);
+  }
   return out;
 }
 

@@ -8,7 +8,7 @@
 namespace fxdyn {
 
 /// A mistake of columns or URDF for people: what, how much the torque error falls, and the line to write.
-CheckFinding in_words(const ArrangementFinding& finding, const Project& project);
+CheckFinding in_words(const ArrangementFinding& finding, const Project& project, const ArrangementOptions& options);
 /// A warning: motion and torque were recorded at different times.
 CheckFinding in_words(const TorqueLead& lead);
 

@@ -24,12 +24,16 @@ struct ArrangementOptions {
   double standstill = 1e-3;
   /// nats; what another arrangement must gain; measured: docs/findings/check.md
   double gain = 15;
+  /// share of the error of the joint that feels it most; where more is left, it is a warning; hand
+  double sure = 0.8;
   /// nats; an arrangement that is nearer to the best is told as well; theory: log 1000
   double as_good = 6.9;
   /// rad; a smaller offset of the zero is no finding; hand: the issue asks for 20 degrees
   double least_zero = 0.17;
   /// relative; a smaller change of a torque gain is no finding; hand: gains of the catalogue are smaller
   double least_gain = 0.2;
+  /// -; a smaller factor of all torques is no finding; hand: masses of a URDF are guessed that well
+  double least_unit = 3;
   /// rad; gravity turned by less is a tilt, which diagnosis names; hand
   double least_turn = 0.35;
   /// s; torque further from the motion's time is told; theory: identify tries up to StructureOptions::longest_lead_s

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
+#include "host_tools/check/check.hpp"
 #include "host_tools/diagnose/diagnose.hpp"
 #include "host_tools/diagnose/diagnosis_result.hpp"
 #include "host_tools/diagnose/evidence.hpp"
@@ -78,6 +79,18 @@ std::optional<IdentifiedModel> Pipeline::written(std::initializer_list<std::stri
   return wanted && is_current(model) ? std::optional(std::move(model)) : std::nullopt;
 }
 
+void Pipeline::check_data() {
+  if (checked_) return;
+  checked_ = true;
+  for (const CheckFinding& finding : check_columns(project_, data().logs)) {
+    if (finding.error) {
+      throw DataError(fmt::format("{}; write {}, or [check] columns = false if the columns are right", finding.text,
+                                  finding.fix));
+    }
+    data_notes_.push_back(finding.text);
+  }
+}
+
 void Pipeline::check_motion() {
   const std::vector<bool> moving = moving_joints(data().logs);
   for (std::size_t j = 0; j < moving.size(); ++j) {
@@ -133,6 +146,7 @@ void Pipeline::write_possible_bodies(const Estimate& estimate) const {
 
 void Pipeline::identify() {
   const ThreadLimit limit(data().threads);
+  check_data();
   data().notes = data_notes_;
   const auto fitter = fxdyn::identify(project_, data(), progress_);
   progress_.stage("fit, standard deviations, possible bodies", 1);
@@ -157,6 +171,7 @@ void Pipeline::identify() {
 void Pipeline::diagnose() {
   const auto start = Clock::now();
   const ThreadLimit limit(data().threads);
+  check_data();
   data().notes = data_notes_;
   std::vector<ProcessedLog> baseline;
   for (Log& log : read_logs(project_, Role::baseline, directory_)) {

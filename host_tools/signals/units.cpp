@@ -47,6 +47,13 @@ void check_velocity(const Log& log, Index joint, bool revolute, const std::strin
   }
 }
 
+/// What else may stand where degrees are seen: torques, if the torque's columns hold no more than angles.
+std::string exchanged_hint(const Log& log) {
+  constexpr double turn = 2 * std::numbers::pi;
+  if (log.tau.size() == 0 || !(log.tau.cwiseAbs().maxCoeff() < turn)) return "";
+  return "; or, if the columns of q and tau are exchanged, exchange them (columns = { q = .., tau = .. })";
+}
+
 /// Units without dq: a joint that turns more than four times, less than an arm's few hundred degrees do as radians, and
 /// does so faster than robots turn for a good part of the log.
 void check_range(const Log& log, Index joint, const std::string& where) {
@@ -61,8 +68,8 @@ void check_range(const Log& log, Index joint, const std::string& where) {
   if (fast < 25) return;
   throw InputError(fmt::format(
       "{}: q{} looks like degrees (range {:.3g}, {:.3g} per second), multiply by pi/180; or, if it is the motor's "
-      "angle, divide by the gear ratio (position_gain)",
-      where, joint + 1, range, fast));
+      "angle, divide by the gear ratio (position_gain){}",
+      where, joint + 1, range, fast, exchanged_hint(log)));
 }
 
 /// Slow logs: one joint may turn more than twice, but not nearly every joint of an arm.
@@ -79,8 +86,8 @@ void check_ranges(const Log& log, const std::vector<bool>& revolute, const std::
   if (count < 3 || turning + 1 < count || widest > 800) return;
   throw InputError(fmt::format(
       "{}: q looks like degrees ({} of {} joints turn more than twice), multiply by pi/180; or, if they are "
-      "the motors' angles, divide by the gear ratios (position_gain)",
-      where, turning, count));
+      "the motors' angles, divide by the gear ratios (position_gain){}",
+      where, turning, count, exchanged_hint(log)));
 }
 
 /// Rows that are far apart while nothing moves faster than a crawl: milliseconds at a high rate.

@@ -138,6 +138,15 @@ TEST(Arrangement, GainsAndUnitsAreFound) {
   expect_alone(degrees.check(), Mistake::position_unit, 2);
 }
 
+TEST(Arrangement, CurrentsInPlaceOfTorquesAreFound) {
+  Recorded recorded;
+  recorded.samples.tau /= 9;
+  const auto found = recorded.check();
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(to_string(found[0].move.mistake), "torque_unit");
+  EXPECT_NEAR(std::log(found[0].move.value), std::log(9), 0.4);
+}
+
 // Two mistakes at once, as where a driver counts both from another end.
 TEST(Arrangement, OneMistakeAfterTheOther) {
   Recorded recorded;
