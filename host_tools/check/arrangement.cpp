@@ -117,7 +117,10 @@ ArrangementEvidence::Design ArrangementEvidence::design(const Arrangement& arran
       x[j].col(bodies + i) = column.col(0);
       out.own_square[j][i] = std::max(column.col(0).squaredNorm() / static_cast<double>(rows), 1e-12);
     }
-    out.gram.push_back(x[j].transpose() * x[j]);
+    // Bodies before the joint do not load it: their columns are zero.
+    const Index used = bodies + own - ten * joint;
+    out.gram.emplace_back(MatrixXd::Zero(bodies + own, bodies + own));
+    out.gram.back().bottomRightCorner(used, used).noalias() = x[j].rightCols(used).transpose() * x[j].rightCols(used);
     out.projection.push_back(x[j].transpose() * samples_.tau);
 
     const bool known = robot.joints[j].inertial.has_value();
@@ -165,7 +168,9 @@ ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangem
   VectorXd solution;
   std::vector<bool> drives(robot_.size(), false), flies(robot_.size(), false);
   double log_determinant = 0;
-  for (int round = 0; round < 6; ++round) {
+  bool settled = false;
+  for (int round = 0; round < 6 && !settled; ++round) {
+    settled = round > 0;
     MatrixXd information = prior;
     VectorXd projection = prior * mean;
     for (Index j = 0; j < n; ++j) {
@@ -193,9 +198,14 @@ ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangem
       const double square =
           whole[j] +
           (x.dot(design.gram[joint] * x) - 2 * gain[j] * x.dot(design.projection[joint].col(from[joint]))) / rows;
+      const double before = variance[j];
       variance[j] = std::max(square, options_.perfect * options_.perfect * whole[j]);
+      settled = settled && std::fabs(variance[j] - before) < options_.settled * before;
       // Friction brakes and a rotor is heavy: else there is none from here on, and what it would explain is left.
-      const auto take_out = [&](Index i) { prior(bodies + own * j + i, bodies + own * j + i) *= 1e8; };
+      const auto take_out = [&](Index i) {
+        prior(bodies + own * j + i, bodies + own * j + i) *= 1e8;
+        settled = false;
+      };
       if (!drives[joint] && friction_power(design.gram[joint], x) < 0) {
         drives[joint] = true;
         take_out(viscous_column());

@@ -18,6 +18,8 @@ struct ArrangementOptions {
   double vague = 100;
   /// share of the torque's RMS; smaller residuals count as this; hand: no model of nominal effects is better
   double perfect = 0.01;
+  /// relative; a residual's variance that changes less from round to round has settled; hand: 0.01 of 60 rows / 2 nats
+  double settled = 0.01;
   /// standard deviations over RMS of the torque; prior of a joint's own columns, each alone; hand
   double own_share = 3;
   /// share of the largest RMS velocity; a joint with less does not move; hand
