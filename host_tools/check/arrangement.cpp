@@ -50,6 +50,15 @@ double chain_length(const Robot& robot) {
   return std::max(length, 0.3);
 }
 
+/// Adds a joint's normal equations: of the bodies, and of its own columns, which begin at `at`.
+void add_rows(const MatrixXd& gram, Index bodies, Index at, MatrixXd& information) {
+  const Index own = gram.rows() - bodies;
+  information.topLeftCorner(bodies, bodies) += gram.topLeftCorner(bodies, bodies);
+  information.block(0, at, bodies, own) += gram.topRightCorner(bodies, own);
+  information.block(at, 0, own, bodies) += gram.bottomLeftCorner(own, bodies);
+  information.block(at, at, own, own) += gram.bottomRightCorner(own, own);
+}
+
 }  // namespace
 
 Arrangement as_given(const Robot& robot) {
@@ -174,15 +183,11 @@ ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangem
     MatrixXd information = prior;
     VectorXd projection = prior * mean;
     for (Index j = 0; j < n; ++j) {
-      if (!moves(j)) continue;
       const auto joint = static_cast<std::size_t>(j);
+      if (!moves(arrangement.motion_from[joint])) continue;
       const double weight = count / (rows * variance[j]);
       const Index at = bodies + own * j;
-      const MatrixXd& gram = design.gram[joint];
-      information.topLeftCorner(bodies, bodies) += weight * gram.topLeftCorner(bodies, bodies);
-      information.block(0, at, bodies, own) += weight * gram.topRightCorner(bodies, own);
-      information.block(at, 0, own, bodies) += weight * gram.bottomLeftCorner(own, bodies);
-      information.block(at, at, own, own) += weight * gram.bottomRightCorner(own, own);
+      add_rows(weight * design.gram[joint], bodies, at, information);
       const VectorXd target = weight * gain[j] * design.projection[joint].col(from[joint]);
       projection.head(bodies) += target.head(bodies);
       projection.segment(at, own) += target.tail(own);
@@ -219,7 +224,8 @@ ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangem
   }
   out.rms = variance.cwiseSqrt();
   for (Index j = 0; j < n; ++j)
-    if (moves(j)) out.nats += count / 2 * std::log(variance[j] / whole[j]);
+    if (moves(arrangement.motion_from[static_cast<std::size_t>(j)]))
+      out.nats += count / 2 * std::log(variance[j] / whole[j]);
   const VectorXd change = solution - mean;
   const Eigen::LLT<MatrixXd> of_prior(prior);
   out.nats += 0.5 * change.dot(prior * change) + 0.5 * log_determinant -

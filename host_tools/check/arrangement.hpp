@@ -51,8 +51,8 @@ class ArrangementEvidence {
   ArrangementScore score(const Design& design, const Arrangement& arrangement) const;
 
   const Robot& robot() const { return robot_; }
-  /// A joint that never moves holds any torque, as does its brake.
-  bool moves(Eigen::Index joint) const { return moves_[static_cast<std::size_t>(joint)]; }
+  /// A joint that never moves holds any torque, as does its brake. By its column of the motion.
+  bool moves(Eigen::Index column) const { return moves_[static_cast<std::size_t>(column)]; }
   /// Twice as many samples as unknowns: fewer prove nothing.
   bool enough() const;
 

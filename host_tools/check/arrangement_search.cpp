@@ -57,7 +57,7 @@ class Moves {
     const auto n = static_cast<Index>(evidence.robot().size());
     for (Index j = 0; j < n; ++j) {
       for (Index other = j + 1; other < n; ++other) swap(j, other);
-      if (evidence.moves(j)) signs_and_gains(j);
+      if (evidence.moves(now.motion_from[static_cast<std::size_t>(j)])) signs_and_gains(j);
       zeros(j);
       axes(j);
       units(j);
@@ -86,9 +86,11 @@ class Moves {
 
   void swap(Index a, Index b) {
     const auto i = static_cast<std::size_t>(a), k = static_cast<std::size_t>(b);
-    ArrangementMove& torques = add(Mistake::swapped_torques, a);
-    torques.other = b;
-    std::swap(torques.result.torque_from[i], torques.result.torque_from[k]);
+    if (evidence_.moves(now_.motion_from[i]) && evidence_.moves(now_.motion_from[k])) {
+      ArrangementMove& torques = add(Mistake::swapped_torques, a);
+      torques.other = b;
+      std::swap(torques.result.torque_from[i], torques.result.torque_from[k]);
+    }
     if (joint(a).type != joint(b).type) return;
     ArrangementMove& joints = add(Mistake::swapped_joints, a);
     joints.other = b;

@@ -12,6 +12,13 @@ using Eigen::Index;
 
 namespace {
 
+/// A factor or its inverse, two digits: 1.3, 57, 1000.
+std::string times(double value) {
+  const double factor = value < 1 ? 1 / value : value;
+  const double digit = std::pow(10, std::floor(std::log10(factor)) - 1);
+  return fmt::format("{:g}", std::round(factor / digit) * digit);
+}
+
 class MoveWords {
  public:
   explicit MoveWords(const Project& project) : project_(project) {
@@ -43,13 +50,13 @@ class MoveWords {
         return fmt::format("gravity points along {} in the base frame, not along {}", vector(move.direction, 1),
                            vector(project_.robot.gravity, 1));
       case Mistake::torque_gain:
-        return fmt::format("torque of {} is about {:.2g} times too {} beside the others' and the URDF's masses",
-                           joint(j), move.value < 1 ? 1 / move.value : move.value, move.value < 1 ? "large" : "small");
+        return fmt::format("torque of {} is about {} times too {} beside the others' and the URDF's masses", joint(j),
+                           times(move.value), move.value < 1 ? "large" : "small");
       case Mistake::torque_unit:
         return fmt::format(
-            "all torques are about {:.2g} times too {} for the URDF's masses: currents, another unit, or "
+            "all torques are about {} times too {} for the URDF's masses: currents, another unit, or "
             "masses that are placeholders?",
-            move.value < 1 ? 1 / move.value : move.value, move.value < 1 ? "large" : "small");
+            times(move.value), move.value < 1 ? "large" : "small");
       case Mistake::position_unit:
         return unit(move);
     }
@@ -101,8 +108,8 @@ class MoveWords {
 
   std::string unit(const ArrangementMove& move) const {
     const bool turns = project_.robot.joints[static_cast<std::size_t>(move.joint)].type == JointType::revolute;
-    return fmt::format("q of {} is not in {}: it looks {:.3g} times too {}", joint(move.joint), turns ? "rad" : "m",
-                       move.value < 1 ? 1 / move.value : move.value, move.value < 1 ? "large" : "small");
+    return fmt::format("q of {} is not in {}: it looks {} times too {}", joint(move.joint), turns ? "rad" : "m",
+                       times(move.value), move.value < 1 ? "large" : "small");
   }
 
   /// The file's columns in another order, as a list.

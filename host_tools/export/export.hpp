@@ -86,6 +86,8 @@ std::string why_not_in_layout(const IdentifiedModel& model, const Formats& forma
 /// |fixed - double| of each joint over the states [N*m | N], both fed with the same quantised states.
 struct QuantisationError {
   Eigen::VectorXd largest, rms;
+  /// The largest while no saturation is counted, nor in the two ticks before: what Proof::error bounds.
+  Eigen::VectorXd uncounted;
   std::uint32_t saturations = 0;
 };
 QuantisationError quantisation_error(const IdentifiedModel& model, const Formats& formats,

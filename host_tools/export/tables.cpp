@@ -310,54 +310,6 @@ std::string why_not_in_layout(const IdentifiedModel& model, const Formats& forma
   return {};
 }
 
-QuantisationError quantisation_error(const IdentifiedModel& model, const Formats& formats,
-                                     const std::vector<TickStates>& states) {
-  FixedModel fixed(model, formats);
-  Evaluator<Real> exact(with_stored_limits(model, formats), model.tick_s);
-  const auto n = static_cast<Eigen::Index>(model.robot.size());
-  QuantisationError out{Eigen::VectorXd::Zero(n), Eigen::VectorXd::Zero(n)};
-  std::vector<JointState<Real>> state(model.robot.size());
-  Eigen::Index count = 0;
-  Saturations saturations, ignored;
-  for (const TickStates& log : states) {
-    fixed.reset();
-    exact.reset();
-    for (Eigen::Index k = 0; k < log.t.size(); ++k, ++count) {
-      const std::vector<std::int32_t> raw = raw_states(log, k, formats);
-      for (std::size_t j = 0; j < state.size(); ++j) {
-        state[j] = {from_raw(raw[3 * j], formats[Quantity::position]),
-                    from_raw(raw[3 * j + 1], formats[Quantity::velocity]),
-                    from_raw(raw[3 * j + 2], formats[Quantity::acceleration])};
-      }
-      const std::vector<std::int32_t> torques = fixed.tick(raw, saturations);
-      const auto reference = exact.tick(state, ignored);
-      for (Eigen::Index j = 0; j < n; ++j) {
-        const auto i = static_cast<std::size_t>(j);
-        const double error = std::fabs(from_raw(torques[i], formats[Quantity::torque]) - reference[i]);
-        out.largest[j] = std::max(out.largest[j], error);
-        out.rms[j] += error * error;
-      }
-    }
-  }
-  out.rms = (out.rms / static_cast<double>(std::max<Eigen::Index>(1, count))).cwiseSqrt();
-  out.saturations = saturations.count;
-  return out;
-}
-
-Eigen::MatrixXd predict_fixed(const IdentifiedModel& model, const Formats& formats, const TickStates& states,
-                              double age_s) {
-  FixedModel fixed(model, formats);
-  if (age_s > 0) fixed.warm_up(age_s);
-  Eigen::MatrixXd out(states.q.rows(), states.q.cols());
-  Saturations ignored;
-  for (Eigen::Index k = 0; k < out.rows(); ++k) {
-    const std::vector<std::int32_t> torques = fixed.tick(raw_states(states, k, formats), ignored);
-    for (Eigen::Index j = 0; j < out.cols(); ++j)
-      out(k, j) = from_raw(torques[static_cast<std::size_t>(j)], formats[Quantity::torque]);
-  }
-  return out;
-}
-
 namespace {
 
 /// tables.hpp, as write_tables() fills it in.

@@ -60,11 +60,11 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
   if (!project.has_role(Role::train)) {
     throw InputError(project.file.string() + ": no log to learn from; add a [[log]] with role = \"train\"");
   }
+  GateData data;
   std::vector<Log> logs;
   for (const Role role : {Role::train, Role::validate}) {
-    for (Log& log : read_logs(project, role, directory)) logs.push_back(std::move(log));
+    for (Log& log : read_logs(project, role, directory, &data.rows)) logs.push_back(std::move(log));
   }
-  GateData data;
   data.filter = choose_filter(logs, project.signals);
   const auto n = static_cast<Eigen::Index>(project.robot.size());
   data.largest_torque = data.dq = data.ddq = Eigen::VectorXd::Zero(n);

@@ -11,6 +11,7 @@
 #include "host_tools/identify/options.hpp"
 #include "host_tools/project/project.hpp"
 #include "host_tools/regression/dataset.hpp"
+#include "host_tools/simulate/known_rows.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {
@@ -20,6 +21,7 @@ struct GateData {
   FilterFit filter;
   std::vector<ProcessedLog> logs;
   std::vector<LogReference> references;
+  KnownRows rows;                             ///< of these logs, for what is read after them
   std::vector<std::string> notes;             ///< what a reader should know of the data
   Eigen::VectorXd largest_torque;             ///< raw, over the train and validate logs [N*m | N]
   Eigen::VectorXd q_lower, q_upper, dq, ddq;  ///< largest of the filtered motion

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace fxdyn {
 
@@ -26,7 +27,7 @@ std::vector<Index> spread_samples(Index first, Index last, Index stride) {
 
 }  // namespace
 
-TorqueSamples sample_torque(const std::vector<ProcessedLog>& logs, Index wanted, double lead_s) {
+TorqueSamples sample_torque(std::span<const ProcessedLog> logs, Index wanted, double lead_s) {
   TorqueSamples samples;
   Index available = 0;
   for (const ProcessedLog& log : logs) {

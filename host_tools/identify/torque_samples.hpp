@@ -1,7 +1,7 @@
 #pragma once
 
 #include <Eigen/Dense>
-#include <vector>
+#include <span>
 
 #include "host_tools/regression/dataset.hpp"
 
@@ -16,6 +16,6 @@ struct TorqueSamples {
 
 /// About `wanted` of them, spread over the motion. Not at even distances: those may keep step with a motion that
 /// repeats itself, and all samples would show one pose. Torques are those of `lead_s` before the motion [s].
-TorqueSamples sample_torque(const std::vector<ProcessedLog>& logs, Eigen::Index wanted, double lead_s = 0);
+TorqueSamples sample_torque(std::span<const ProcessedLog> logs, Eigen::Index wanted, double lead_s = 0);
 
 }  // namespace fxdyn

@@ -84,8 +84,8 @@ void Pipeline::check_data() {
   checked_ = true;
   for (const CheckFinding& finding : check_columns(project_, data().logs)) {
     if (finding.error) {
-      throw DataError(fmt::format("{}; write {}, or [check] columns = false if the columns are right", finding.text,
-                                  finding.fix));
+      throw DataError(
+          fmt::format("{}; write {}, or [check] columns = false if the columns are right", finding.text, finding.fix));
     }
     data_notes_.push_back(finding.text);
   }
@@ -120,7 +120,7 @@ void Pipeline::check_excited() const {
 
 std::vector<ProcessedLog> Pipeline::logs(Role role) {
   std::vector<ProcessedLog> out;
-  for (Log& log : read_logs(project_, role, directory_)) {
+  for (Log& log : read_logs(project_, role, directory_, &data().rows)) {
     check_torque(log, project_.robot);
     out.push_back(process(std::move(log), data().filter));
   }
@@ -174,7 +174,7 @@ void Pipeline::diagnose() {
   check_data();
   data().notes = data_notes_;
   std::vector<ProcessedLog> baseline;
-  for (Log& log : read_logs(project_, Role::baseline, directory_)) {
+  for (Log& log : read_logs(project_, Role::baseline, directory_, &data().rows)) {
     log.role = Role::train;  // what the healthy session is fitted on
     check_torque(log, project_.robot);
     baseline.push_back(process(std::move(log), data().filter));

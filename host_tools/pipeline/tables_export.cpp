@@ -23,7 +23,8 @@ constexpr double tight_enough = 2;
 constexpr int proof_boxes = 40'000;
 constexpr Eigen::Index random_states = 20'000;
 
-/// Errors of the tables: on the logs, and on these and what disturbs them.
+/// Errors of the tables on the logs, and there and on random, creeping and disturbed motion. Of the latter what is
+/// counted as saturated is left out: such setpoints jump, and the drive says so.
 struct Observed {
   QuantisationError on_logs, anywhere;
 };
@@ -35,7 +36,9 @@ Observed observe(const IdentifiedModel& model, const Formats& formats, const std
   for (std::size_t i = 0; i < states.size(); ++i) judged.push_back(perturbed(states[i], model, 1000 + i));
   judged.push_back(within_limits(model, random_states, 77));
   judged.push_back(creeping(model, formats));
-  return {quantisation_error(model, formats, states), quantisation_error(model, formats, judged)};
+  Observed out{quantisation_error(model, formats, states), quantisation_error(model, formats, judged)};
+  out.anywhere.largest = out.anywhere.uncounted.cwiseMax(out.on_logs.largest);
+  return out;
 }
 
 /// A value that is enough, as one writes it: 0.0234 -> 0.03.
@@ -51,10 +54,10 @@ void check_errors(const IdentifiedModel& model, const Observed& observed, const 
     const auto k = static_cast<Eigen::Index>(j);
     const std::string joint = fmt::format("joint {} ({})", j + 1, model.robot.joints[j].name);
     const double error = observed.anywhere.largest[k], rated = model.joints[j].rated_torque;
-    if (error > proof.error[k]) {
+    if (observed.anywhere.uncounted[k] > proof.error[k]) {
       throw DataError(fmt::format(
           "{}: fixed point is off by {:.3g}, more than the {:.3g} that were proven: please report this with {}", joint,
-          error, proof.error[k], reported.string()));
+          observed.anywhere.uncounted[k], proof.error[k], reported.string()));
     }
     constexpr const char* advice =
         "narrow the project's [limits] to what the robot does, check that URDF and log are of one robot, or accept it "

@@ -2,14 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <map>
-#include <mutex>
 #include <numbers>
 
 #include "host_tools/project/log_entries.hpp"
-#include "host_tools/project/provenance.hpp"
-#include "host_tools/signals/same_motion.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
@@ -55,39 +50,6 @@ void check_copies(const Project& project, const fs::path& directory) {
   }
 }
 
-/// Prints of the logs that this process has read for a project: what judges is read after what is fitted.
-class ReadLogs {
- public:
-  /// @throws InputError: the log holds rows of one with another role, under other time stamps
-  void check(const Project& project, const LogEntry& entry, const Log& log) {
-    constexpr std::size_t fewest = 50;     // rows that are no coincidence
-    constexpr double share_of_copy = 0.1;  // of the shorter log's rows
-    std::vector<std::uint64_t> prints = row_prints(log);
-    const std::lock_guard lock(reading_);
-    std::map<int, std::vector<std::uint64_t>>& known = prints_[project_hash(project)];
-    for (const LogEntry& other : project.logs) {
-      const auto found = known.find(other.line);
-      if (found == known.end() || other.role == entry.role || is_source(other, entry)) continue;
-      const std::size_t common = rows_in_common(found->second, prints);
-      const std::size_t shorter = std::min(found->second.size(), prints.size());
-      if (common < fewest || static_cast<double>(common) < share_of_copy * static_cast<double>(shorter)) continue;
-      throw InputError(
-          fmt::format("{}:{}: {} of its {} moving rows are those of the log in line {}, under other time "
-                      "stamps: a copy can't judge what was fitted on it; record another motion",
-                      project.file.string(), entry.line, common, prints.size(), other.line));
-    }
-    known[entry.line] = std::move(prints);
-  }
-
- private:
-  /// Windows of one log are told apart by their times.
-  static bool is_source(const LogEntry& a, const LogEntry& b) {
-    return a.file == b.file && a.scenario == b.scenario && a.scenario_log == b.scenario_log;
-  }
-  std::map<std::string, std::map<int, std::vector<std::uint64_t>>> prints_;  ///< project's hash, line of the [[log]]
-  std::mutex reading_;
-};
-
 /// A joint with end stops can't turn far beyond them.
 void check_turns(const Log& log, const Robot& robot) {
   for (std::size_t i = 0; i < robot.size(); ++i) {
@@ -111,7 +73,7 @@ void check_turns(const Log& log, const Robot& robot) {
 
 }  // namespace
 
-std::vector<Log> read_logs(const Project& project, Role role, const fs::path& directory) {
+std::vector<Log> read_logs(const Project& project, Role role, const fs::path& directory, KnownRows* known) {
   std::vector<bool> revolute;
   for (const Joint& joint : project.robot.joints) revolute.push_back(joint.type == JointType::revolute);
   std::vector<fs::path> files;  // all of them first: what one scenario makes may be a copy of another log
@@ -127,8 +89,7 @@ std::vector<Log> read_logs(const Project& project, Role role, const fs::path& di
     logs.back().role = role;
     logs.back().load = entry.load;
     check_turns(logs.back(), project.robot);
-    static ReadLogs read;
-    read.check(project, entry, logs.back());
+    if (known != nullptr) known->add(project, entry, logs.back());
   }
   return logs;
 }

