@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "host_tools/check/check.hpp"
@@ -140,17 +142,52 @@ Action add_refine(CLI::App& verb) {
   };
 }
 
+namespace {
+
+/// "X,Y,Z"
+Eigen::Vector3d point_of(const std::string& text) {
+  Eigen::Vector3d out;
+  std::size_t at = 0;
+  for (int k = 0; k < 3; ++k) {
+    const std::size_t end = k < 2 ? text.find(',', at) : text.size();
+    const char *from = text.data() + at, *to = text.data() + (end == std::string::npos ? at : end);
+    const auto [read, error] = std::from_chars(from, to, out[k]);
+    if (error != std::errc() || read != to || !std::isfinite(out[k]))
+      throw InputError(fmt::format("payload: --com {}: expected three lengths in metres, as in 0,0.02,0.1", text));
+    at = end + 1;
+  }
+  return out;
+}
+
+}  // namespace
+
 Action add_payload(CLI::App& verb) {
   struct Options {
-    std::string model, log, out;
+    std::string model, log, out, com, unloaded;
+    double mass = 0;
   };
   const auto options = std::make_shared<Options>();
   verb.add_option("--model", options->model, "model.json, identified without load")->required();
   verb.add_option("--log", options->log, "log (CSV) recorded with the load")->required();
+  const auto* mass = verb.add_option("--mass", options->mass, "the load is known [kg]: find the gains of the torques");
+  const auto* com = verb.add_option("--com", options->com, "its centre X,Y,Z in the last link's URDF frame [m]");
+  const auto* unloaded = verb.add_option("--unloaded", options->unloaded, "log (CSV) of the same motion without load");
   verb.add_option("--out", options->out, "directory for the results")->required();
-  return [options] {
-    fmt::print("{}", identify_payload(options->model, options->log, options->out));
-    fmt::print("load in {0}/payload.json, model with it in {0}/model.json\n", options->out);
+  return [options, mass, com, unloaded] {
+    if (mass->count() == 0 && com->count() + unloaded->count() > 0)
+      throw InputError("payload: --com and --unloaded belong to a known load: give its --mass too");
+    if (mass->count() == 0) {
+      fmt::print("{}", identify_payload(options->model, options->log, options->out));
+      fmt::print("load in {0}/payload.json, model with it in {0}/model.json\n", options->out);
+      return;
+    }
+    if (!(options->mass > 0)) throw InputError("payload: --mass has to be above 0 kg");
+    if (com->count() == 0) throw InputError("payload: --mass needs --com X,Y,Z: where the load's centre is");
+    if (unloaded->count() == 0)
+      throw InputError("payload: --mass needs --unloaded: the log of the same motion without the load");
+    fmt::print("{}", identify_torque_gains(options->model, options->unloaded, options->log,
+                                           {options->mass, point_of(options->com)}, options->out));
+    fmt::print("gains in {0}/payload.json, the line in {0}/torque_gain.toml; then identify again\n", options->out);
   };
 }
 

@@ -44,7 +44,10 @@ std::span<const Verb> verbs() {
       Verb{"refine",
            "Parameters that fit the simulated positions of the train logs, from those by torque on: refined.json.",
            "robot.toml --out out/robot", add_refine},
-      Verb{"payload", "Load on the last link from a log recorded with it: payload.json, and the model with it.",
+      Verb{"payload",
+           "Load on the last link from a log recorded with it: payload.json, and the model with it; or, of a load that "
+           "is\n"
+           "known (--mass), the gains of the torques: payload.json, torque_gain.toml.",
            "--model out/robot/model.json --log loaded.csv --out out/loaded", add_payload},
       Verb{"effects", "List the effects that the model knows.", "--json", add_effects},
       Verb{"doctor", "What this machine lacks for which verb, and the command that installs it.", "", add_doctor},

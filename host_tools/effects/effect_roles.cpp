@@ -69,6 +69,13 @@ const EffectInfo& viscous_friction_effect() {
   return found;
 }
 
+const EffectInfo& friction_of_load_effect() {
+  static const EffectInfo& found =
+      first_that([](const EffectInfo& info) { return info.turns_with_sign == TurnsWithSign::load; },
+                 "friction that grows with the load");
+  return found;
+}
+
 const EffectInfo& constant_effect() {
   static const EffectInfo& found =
       first_that([](const EffectInfo& info) { return info.nominal && info.has_constant; }, "a constant torque");

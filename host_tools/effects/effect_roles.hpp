@@ -20,6 +20,8 @@ const EffectInfo& rotor_effect();
 const EffectInfo& dry_friction_effect();
 /// The nominal friction in proportion to the velocity.
 const EffectInfo& viscous_friction_effect();
+/// The friction in proportion to the load on the gear.
+const EffectInfo& friction_of_load_effect();
 /// The nominal torque that never changes.
 const EffectInfo& constant_effect();
 /// Whether it bends the gear in proportion to the load.

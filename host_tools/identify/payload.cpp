@@ -279,12 +279,16 @@ ConsistentFit possible_load(const Fit& fit, const std::array<bool, 10>& apart, I
 
 }  // namespace
 
-LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log, const LoadOptions& options) {
+void check_weighable(const IdentifiedModel& model, const ProcessedLog& log) {
   for (const EffectFit& effect : model.body) {
     if (is_load(effect.effect))
       throw InputError("the model has a payload already: take the model that was identified without load");
   }
   if (log.tau.size() == 0) throw InputError(fmt::format("{}: no torque; a load shows in the torque only", log.name));
+}
+
+LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log, const LoadOptions& options) {
+  check_weighable(model, log);
   const DhChain chain = to_dh(model.robot);
   const auto n = static_cast<Index>(model.robot.size());
   const Rows rows = build_rows(model, chain, log);

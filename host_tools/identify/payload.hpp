@@ -29,6 +29,10 @@ struct LoadFit {
   EffectFit effect;  ///< `payload`
 };
 
+/// What every look at a load asks for.
+/// @throws InputError: the model has a payload already, or the log has no torque.
+void check_weighable(const IdentifiedModel& model, const ProcessedLog& log);
+
 /// Weighted least squares of tau - predict(model) on the ten parameters of the last link, a Coulomb and an offset
 /// column a joint beside them (friction changes with the load), all filtered alike; made physically consistent.
 /// Standard deviations count the residual's autocorrelation.

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "host_tools/identify/known_load.hpp"
 #include "host_tools/identify/payload.hpp"
 
 namespace fxdyn {
@@ -74,6 +75,46 @@ PayloadResult payload_of(const json& file) {
     out.joints.push_back({joint.at("joint"), joint.at("unit"), joint.at("residual_before"), joint.at("residual_after"),
                           joint.at("residual_with_model"), joint.at("coulomb_change"), joint.at("coulomb_change_std"),
                           joint.at("offset_change")});
+  }
+  return out;
+}
+
+GainResult gain_result(const std::vector<JointGain>& gains, const Load& load, const Robot& robot,
+                       const std::vector<double>& gain) {
+  GainResult out{robot.joints.back().link, load.mass, {load.com.x(), load.com.y(), load.com.z()}, {}};
+  for (std::size_t j = 0; j < robot.size(); ++j) {
+    const JointGain& one = gains[j];
+    const double now = gain.empty() ? 1 : gain[j];
+    out.joints.push_back({robot.joints[j].name, robot.joints[j].torque_unit(), one.felt, one.factor, one.std,
+                          one.load_rms, one.felt ? now * one.factor : now});
+  }
+  return out;
+}
+
+json to_json(const GainResult& result) {
+  json joints = json::array();
+  for (const GainResult::Joint& joint : result.joints) {
+    joints.push_back({{"joint", joint.name},
+                      {"index", joints.size() + 1},
+                      {"felt", joint.felt},
+                      {"factor", joint.factor},
+                      {"std", joint.std},
+                      {"load_rms", joint.load_rms},
+                      {"unit", joint.unit},
+                      {"torque_gain", joint.torque_gain}});
+  }
+  return {{"schema", "fxdyn.payload/1"},
+          {"link", result.link},
+          {"frame", "URDF frame of the link"},
+          {"gains", {{"mass", result.mass}, {"com", result.com}, {"joints", joints}}}};
+}
+
+GainResult gains_of(const json& file) {
+  const json& gains = file.at("gains");
+  GainResult out{file.at("link"), gains.at("mass"), gains.at("com"), {}};
+  for (const json& joint : gains.at("joints")) {
+    out.joints.push_back({joint.at("joint"), joint.at("unit"), joint.at("felt"), joint.at("factor"), joint.at("std"),
+                          joint.at("load_rms"), joint.at("torque_gain")});
   }
   return out;
 }

@@ -9,6 +9,8 @@
 
 namespace fxdyn {
 
+struct JointGain;
+struct Load;
 struct LoadFit;
 
 /// Content of payload.json: a load on the last link.
@@ -29,6 +31,27 @@ struct PayloadResult {
   bool constrained = false;
   std::vector<Joint> joints;
 };
+
+/// Content of payload.json where the load was known: the gains of the joints' torques.
+struct GainResult {
+  struct Joint {
+    std::string name, unit;
+    bool felt = false;           ///< else its gain is unknown and stays as it is
+    double factor = 1, std = 0;  ///< see JointGain [-]
+    double load_rms = 0;         ///< torque of the load [N*m | N]
+    double torque_gain = 1;      ///< for the project: what the log was read with, times the factor where it is known
+  };
+  std::string link;
+  double mass = 0;              ///< [kg]
+  std::array<double, 3> com{};  ///< in the link's URDF frame [m]
+  std::vector<Joint> joints;
+};
+/// @param gain what the logs were read with; empty: 1
+GainResult gain_result(const std::vector<JointGain>& gains, const Load& load, const Robot& robot,
+                       const std::vector<double>& gain);
+nlohmann::json to_json(const GainResult& result);
+GainResult gains_of(const nlohmann::json& file);
+
 PayloadResult payload_result(const LoadFit& fit, const Robot& robot);
 nlohmann::json to_json(const PayloadResult& result);
 PayloadResult payload_of(const nlohmann::json& file);

@@ -8,6 +8,7 @@
 
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/export/export.hpp"
+#include "host_tools/identify/known_load.hpp"
 #include "host_tools/identify/payload.hpp"
 #include "host_tools/identify/payload_result.hpp"
 #include "host_tools/regression/metrics_result.hpp"
@@ -18,22 +19,28 @@ namespace fxdyn {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+/// Columns and gains of a log, by its name.
+LogFormat format_of(const IdentifiedModel& model, const fs::path& file) {
+  for (const std::string& name : {file.filename().string(), std::string()}) {
+    if (const auto found = model.log_formats.find(name); found != model.log_formats.end()) return found->second;
+  }
+  if (model.log_formats.empty()) return {};  // of a simulated robot
+  throw InputError(fmt::format(
+      "{}: the project's logs have different columns or gains, and this one is none of them; name it like one",
+      file.string()));
+}
+
+}  // namespace
+
 Log read_log_for(const IdentifiedModel& model, const fs::path& file, std::optional<double> from_s,
                  std::optional<double> to_s, bool torque_required) {
   std::vector<bool> revolute;
   for (const Joint& joint : model.robot.joints) revolute.push_back(joint.type == JointType::revolute);
-  const auto read = [&](const LogFormat& format) {
-    Log log = read_log(file, model.robot.size(), revolute, format, from_s, to_s, torque_required);
-    if (!log.time_note.empty()) fmt::print(stderr, "note: {}\n", log.time_note);
-    return log;
-  };
-  for (const std::string& name : {file.filename().string(), std::string()}) {
-    if (const auto found = model.log_formats.find(name); found != model.log_formats.end()) return read(found->second);
-  }
-  if (model.log_formats.empty()) return read({});  // of a simulated robot
-  throw InputError(fmt::format(
-      "{}: the project's logs have different columns or gains, and this one is none of them; name it like one",
-      file.string()));
+  Log log = read_log(file, model.robot.size(), revolute, format_of(model, file), from_s, to_s, torque_required);
+  if (!log.time_note.empty()) fmt::print(stderr, "note: {}\n", log.time_note);
+  return log;
 }
 
 namespace {
@@ -67,6 +74,42 @@ std::string payload_table(const PayloadResult& result, const Robot& robot) {
                        joint.residual_with_model, joint.unit,
                        with_deviation(joint.coulomb_change, joint.coulomb_change_std));
   }
+  return out;
+}
+
+/// "torque_gain = [12.5, 3]"
+std::string gain_line(const GainResult& result) {
+  std::vector<std::string> gains;
+  for (const GainResult::Joint& joint : result.joints) gains.push_back(fmt::format("{:.5g}", joint.torque_gain));
+  return fmt::format("torque_gain = [{}]", fmt::join(gains, ", "));
+}
+
+/// Names of the joints whose gain stays as it is; empty: none.
+std::string unknown_gains(const GainResult& result) {
+  std::string out;
+  for (const GainResult::Joint& joint : result.joints) {
+    if (!joint.felt) out += (out.empty() ? "" : ", ") + joint.name;
+  }
+  return out;
+}
+
+std::string gain_table(const GainResult& result, const Robot& robot) {
+  const std::size_t width = widest_name(robot);
+  std::string out = fmt::format("known load on {}: {:g} kg at {:g} {:g} {:g} m in its URDF frame\n  {:<{}}{:<26}{}\n",
+                                result.link, result.mass, result.com[0], result.com[1], result.com[2], "joint", width,
+                                "its torque_gain times", "torque of the load (RMS)");
+  for (const GainResult::Joint& joint : result.joints) {
+    out += fmt::format(
+        "  {:<{}}{:<26}{:.3g} {}{}\n", joint.name, width,
+        joint.felt ? with_deviation(joint.factor, joint.std) : "did not feel the load", joint.load_rms, joint.unit,
+        joint.felt ? ""
+        : joint.std == 0
+            ? ": its gain stays unknown"
+            : fmt::format(": its gain stays unknown (to {:.2g} %)", 100 * joint.std / std::fabs(joint.factor)));
+  }
+  const std::string unknown = unknown_gains(result);
+  out += fmt::format("for [signals] of the project{}:\n{}\n", unknown.empty() ? "" : ", as before for " + unknown,
+                     gain_line(result));
   return out;
 }
 
@@ -106,6 +149,27 @@ std::string identify_payload(const fs::path& model_file, const fs::path& log_fil
   write_file(directory / "model.json", to_json(model).dump(1) + "\n");
   write_file(directory / "payload.json", to_json(report).dump(1) + "\n");
   return payload_table(report, model.robot);
+}
+
+std::string identify_torque_gains(const fs::path& model_file, const fs::path& unloaded, const fs::path& loaded,
+                                  const Load& load, const fs::path& directory) {
+  const IdentifiedModel model = read_model(model_file);
+  const std::vector<double> gain = format_of(model, loaded).torque_gain;
+  if (format_of(model, unloaded).torque_gain != gain) {
+    throw InputError(fmt::format("{} and {} are read with different torque_gain: a load tells one only",
+                                 unloaded.string(), loaded.string()));
+  }
+  const Log without = read_log_for(model, unloaded, {}, {}), with = read_log_for(model, loaded, {}, {});
+  const std::vector<JointGain> gains =
+      identify_gains(model, load, process(without, model.filter), process(with, model.filter));
+  const GainResult result = gain_result(gains, load, model.robot, gain);
+  const std::string unknown = unknown_gains(result);
+  write_file(directory / "payload.json", to_json(result).dump(1) + "\n");
+  write_file(directory / "torque_gain.toml",
+             fmt::format("# measured with {:g} kg at {:g} {:g} {:g} m on {}{}\n[signals]\n{}\n", load.mass,
+                         load.com.x(), load.com.y(), load.com.z(), result.link,
+                         unknown.empty() ? "" : "; not measured: " + unknown, gain_line(result)));
+  return gain_table(result, model.robot);
 }
 
 std::string predict_log(const fs::path& model_file, const fs::path& log_file, const Prediction& how,

@@ -27,4 +27,10 @@ std::string predict_log(const std::filesystem::path& model, const std::filesyste
 std::string identify_payload(const std::filesystem::path& model, const std::filesystem::path& log,
                              const std::filesystem::path& directory);
 
+/// The same with a load that is known: gains of the joints' torques from a log without it and one with it, payload.json
+/// and torque_gain.toml, the line for the project; as a table.
+std::string identify_torque_gains(const std::filesystem::path& model, const std::filesystem::path& unloaded,
+                                  const std::filesystem::path& loaded, const Load& load,
+                                  const std::filesystem::path& directory);
+
 }  // namespace fxdyn

@@ -40,6 +40,9 @@ std::string base_section(const ReportInput& input, const json&) {
              "modified Denavit-Hartenberg frames. Each stands for its group: what can't be told apart from it is added "
              "to it. "
              "Red: the standard deviation is above 30 % of the value, the data hardly determine it.") +
+         paragraph(
+             "Torques, masses, inertias and friction scale with torque_gain, errors as a share of a joint's own torque "
+             "do not; a log alone can't tell the gains, a known mass can (fxdyn payload --mass).") +
          "<div class=\"split\">" + table.bare_html() + "</div>\n";
 }
 

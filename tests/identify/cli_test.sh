@@ -104,6 +104,15 @@ echo '{"schema": "fxdyn.model/1"}' >"$work/model.json"
 expect 2 "model.json" predict --model "$work/model.json" --log "$work/good.csv" --out "$work/out"
 expect 1 "the mass of the load cannot be identified from this motion: no joint of this robot lifts" payload --model "$work/good/model.json" --log "$work/good.csv" --out "$work/out"
 unwritten() { [ ! -e "$work/out" ] || { echo "FAILED: $1 left files behind"; failures=$((failures + 1)); }; }
+# a known load: its mass and where it is, and a log without it
+known() { expect 2 "$1" payload --model "$work/good/model.json" --log "$work/good.csv" --out "$work/out" "${@:2}"; }
+known "--mass has to be above 0 kg" --mass 0 --com 0,0,0.1 --unloaded "$work/good.csv"
+known "give its --mass too" --com 0,0,0.1
+known "needs --com X,Y,Z" --mass 1 --unloaded "$work/good.csv"
+known "needs --unloaded" --mass 1 --com -0.1,0,0.1
+for com in 0,0.1 0,0,0.1,2 0,x,0.1; do known "--com $com: expected three lengths" --mass 1 --com $com --unloaded "$work/good.csv"; done
+expect 1 "no joint feels a load of 0.001 kg" payload --model "$work/good/model.json" --log "$work/good.csv" --unloaded "$work/good.csv" --mass 0.001 --com 0,0,0.1 --out "$work/out"
+unwritten "payload with a load that nothing feels"
 forward() { expect 2 "$1" forward --model "$work/good/model.json" --log "$work/$2" --out "$work/out" "${@:3}"; }
 forward "at least 3 samples" good.csv --given 2
 forward "nothing is left to simulate" good.csv --given 5000

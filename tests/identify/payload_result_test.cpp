@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "host_tools/identify/known_load.hpp"
 #include "host_tools/identify/payload.hpp"
 #include "tests/support/pendulum.hpp"
 
@@ -34,6 +35,21 @@ TEST(PayloadResult, ComesBackFromItsFile) {
   EXPECT_TRUE(read.parameters[2].identifiable);
   EXPECT_FALSE(read.parameters[3].identifiable);
   EXPECT_EQ(read.joints.at(0).residual_after, 0.125);
+}
+
+TEST(GainResult, ComesBackFromItsFileAndKeepsUnknownGains) {
+  const Robot robot = test::pendulum(2);
+  const std::vector<JointGain> gains{{true, 1.5, 0.01, 3}, {false, 0.7, 0.2, 1}};
+  const json file = to_json(gain_result(gains, {2, {0.1, 0.2, 0.3}}, robot, {10, 20}));
+  EXPECT_EQ(to_json(gains_of(json::parse(file.dump()))), file);
+  const GainResult read = gains_of(file);
+  EXPECT_EQ(read.link, robot.joints.back().link);
+  EXPECT_EQ(read.mass, 2);
+  EXPECT_EQ(read.com[2], 0.3);
+  EXPECT_EQ(read.joints.at(0).torque_gain, 15);
+  EXPECT_EQ(read.joints.at(1).torque_gain, 20);
+  EXPECT_FALSE(read.joints.at(1).felt);
+  EXPECT_EQ(gain_result(gains, {2, {0, 0, 0}}, robot, {}).joints.at(0).torque_gain, 1.5);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@ TEST(EffectRoles, TheCatalogueHasOneForEach) {
   EXPECT_EQ(rotor_effect().name, "rotor_inertia");
   EXPECT_EQ(dry_friction_effect().name, "coulomb");
   EXPECT_EQ(viscous_friction_effect().name, "viscous");
+  EXPECT_EQ(friction_of_load_effect().name, "load_friction");
   EXPECT_EQ(constant_effect().name, "offset");
   for (const EffectInfo& info : effect_infos()) {
     EXPECT_EQ(is_load(info.name), info.name == "payload") << info.name;

@@ -75,7 +75,7 @@ TEST(ModelSections, ShowBaseParametersAndEffects) {
   model.joints[1].effects = {test::effect("viscous", {}, {2.25})};
   const auto nowhere = test::folder();
   expect_all(drawn("base", nullptr, nowhere, model),
-             {"<h2>Base parameters</h2>", "hx3", "-1.5", "0.75", "50 %", "kg*m"});
+             {"<h2>Base parameters</h2>", "hx3", "-1.5", "0.75", "50 %", "kg*m", "scale with torque_gain"});
   expect_all(drawn("effects", nullptr, nowhere, model),
              {"<h2>Effects</h2>", "viscous", "coefficient = 2.25 N*m*s/rad"});
 }
