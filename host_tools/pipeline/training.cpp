@@ -171,7 +171,10 @@ void Trainer::add_findings_of(const IdentifiedModel& refitted, IdentifiedModel& 
     to.flexible = from.flexible;
     for (std::size_t e = to.effects.size(); e < from.effects.size(); ++e) to.effects.push_back(from.effects[e]);
   }
-  model.notes = refitted.notes;
+  model.notes = data_.notes;
+  for (const std::string& note : refitted.notes) {
+    if (std::find(model.notes.begin(), model.notes.end(), note) == model.notes.end()) model.notes.push_back(note);
+  }
   model.drop_tables();  // they are another model's now
 }
 
