@@ -130,6 +130,8 @@ HeldOut judge(const Outcome& outcome, const std::vector<SessionLog>& logs, const
   std::vector<MatrixXd> in_band(n);
   parallel_for(n, [&](std::size_t j) { in_band[j] = features(problem, j, problem.models().has_baseline); });
   const HeldOut band = hold_out(outcome, logs, problem, in_band, groups);
+  held.plain_before = band.before;
+  held.plain_after = band.after;
   for (std::size_t j = 0; j < n; ++j) {
     if (!outcome.structured(j)) continue;
     const auto k = static_cast<Index>(j);
@@ -148,8 +150,9 @@ HeldOut judge(const Outcome& outcome, const std::vector<SessionLog>& logs, const
 struct PlainErrors {
   VectorXd before, after;
 };
-PlainErrors judged_plainly(const Outcome& outcome, const std::vector<SessionLog>& logs,
-                           const std::vector<std::size_t>& groups) {
+PlainErrors judged_plainly(const Outcome& outcome, const std::vector<SessionLog>& logs, const Gate& gate) {
+  if (gate.held.plain_after.size() > 0) return {gate.held.plain_before, gate.held.plain_after};
+  const std::vector<std::size_t>& groups = gate.groups;
   const std::size_t n = outcome.lack.size();
   const Linearised with(outcome.models, logs, std::vector<VectorXd>(n, VectorXd::Zero(1)));
   const std::unique_ptr<Linearised> plain = without(outcome, logs, with, groups);
@@ -373,7 +376,7 @@ Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<Se
       if (validated.size() > 0) {
         errors.after = plain_error(outcome.models.current, logs);
       } else {
-        errors = judged_plainly(outcome, logs, gate.groups);
+        errors = judged_plainly(outcome, logs, gate);
       }
     }
     const std::size_t worst = weakest(gate, outcome, errors.before, errors.after);

@@ -26,6 +26,7 @@ struct HeldOut {
   Eigen::VectorXd leftover;  ///< structure that is left
   Eigen::VectorXd excess;    ///< .. beyond the share of it that the healthy session shows
   Eigen::VectorXd fitted_before, fitted_after, fitted_rows;  ///< of today's rows that fit, with a fit of all
+  Eigen::VectorXd plain_before, plain_after;    ///< of all joints in the whole band; empty: no joint is judged in it
   std::vector<Eigen::VectorXd> alone;           ///< by named group: what comes back when it alone is removed
   std::vector<std::vector<Stretch>> stretches;  ///< by joint
 };

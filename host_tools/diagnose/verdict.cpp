@@ -306,7 +306,8 @@ class ReportWriter {
     note_other_test_logs(j, of);
     note_impacts(j);
     const bool changed = state.established || state.there || state.reached;
-    if (changed) out.carries_over = carries_over(of);
+    // A finding elsewhere may reach this joint through the base parameters.
+    if (changed || of.after != of.before) out.carries_over = carries_over(of);
     if (out.carries_over == false) note_risen_error(j, of);
     const bool left = out.verdict == Verdict::unexplained || out.verdict == Verdict::partly_explained;
     // What only bends leaves no gap in the torque, and noise alone has nothing to close.

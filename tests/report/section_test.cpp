@@ -114,8 +114,8 @@ json metrics(const std::vector<std::array<double, 2>>& validate, const std::vect
   return out;
 }
 
-/// The error section of two joints, its results on test logs.
-std::string error_page(const json& metrics) {
+/// A section of two joints, its results on test logs.
+std::string section_page(std::string_view name, const json& metrics) {
   IdentifiedModel model = test::plant_of(read_urdf(test::puma560));
   model.joints.resize(2);
   model.robot.joints.resize(2);
@@ -124,28 +124,40 @@ std::string error_page(const json& metrics) {
   results.files["metrics"] = metrics;
   results.role = "test";
   const auto sections = report_sections();
-  const auto section = std::find_if(sections.begin(), sections.end(), [](const auto& s) { return s.name == "error"; });
+  const auto section = std::find_if(sections.begin(), sections.end(), [&](const auto& s) { return s.name == name; });
   const std::vector<ProcessedLog> logs;
   const auto directory = test::folder();
   return draw_sections({model, to_json(model), logs, results, directory}, {&*section, 1});
 }
 
 TEST(ErrorSection, TheExportedStageIsGreenWhereItIsTheBest) {
-  const std::string page =
-      error_page(metrics({{{2.5, 3.5}, {0.75, 1.25}, {0.5, 1.25}}}, {{{2.6, 3.6}, {0.85, 1.35}, {0.55, 1.35}}}));
-  expect_all(page, {"<td>+ BLS: exported</td><td class=\"n\">0.5</td><td class=\"n good\">0.55</td>",
-                    "<td>+ diagnosed: exported</td><td class=\"n\">1.25</td><td class=\"n good\">1.35</td>",
-                    "<td>+ BLS</td><td class=\"n\">1.25</td><td class=\"n\">1.35</td>"});
+  const std::string page = section_page(
+      "error", metrics({{{2.5, 3.5}, {0.75, 1.25}, {0.5, 1.25}}}, {{{2.6, 3.6}, {0.85, 1.35}, {0.55, 1.35}}}));
+  expect_all(page, {"<td class=\"\">+ BLS: exported</td><td class=\"n\">0.5</td><td class=\"n good\">0.55</td>",
+                    "<td class=\"\">+ diagnosed: exported</td><td class=\"n\">1.25</td><td class=\"n good\">1.35</td>",
+                    "<td class=\"\">+ BLS</td><td class=\"n\">1.25</td><td class=\"n\">1.35</td>"});
   EXPECT_EQ(page.find("amber\""), std::string::npos);
 }
 
 TEST(ErrorSection, ItIsAmberWhereTheTestLogsOrTheGateSayOtherwise) {
   // On the test logs joint 1 was better before it got a BLS; on the gate joint 2 was better without any effect.
-  const std::string page =
-      error_page(metrics({{{2.5, 1.15}, {0.75, 1.25}, {0.5, 1.25}}}, {{{2.6, 3.6}, {0.85, 1.35}, {0.95, 1.35}}}));
-  expect_all(page, {"<td>+ BLS: exported</td><td class=\"n\">0.5</td><td class=\"n amber\">0.95</td>",
-                    "<td>+ diagnosed: exported</td><td class=\"n\">1.25</td><td class=\"n amber\">1.35</td>"});
+  const std::string page = section_page(
+      "error", metrics({{{2.5, 1.15}, {0.75, 1.25}, {0.5, 1.25}}}, {{{2.6, 3.6}, {0.85, 1.35}, {0.95, 1.35}}}));
+  expect_all(page,
+             {"<td class=\"\">+ BLS: exported</td><td class=\"n\">0.5</td><td class=\"n amber\">0.95</td>",
+              "<td class=\"\">+ diagnosed: exported</td><td class=\"n\">1.25</td><td class=\"n amber\">1.35</td>"});
   EXPECT_EQ(page.find("n good"), std::string::npos);
+}
+
+TEST(BlsSection, ABlsThatTheTestLogsDoNotLikeIsKeptInAmber) {
+  json result = metrics({{{2.5, 3.5}, {0.75, 1.25}, {0.5, 1.05}}}, {{{2.6, 3.6}, {0.85, 1.35}, {0.95, 1.15}}});
+  for (const double with : {0.5, 1.05}) {
+    result["training"].push_back(
+        {{"joint", "j"}, {"unit", "N*m"}, {"held_out_without", 1.5 * with}, {"held_out_with", with}, {"kept", true}});
+  }
+  const std::string page = section_page("bls", result);
+  expect_all(page, {"<td class=\"amber\">kept</td><td class=\"n\">0.85</td><td class=\"n\">0.95</td>",
+                    "<td class=\"good\">kept</td><td class=\"n\">1.35</td><td class=\"n\">1.15</td>"});
 }
 
 TEST(DiagnosisSection, AJointThatTheTestLogsDoNotBearOutIsAmberWithBothFigures) {
