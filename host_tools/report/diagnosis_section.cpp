@@ -22,7 +22,7 @@ constexpr const char* plus_minus = " ± ";
 std::string what_it_means(const json& diagnosis) {
   const std::string verdict = diagnosis.value("verdict", "");
   if (verdict == "explained" && !words::not_borne_out(diagnosis).empty())
-    return "Explained on the data that judged: it confirms the effects below. The test logs do not everywhere.";
+    return "Explained on the data that judged: it confirms the effects below. The test logs do not bear them all out.";
   if (verdict == "explained")
     return "Explained: the model lacked physics; held-out data confirms the effects below, and what is left is noise.";
   if (verdict == "partly_explained")

@@ -68,6 +68,11 @@ TEST_F(OfAPendulum, AnImpossibleModelMovesToThePossibleOneThatTheLogsTellApartLe
   // The bodies have the model's torque: base parameters are the same sums.
   for (std::size_t i = 0; i < model_.base.size(); ++i)
     EXPECT_EQ(possible.model.base[i].value, possible.bodies.beta[static_cast<Eigen::Index>(i)]);
+  // It is possible now, and its bodies are found again.
+  const PossibleModel again = possible_model(project_, possible.model, data_.logs);
+  EXPECT_FALSE(again.bodies.constrained);
+  EXPECT_EQ(to_json(again.model), to_json(possible.model));
+  EXPECT_LT((again.bodies.beta - possible.bodies.beta).norm(), 1e-12 * possible.bodies.beta.norm());
   EXPECT_EQ(possible.model.base[inertia].std, impossible.base[inertia].std);
   EXPECT_EQ(possible.model.stage, impossible.stage);
 }
