@@ -5,12 +5,19 @@
 #include "host_tools/identify/estimate.hpp"
 #include "host_tools/identify/identify.hpp"
 #include "host_tools/identify/structure.hpp"
+#include "host_tools/pipeline/possible_model.hpp"
 #include "host_tools/pipeline/training.hpp"
 
 namespace fxdyn {
 
 IdentifiedModel named_model(const Project& project, GateData data, Progress& progress) {
-  const IdentifiedModel diagnosed = diagnose(project, data, {}, {}, progress).model;
+  FinishModel finish;
+  if (project.identify.physical) {
+    finish = [&](const IdentifiedModel& model, const std::vector<ProcessedLog>& logs) {
+      return possible_model(project, model, logs).model;
+    };
+  }
+  const IdentifiedModel diagnosed = diagnose(project, data, {}, {}, progress, {}, finish).model;
   // Diagnosis searches without a prior; the fit after it, that of `train`, has one.
   Project plain = project;
   plain.train.enabled = false;

@@ -100,8 +100,14 @@ class Diagnoser {
  public:
   Diagnoser(const Project& project, GateData& data, const std::vector<ProcessedLog>& baseline,
             const std::vector<ProcessedLog>& test, const std::vector<bool>& still, Progress& progress,
-            const Options& options)
-      : project_(project), data_(data), baseline_(baseline), test_(test), still_(still), progress_(progress) {
+            const Options& options, const FinishModel& finish)
+      : project_(project),
+        data_(data),
+        baseline_(baseline),
+        test_(test),
+        still_(still),
+        progress_(progress),
+        finish_(finish) {
     models_.options = options;
     models_.has_baseline = !baseline_.empty();
     models_.smallest_step_s = project_.target.tick_s;
@@ -164,29 +170,17 @@ class Diagnoser {
     if (refit_links(outcome)) gate = pass(outcome, models_.current, logs_, still_);
     weigh_evidence(outcome, gate);
     const std::vector<Likely> likely = set_aside(outcome, gate, logs_, still_);
-    Models& found = outcome.models;
-    if (gate.groups.empty() && deflections_.found.empty()) {
-      if (found.rotors.size() != models_.rotors.size()) {
-        // The search gave up a rotor that the baseline has.
-        found = models_;
-        outcome.look_again(logs_);
-      }
-      found.current = models_.current;
-      add_deviations(found, *outcome.problem);
-    } else if (outcome.structured()) {
-      Models in_band = found;
-      refit(in_band, logs_, plain(), 4);
-      if (!is_worse_anywhere(found.current, in_band.current)) found = std::move(in_band);
-      Linearised problem(found, logs_, plain());
-      problem.solver().set_weights(diluted(problem));
-      add_deviations(found, problem);
-    } else {
-      add_deviations(found, *outcome.problem);
+    result.nominal = finished(result.nominal);
+    const IdentifiedModel judged_against = deflections_.found.empty() ? result.nominal : finished(models_.current);
+    result.model = concluded(outcome, gate);
+    // What came after the gate (likely names set aside, possible bodies) may have made a finding harm.
+    while (const std::optional<EffectId> harmful = harmful_finding(outcome, judged_against, result.model, logs_)) {
+      take_out(outcome, *harmful, logs_);
+      gate = judge_again(outcome, logs_, still_);
+      result.model = concluded(outcome, gate);
     }
-    mark_named(found.current, outcome);
-    result.model = found.current;
     if (models_.has_baseline) add_notes(changed_parameters(*outcome.problem));
-    const auto impacts = find_impacts(result.model, data_.logs, found.healthy, baseline_, options().impact);
+    const auto impacts = find_impacts(result.model, data_.logs, outcome.models.healthy, baseline_, options().impact);
     result.report = verdicts(
         {result.nominal, result.model, outcome, gate, likely, deflections_, impacts, still_, data_.logs, test_});
     for (std::size_t j = 0; j < joints(); ++j) {
@@ -208,6 +202,34 @@ class Diagnoser {
       notes_.push_back("no log has role = \"validate\": names are accepted on the " + gate_of(data_.logs) +
                        "; other trajectories would judge better");
     }
+  }
+  IdentifiedModel finished(const IdentifiedModel& model) const {
+    const bool moves = std::find(still_.begin(), still_.end(), true) == still_.end();
+    return finish_ && moves ? finish_(model, data_.logs) : model;
+  }
+  /// The model of what passed the gate.
+  IdentifiedModel concluded(Outcome& outcome, const Gate& gate) const {
+    Models& found = outcome.models;
+    if (gate.groups.empty() && deflections_.found.empty()) {
+      if (found.rotors.size() != models_.rotors.size()) {
+        // The search gave up a rotor that the baseline has.
+        found = models_;
+        outcome.look_again(logs_);
+      }
+      found.current = models_.current;
+      add_deviations(found, *outcome.problem);
+    } else if (outcome.structured()) {
+      Models in_band = found;
+      refit(in_band, logs_, plain(), 4);
+      if (!is_worse_anywhere(found.current, in_band.current)) found = std::move(in_band);
+      Linearised problem(found, logs_, plain());
+      problem.solver().set_weights(diluted(problem));
+      add_deviations(found, problem);
+    } else {
+      add_deviations(found, *outcome.problem);
+    }
+    mark_named(found.current, outcome);
+    return finished(found.current);
   }
   /// A fault of the recording would get the name of an effect.
   void refuse_faulty_recordings(const Models& nominal, const Outcome& outcome) const {
@@ -423,6 +445,7 @@ class Diagnoser {
   const std::vector<ProcessedLog>& test_;
   const std::vector<bool>& still_;
   Progress& progress_;
+  const FinishModel& finish_;
   Models models_;
   SearchSettings settings_;
   std::optional<Session> session_;
@@ -436,7 +459,8 @@ class Diagnoser {
 }  // namespace
 
 Diagnosis diagnose(const Project& project, GateData& given, const std::vector<ProcessedLog>& given_baseline,
-                   const std::vector<ProcessedLog>& test, Progress& progress, const Options& options) {
+                   const std::vector<ProcessedLog>& test, Progress& progress, const Options& options,
+                   const FinishModel& finish) {
   const std::vector<bool> still = still_joints(given, options.session);
   if (std::find(still.begin(), still.end(), false) == still.end()) {
     throw DataError(
@@ -447,7 +471,7 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
   std::vector<ProcessedLog> baseline = given_baseline;
   leave_out(data.logs, still);
   leave_out(baseline, still);
-  Diagnoser diagnoser(project, data, baseline, test, still, progress, options);
+  Diagnoser diagnoser(project, data, baseline, test, still, progress, options, finish);
   Diagnosis result = diagnoser.run();
   given.notes = data.notes;
   given.notes.insert(given.notes.end(), diagnoser.notes().begin(), diagnoser.notes().end());

@@ -130,6 +130,9 @@ json to_json(const JointDiagnosis& joint) {
           {"gap_before", or_null(joint.gap_before)},
           {"gap_after", or_null(joint.gap_after)},
           {"noise_floor", or_null(joint.noise_floor)},
+          {"gate_before", or_null(joint.gate_before)},
+          {"gate_after", or_null(joint.gate_after)},
+          {"carries_over", joint.carries_over ? json(*joint.carries_over) : json(nullptr)},
           {"closure", or_null(joint.closure)},
           {"left", to_json(joint.left)},
           {"where", to_json(joint.where)},
@@ -148,6 +151,10 @@ JointDiagnosis joint_of(const json& file) {
   out.gap_before = optional_of(file.at("gap_before"));
   out.gap_after = optional_of(file.at("gap_after"));
   out.noise_floor = optional_of(file.at("noise_floor"));
+  // Files of earlier versions don't have these three.
+  out.gate_before = optional_of(file.value("gate_before", json()));
+  out.gate_after = optional_of(file.value("gate_after", json()));
+  if (const json over = file.value("carries_over", json()); over.is_boolean()) out.carries_over = over.get<bool>();
   out.closure = optional_of(file.at("closure"));
   out.left = left_of(file.at("left"));
   out.where = place_of(file.at("where"));

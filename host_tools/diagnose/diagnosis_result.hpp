@@ -64,8 +64,13 @@ struct JointDiagnosis {
   std::size_t index = 0;  ///< from 1
   Verdict verdict = Verdict::nothing_missing;
   std::optional<double> gap_before{}, gap_after{}, noise_floor{};  ///< [N*m | N]; none: it stands still
-  std::optional<double> closure{};                                 ///< none: the torque has nothing to close
-  std::optional<GapLeft> left{};                                   ///< likewise
+  /// The same on what judged the names.
+  std::optional<double> gate_before{}, gate_after{};
+  /// Whether the error falls on the test logs, too, or hardly rises. None: there are no such logs, or nothing was
+  /// found.
+  std::optional<bool> carries_over{};
+  std::optional<double> closure{};  ///< none: the torque has nothing to close
+  std::optional<GapLeft> left{};    ///< likewise
   GapPlace where{};
   std::vector<NamedEffect> effects{};
   /// Sets of which one effect is there for sure, and the data don't tell which. The model has the first, without a

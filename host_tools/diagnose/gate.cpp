@@ -130,6 +130,8 @@ HeldOut judge(const Outcome& outcome, const std::vector<SessionLog>& logs, const
   std::vector<MatrixXd> in_band(n);
   parallel_for(n, [&](std::size_t j) { in_band[j] = features(problem, j, problem.models().has_baseline); });
   const HeldOut band = hold_out(outcome, logs, problem, in_band, groups);
+  held.plain_before = band.before;
+  held.plain_after = band.after;
   for (std::size_t j = 0; j < n; ++j) {
     if (!outcome.structured(j)) continue;
     const auto k = static_cast<Index>(j);
@@ -141,6 +143,25 @@ HeldOut judge(const Outcome& outcome, const std::vector<SessionLog>& logs, const
     for (std::size_t i = 0; i < groups.size(); ++i) held.alone[i][k] = band.alone[i][k];
   }
   return held;
+}
+
+/// Squares of the error in the whole band where logs judge one another: each fold by a fit of the others, without the
+/// named effects and with them.
+struct PlainErrors {
+  VectorXd before, after;
+};
+PlainErrors judged_plainly(const Outcome& outcome, const std::vector<SessionLog>& logs, const Gate& gate) {
+  if (gate.held.plain_after.size() > 0) return {gate.held.plain_before, gate.held.plain_after};
+  const std::vector<std::size_t>& groups = gate.groups;
+  const std::size_t n = outcome.lack.size();
+  const Linearised with(outcome.models, logs, std::vector<VectorXd>(n, VectorXd::Zero(1)));
+  const std::unique_ptr<Linearised> plain = without(outcome, logs, with, groups);
+  PlainErrors out{VectorXd::Zero(static_cast<Index>(n)), VectorXd::Zero(static_cast<Index>(n))};
+  for (const Fold& fold : with.blocks().folds) {
+    out.before += judged(*plain, fold);
+    out.after += judged(with, groups, fold);
+  }
+  return out;
 }
 
 VectorXd gap_of(const HeldOut& held) { return (held.before - held.after).cwiseMax(0.0) + held.excess; }
@@ -222,7 +243,7 @@ void believe(Gate& gate, const Outcome& outcome) {
 }
 
 /// The named effect that goes first, as a place in the gate's groups; their number: all hold.
-/// @param before, after mean squares of the plain error on the logs that judge
+/// @param before, after squares of the plain error on what judges
 std::size_t weakest(const Gate& gate, const Outcome& outcome, const VectorXd& before, const VectorXd& after) {
   const auto rises = [&](Index j) { return is_worse(outcome.models.options.gate, before, after, j); };
   const std::size_t none = gate.groups.size();
@@ -346,24 +367,49 @@ Gate judge_again(const Outcome& outcome, const std::vector<SessionLog>& logs, co
 Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs,
           const std::vector<bool>& still) {
   choose_time_constants(outcome, logs);
-  const VectorXd before = plain_error(nominal, logs);
+  const VectorXd validated = plain_error(nominal, logs);
   Gate gate;
   for (;;) {
     gate = judge_again(outcome, logs, still);
-    const VectorXd after =
-        gate.groups.empty() || before.size() == 0 ? before : plain_error(outcome.models.current, logs);
-    const std::size_t worst = weakest(gate, outcome, before, after);
+    PlainErrors errors{validated, validated};
+    if (!gate.groups.empty()) {
+      if (validated.size() > 0) {
+        errors.after = plain_error(outcome.models.current, logs);
+      } else {
+        errors = judged_plainly(outcome, logs, gate);
+      }
+    }
+    const std::size_t worst = weakest(gate, outcome, errors.before, errors.after);
     if (worst == gate.groups.size()) break;
-    const EffectId gone = outcome.problem->groups()[gate.groups[worst]].id;
-    std::erase_if(outcome.found, [&](const Finding& f) { return f.id == gone; });
-    std::vector<EffectId> ids;
-    for (const Finding& f : outcome.found) ids.push_back(f.id);
-    take_back(outcome.models, ids, gone);
-    for (std::size_t i = 0; i < ids.size(); ++i) outcome.found[i].id = ids[i];
-    refit(outcome.models, logs, outcome.whitening, 3);
-    outcome.look_again(logs);
+    take_out(outcome, outcome.problem->groups()[gate.groups[worst]].id, logs);
   }
   return gate;
+}
+
+std::optional<EffectId> harmful_finding(const Outcome& outcome, const IdentifiedModel& before,
+                                        const IdentifiedModel& after, const std::vector<SessionLog>& logs) {
+  const VectorXd of_before = plain_error(before, logs), of_after = plain_error(after, logs);
+  for (Index j = 0; j < of_after.size(); ++j) {
+    if (!is_worse(outcome.models.options.gate, of_before, of_after, j)) continue;
+    const auto rank = [&](const Finding& f) {
+      const int distance = f.id.body ? 1 : static_cast<Index>(f.id.joint) == j ? 0 : 2;
+      return std::pair(distance, f.score);
+    };
+    const auto first = std::min_element(outcome.found.begin(), outcome.found.end(),
+                                        [&](const Finding& a, const Finding& b) { return rank(a) < rank(b); });
+    return first == outcome.found.end() ? std::nullopt : std::optional(first->id);
+  }
+  return {};
+}
+
+void take_out(Outcome& outcome, const EffectId& gone, const std::vector<SessionLog>& logs) {
+  std::erase_if(outcome.found, [&](const Finding& f) { return f.id == gone; });
+  std::vector<EffectId> ids;
+  for (const Finding& f : outcome.found) ids.push_back(f.id);
+  take_back(outcome.models, ids, gone);
+  for (std::size_t i = 0; i < ids.size(); ++i) outcome.found[i].id = ids[i];
+  refit(outcome.models, logs, outcome.whitening, 3);
+  outcome.look_again(logs);
 }
 
 }  // namespace fxdyn::diagnosis

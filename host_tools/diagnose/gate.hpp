@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "host_tools/diagnose/explore.hpp"
@@ -25,6 +26,7 @@ struct HeldOut {
   Eigen::VectorXd leftover;  ///< structure that is left
   Eigen::VectorXd excess;    ///< .. beyond the share of it that the healthy session shows
   Eigen::VectorXd fitted_before, fitted_after, fitted_rows;  ///< of today's rows that fit, with a fit of all
+  Eigen::VectorXd plain_before, plain_after;    ///< of all joints in the whole band; empty: no joint is judged in it
   std::vector<Eigen::VectorXd> alone;           ///< by named group: what comes back when it alone is removed
   std::vector<std::vector<Stretch>> stretches;  ///< by joint
 };
@@ -62,9 +64,18 @@ bool is_worse(const GateOptions& options, const Eigen::VectorXd& before, const E
 /// Judges each fold by a fit of the others; time constants of drift are chosen by that, and names that do not hold are
 /// taken out of the outcome one by one: those that bring nothing; those at joints whose plain error on the validate
 /// logs is larger than that of `nominal` (rows near standstill, of which the search believes little, count there too),
-/// and those that spoil a joint at which nothing was found; and those not believed at joints that show no more
-/// structure than their background.
+/// or, where there are none, on train logs that judge one another, than without what was found; those that
+/// spoil a joint at which nothing was found; and those not believed at joints that show no more structure than their
+/// background.
 Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs,
           const std::vector<bool>& still);
+
+/// Where a model errs more than the one before at a joint, on the validate logs, by more than a name may raise it: the
+/// finding there with the least score, else one on the robot, else one at another joint. None: it does not, or nothing
+/// was found.
+std::optional<EffectId> harmful_finding(const Outcome& outcome, const IdentifiedModel& before,
+                                        const IdentifiedModel& after, const std::vector<SessionLog>& logs);
+/// Takes a finding out of the outcome and fits what is left again.
+void take_out(Outcome& outcome, const EffectId& gone, const std::vector<SessionLog>& logs);
 
 }  // namespace fxdyn::diagnosis

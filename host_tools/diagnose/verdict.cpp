@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "host_tools/diagnose/gap_errors.hpp"
 #include "host_tools/diagnose/where.hpp"
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
@@ -19,7 +20,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-bool is_validate(const ProcessedLog& log) { return log.role == Role::validate; }
 
 /// @param rated torque [N*m | N]
 std::vector<NamedParameter> parameters_of(const EffectFit& fit, const Joint& joint, double rated) {
@@ -38,50 +38,14 @@ std::vector<NamedParameter> parameters_of(const EffectFit& fit, const Joint& joi
   return out;
 }
 
-/// Filtered error of a joint over a log, full rate.
-VectorXd error_of(const ProcessedLog& log, const MatrixXd& torque, std::size_t joint) {
-  const auto j = static_cast<Index>(joint);
-  return log.filter_columns(log.tau.col(j) - torque.col(j)).col(0);
-}
-
 /// Makes the result of what was concluded.
 class ReportWriter {
  public:
   explicit ReportWriter(const Conclusion& conclusion)
       : conclusion_(conclusion),
         problem_(*conclusion.outcome.problem),
-        report_(conclusion.outcome.models.options.report) {
-    // Figures are on logs that decided nothing, where there are any.
-    for (const ProcessedLog& log : conclusion_.test) shown_.push_back(&log);
-    figures_on_ = "test logs";
-    if (shown_.empty()) {
-      figures_on_ = "validate logs, which also decided which names stay";
-      for (const ProcessedLog& log : conclusion_.now) {
-        if (is_validate(log)) shown_.push_back(&log);
-      }
-    }
-    blocks_only_ = shown_.empty();
-    if (blocks_only_) {
-      figures_on_ = gate_of(conclusion_.now);
-      for (const ProcessedLog& log : conclusion_.now) shown_.push_back(&log);
-    }
-    const bool judged_alone = std::any_of(conclusion_.now.begin(), conclusion_.now.end(), is_validate);
-    for (const ProcessedLog& log : conclusion_.now) {
-      if (!judged_alone || is_validate(log)) judges_.push_back(&log);
-    }
-    before_.resize(shown_.size());
-    after_.resize(shown_.size());
-    judged_.resize(judges_.size());
-    parallel_for(shown_.size() + judges_.size(), [&](std::size_t l) {
-      if (l >= shown_.size()) {
-        const std::size_t k = l - shown_.size();
-        judged_[k] = predict(conclusion_.model, *judges_[k]);
-        return;
-      }
-      before_[l] = predict(conclusion_.nominal, *shown_[l]);
-      after_[l] = predict(conclusion_.model, *shown_[l]);
-    });
-  }
+        report_(conclusion.outcome.models.options.report),
+        errors_(conclusion) {}
 
   DiagnosisResult all() {
     DiagnosisResult out;
@@ -110,33 +74,13 @@ class ReportWriter {
     out.not_identifiable = conclusion_.outcome.not_identifiable.back();
     out.next_experiment = next_;
     out.gate = gate_of(conclusion_.now);
-    out.figures_on = figures_on_;
+    out.figures_on = errors_.figures_on();
     out.baseline = problem_.has_baseline();
     out.notes = notes_;
     return out;
   }
 
  private:
-  /// Errors of what was fitted come out too small by the square root of this.
-  double judged_over_fitted(Index joint) const {
-    const HeldOut& held = conclusion_.gate.held;
-    return held.fitted_rows[joint] / std::max(held.rows[joint], 1.0) * held.after[joint] /
-           std::max(held.fitted_after[joint], 1e-300);
-  }
-
-  /// RMS error of a joint on the logs that judged the names.
-  double gate_error(std::size_t j) const {
-    double square = 0, count = 0;
-    for (std::size_t l = 0; l < judges_.size(); ++l) {
-      const ProcessedLog& log = *judges_[l];
-      const Index samples = log.last - log.first;
-      square += error_of(log, judged_[l], j).segment(log.first, samples).squaredNorm();
-      count += static_cast<double>(samples);
-    }
-    if (!is_validate(*judges_.front())) square *= judged_over_fitted(static_cast<Index>(j));
-    return std::sqrt(square / std::max(count, 1.0));
-  }
-
   const Joint& joint_of(std::size_t j) const { return conclusion_.model.robot.joints[j]; }
 
   void advise(const std::string& text) {
@@ -147,19 +91,21 @@ class ReportWriter {
   double model_share(std::size_t j, std::size_t e) const {
     IdentifiedModel less = conclusion_.model;
     less.joints[j].effects.erase(less.joints[j].effects.begin() + static_cast<std::ptrdiff_t>(e));
-    const MatrixXd without = predict(less, *shown_.front());
+    const MatrixXd& after = errors_.first_after();
+    const MatrixXd without = predict(less, errors_.first_shown());
     const auto k = static_cast<Index>(j);
-    return (after_.front() - without).col(k).norm() / std::max(after_.front().col(k).norm(), 1e-300);
+    return (after - without).col(k).norm() / std::max(after.col(k).norm(), 1e-300);
   }
 
   /// .. an effect on the robot, at the joint where it is largest.
   double body_share(std::size_t e) const {
     IdentifiedModel less = conclusion_.model;
     less.body.erase(less.body.begin() + static_cast<std::ptrdiff_t>(e));
-    const MatrixXd change = after_.front() - predict(less, *shown_.front());
+    const MatrixXd& after = errors_.first_after();
+    const MatrixXd change = after - predict(less, errors_.first_shown());
     double most = 0;
     for (Index k = 0; k < change.cols(); ++k)
-      most = std::max(most, change.col(k).norm() / std::max(after_.front().col(k).norm(), 1e-300));
+      most = std::max(most, change.col(k).norm() / std::max(after.col(k).norm(), 1e-300));
     return most;
   }
 
@@ -226,39 +172,6 @@ class ReportWriter {
     return out;
   }
 
-  /// RMS errors of a joint on the logs that are shown [N*m | N].
-  struct Figures {
-    double before = 0, after = 0;
-    double gate = 0;   ///< on the logs that judged
-    double floor = 0;  ///< of the noise
-  };
-
-  Figures figures(std::size_t j) const {
-    const auto k = static_cast<Index>(j);
-    const HeldOut& held = conclusion_.gate.held;
-    Figures out;
-    double before = 0, after = 0, count = 0;
-    for (std::size_t l = 0; l < shown_.size(); ++l) {
-      const ProcessedLog& log = *shown_[l];
-      const Index samples = log.last - log.first;
-      before += error_of(log, before_[l], j).segment(log.first, samples).squaredNorm();
-      after += error_of(log, after_[l], j).segment(log.first, samples).squaredNorm();
-      count += static_cast<double>(samples);
-    }
-    if (blocks_only_) {
-      // Errors of what was fitted, by the ratio of judged to fitted ones.
-      const double rows = held.fitted_rows[k] / std::max(held.rows[k], 1.0);
-      before *= rows * held.before[k] / std::max(held.fitted_before[k], 1e-300);
-      after *= judged_over_fitted(k);
-    }
-    out.before = std::sqrt(before / std::max(count, 1.0));
-    out.after = std::sqrt(after / std::max(count, 1.0));
-    // Of the logs that judged: what another motion shows on top is no noise.
-    out.gate = blocks_only_ ? out.after : gate_error(j);
-    out.floor = out.gate * std::sqrt(std::max(0.0, 1 - held.leftover[k] / std::max(held.after[k], 1e-300)));
-    return out;
-  }
-
   /// Effects that were found at a joint. @param open those that are undecided
   std::vector<NamedEffect> effects_of(std::size_t j, std::vector<std::vector<std::string>>& open) {
     std::vector<NamedEffect> out;
@@ -304,12 +217,12 @@ class ReportWriter {
     return out;
   }
 
-  void note_other_test_logs(std::size_t j, const Figures& figures) {
-    if (conclusion_.test.empty() || figures.after <= report_.much_larger * figures.gate) return;
+  void note_other_test_logs(std::size_t j, const GapFigures& figures) {
+    if (conclusion_.test.empty() || figures.after <= report_.much_larger * figures.gate_after) return;
     notes_.push_back(fmt::format(
         "{}: the error is {:.3g} {} on the test logs and {:.3g} on the logs that judged: another load, tool "
         "or motion that these did not have?",
-        joint_of(j).name, figures.after, joint_of(j).torque_unit(), figures.gate));
+        joint_of(j).name, figures.after, joint_of(j).torque_unit(), figures.gate_after));
   }
 
   void note_impacts(std::size_t j) {
@@ -322,12 +235,18 @@ class ReportWriter {
         impacts->t, impacts->log));
   }
 
-  void note_risen_error(std::size_t j, const Figures& figures) {
-    if (conclusion_.test.empty() || figures.after <= report_.risen * figures.before) return;
-    notes_.push_back(
-        fmt::format("{}: on the test logs the error rises from {:.3g} to {:.3g} {}: what was found does not carry "
-                    "over to their motion",
-                    joint_of(j).name, figures.before, figures.after, joint_of(j).torque_unit()));
+  /// Whether the test logs bear out what the logs that judged said. None: there are no test logs.
+  std::optional<bool> carries_over(const GapFigures& figures) const {
+    if (conclusion_.test.empty()) return {};
+    return figures.after <= report_.risen * figures.before;
+  }
+
+  void note_risen_error(std::size_t j, const GapFigures& figures) {
+    notes_.push_back(fmt::format(
+        "{0}: on the test logs the error rises from {1:.3g} to {2:.3g} {5}, on the logs that judged it goes from "
+        "{3:.3g} to {4:.3g}: what was found does not carry over to their motion",
+        joint_of(j).name, figures.before, figures.after, figures.gate_before, figures.gate_after,
+        joint_of(j).torque_unit()));
   }
 
   void note_doubtful_direction(std::size_t j) {
@@ -365,7 +284,7 @@ class ReportWriter {
 
   JointDiagnosis moving(std::size_t j) {
     const auto k = static_cast<Index>(j);
-    const Figures of = figures(j);
+    const GapFigures of = errors_(j);
     JointDiagnosis out{joint_of(j).name, joint_of(j).torque_unit(), j + 1};
     out.effects = effects_of(j, out.undecided);
     std::sort(out.effects.begin(), out.effects.end(),
@@ -387,7 +306,9 @@ class ReportWriter {
     note_other_test_logs(j, of);
     note_impacts(j);
     const bool changed = state.established || state.there || state.reached;
-    if (changed) note_risen_error(j, of);
+    // A finding elsewhere may reach this joint through the base parameters.
+    if (changed || of.after != of.before) out.carries_over = carries_over(of);
+    if (out.carries_over == false) note_risen_error(j, of);
     const bool left = out.verdict == Verdict::unexplained || out.verdict == Verdict::partly_explained;
     // What only bends leaves no gap in the torque, and noise alone has nothing to close.
     const bool of_torque = state.there || state.reached || (left && (state.structured || state.likely)) ||
@@ -407,7 +328,10 @@ class ReportWriter {
     }
     out.gap_before = of.before;
     out.gap_after = of.after;
-    out.noise_floor = std::min(of.floor, of.after);
+    out.gate_before = of.gate_before;
+    out.gate_after = of.gate_after;
+    // On other logs than those that judged, either model may show that there is less noise.
+    out.noise_floor = std::min({of.floor, of.before, of.after});
     if (of_torque) {
       out.closure = conclusion_.gate.closure[k];
       const Share share = left_of(conclusion_.gate.held, conclusion_.gate.gap[k], k);
@@ -473,19 +397,16 @@ class ReportWriter {
   const Conclusion& conclusion_;
   const Linearised& problem_;
   const ReportOptions& report_;
-  std::vector<const ProcessedLog*> shown_;
-  std::string figures_on_, next_;
+  const GapErrors errors_;
+  std::string next_;
   std::vector<std::string> notes_;
-  bool blocks_only_ = false;
-  std::vector<MatrixXd> before_, after_;
-  std::vector<const ProcessedLog*> judges_;  ///< what accepted the names: validate logs, or the train logs
-  std::vector<MatrixXd> judged_;             ///< .. and the model's torque on them
 };
 
 }  // namespace
 
 std::string gate_of(const std::vector<ProcessedLog>& now) {
-  if (std::any_of(now.begin(), now.end(), is_validate)) return "validate logs";
+  if (std::any_of(now.begin(), now.end(), [](const ProcessedLog& log) { return log.role == Role::validate; }))
+    return "validate logs";
   return fmt::format("{}, each judged by coefficients fitted to the others",
                      now.size() == 1 ? "blocks of the train log" : "train logs, whole or in parts");
 }

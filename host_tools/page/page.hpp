@@ -13,7 +13,7 @@ std::string escape(std::string_view text);
 
 struct Cell {
   std::string text;
-  const char* kind = "";  ///< CSS classes: n (number), bad, good
+  const char* kind = "";  ///< CSS classes: n (number), bad, amber, good
 };
 Cell number(double value, int digits = 4);
 Cell percent(double share);

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/identify/fit_figures.hpp"
+#include "host_tools/train/kept_effects.hpp"
 
 namespace fxdyn {
 namespace {
@@ -35,6 +37,24 @@ MetricsResult fit_metrics(const Project& project, const Fitter& fitter, const Fi
   out.stages = stages;
   out.fit = std::move(fit);
   return out;
+}
+
+void add_friction_errors(std::vector<GateErrors>& errors, Fitter fitter, const std::vector<StageErrors>& stages,
+                         const std::filesystem::path& nominal) {
+  if (fitter.has_validation()) {
+    const auto stage =
+        std::find_if(stages.begin(), stages.end(), [](const StageErrors& one) { return one.stage == "friction"; });
+    for (std::size_t j = 0; j < errors.size() && stage != stages.end(); ++j)
+      errors[j].friction = pooled_error(stage->logs, Role::validate, j).rmse;
+    return;
+  }
+  if (!std::filesystem::exists(nominal)) return;
+  const IdentifiedModel model = read_model(nominal);
+  const KeptEffects kept(model, fitter.logs());
+  fitter.set_designs(kept.design());
+  fitter.set_torque_lead(model.filter.torque_lead_s, kept.torque(model, fitter.logs()));
+  const std::vector<Judgement> held_out = fitter.held_out();
+  for (std::size_t j = 0; j < errors.size(); ++j) errors[j].friction = held_out[j].rmse;
 }
 
 std::string weak_note(const std::vector<WeakParameter>& weak, const Robot& robot) {

@@ -14,6 +14,7 @@
 #include "host_tools/export/export.hpp"
 #include "host_tools/identify/identify.hpp"
 #include "host_tools/pipeline/fit_metrics.hpp"
+#include "host_tools/pipeline/possible_model.hpp"
 #include "host_tools/pipeline/tables_export.hpp"
 #include "host_tools/pipeline/training.hpp"
 #include "host_tools/project/provenance.hpp"
@@ -138,10 +139,10 @@ std::function<StageErrors(const IdentifiedModel&, const std::string&)> Pipeline:
   return [this](const IdentifiedModel& model, const std::string& stage) { return stage_errors(model, stage); };
 }
 
-void Pipeline::write_possible_bodies(const Estimate& estimate) const {
-  if (!estimate.physical) return;
-  write_urdf(project_.urdf, directory_ / "identified.urdf", project_.robot, to_dh(project_.robot),
-             estimate.physical->inertia);
+void Pipeline::write_possible_bodies(const std::optional<PhysicalFit>& bodies) const {
+  if (!bodies) return;
+  write_urdf(project_.urdf, directory_ / "identified.urdf", project_.robot, to_dh(project_.robot), bodies->inertia,
+             share_comments(*bodies));
 }
 
 void Pipeline::identify() {
@@ -162,7 +163,7 @@ void Pipeline::identify() {
   progress_.step();
   progress_.done();
   const MetricsResult metrics = fit_metrics(project_, *fitter, estimate, data().notes, stages);
-  write_possible_bodies(estimate);
+  write_possible_bodies(estimate.physical);
   write_file(directory_ / "model.json", to_json(model).dump(1) + "\n");
   write_file(directory_ / "metrics.json", to_json(metrics).dump(1) + "\n");
   for (const std::string& note : data().notes) fmt::print(stderr, "note: {}\n", note);
@@ -179,7 +180,16 @@ void Pipeline::diagnose() {
     check_torque(log, project_.robot);
     baseline.push_back(process(std::move(log), data().filter));
   }
-  const Diagnosis diagnosis = fxdyn::diagnose(project_, data(), baseline, logs(Role::test), progress_);
+  std::optional<PhysicalFit> bodies;  // of the model that was finished last: the one with what was found
+  FinishModel finish;
+  if (project_.identify.physical) {
+    finish = [&](const IdentifiedModel& found, const std::vector<ProcessedLog>& made_from) {
+      PossibleModel possible = possible_model(project_, found, made_from);
+      bodies = std::move(possible.bodies);
+      return std::move(possible.model);
+    };
+  }
+  const Diagnosis diagnosis = fxdyn::diagnose(project_, data(), baseline, logs(Role::test), progress_, {}, finish);
   IdentifiedModel model = diagnosis.model;
   model.stage = "diagnosed";
   model.notes = data().notes;
@@ -200,6 +210,7 @@ void Pipeline::diagnose() {
                               .base_parameters = model.base.size(),
                               .notes = data().notes,
                               .stages = stages};
+  write_possible_bodies(bodies);
   write_file(directory_ / "nominal.json", to_json(nominal).dump(1) + "\n");
   write_file(directory_ / "metrics.json", to_json(metrics).dump(1) + "\n");
   write_file(directory_ / "diagnosis.json", to_json(report).dump(1) + "\n");
@@ -252,7 +263,9 @@ void Pipeline::train() {
   stages.push_back(training.trained);
   MetricsResult metrics = fit_metrics(project_, trainer.fitter(), training.estimate, data().notes, stages);
   metrics.training = trained_joints(training.outcomes, project_.robot);
-  write_possible_bodies(training.estimate);
+  metrics.gate_errors = training.gate_errors;
+  add_friction_errors(metrics.gate_errors, trainer.fitter(), stages, directory_ / "nominal.json");
+  write_possible_bodies(training.estimate.physical);
   write_file(directory_ / "metrics.json", to_json(metrics).dump(1) + "\n");
   write_file(directory_ / "model.json", to_json(training.model).dump(1) + "\n");
   write_information(training.stored, read_model(directory_ / "model.json"), directory_);

@@ -18,7 +18,7 @@
 
 namespace fxdyn {
 
-struct Estimate;
+struct PhysicalFit;
 struct Formats;
 struct GateData;
 
@@ -75,8 +75,8 @@ class Pipeline {
   std::function<StageErrors(const IdentifiedModel& model, const std::string& stage)> stage_errors();
   /// The stages before training that DIR/metrics.json holds.
   std::vector<StageErrors> diagnosed_stages() const;
-  /// DIR/identified.urdf, where the estimate has bodies.
-  void write_possible_bodies(const Estimate& estimate) const;
+  /// DIR/identified.urdf, where there are bodies.
+  void write_possible_bodies(const std::optional<PhysicalFit>& bodies) const;
 
   Project project_;
   std::filesystem::path directory_;

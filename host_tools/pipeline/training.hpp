@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,13 +21,17 @@ std::string unused_settings(const TrainSettings& settings);
 /// What training makes of a diagnosed model.
 struct Training {
   IdentifiedModel model;
-  Estimate estimate;  ///< of the new fit, whether the model is it or not
+  /// Of the new fit, whether the model is it or not; but the bodies are those of the model.
+  Estimate estimate;
   std::vector<TrainOutcome> outcomes;
   StoredInformation stored;
   StageErrors rigid, trained;
+  std::vector<GateErrors> gate_errors;  ///< without those of the friction stage
 };
 
-/// A BLS beside the effects that diagnosis found.
+/// A BLS beside the effects that diagnosis found. A joint has one in the end only where it lowers the joint's error on
+/// the data that judge; any other joint stays as diagnosis left it. So where some joints have none, the base
+/// parameters, which they share with the others, stay too, and a BLS is fitted beside them.
 class Trainer {
  public:
   /// Errors of a model on all logs, under a stage's name.
@@ -44,8 +49,27 @@ class Trainer {
   Fitter make_fitter();
   /// The kept effects, and the load that a BLS sees, follow the rigid body that is fitted beside them.
   void follow(const IdentifiedModel& model);
+  /// Everything together, with the BLS that the fitter has.
+  void fit_anew(Training& out);
+  /// Where the project wants a fit that diagnosis does not make: that one takes the diagnosed model's place.
+  void choose_base(Training& out);
   /// A baseline taught the diagnosed model what the train logs alone may not: where validation says so, it stays.
-  void keep_diagnosed_if_better(Training& training);
+  bool diagnosed_is_better(const StageErrors& refitted) const;
+  std::vector<bool> joints_with_bls() const;
+  /// Drops each BLS that does not lower the error of its joint.
+  void settle(Training& out);
+  /// The base model with the BLS of some joints, and these joints' coefficients fitted beside its base parameters.
+  void fit_beside(Training& out);
+  void take_base(Training& out);
+  /// What of the new fit every model says: notes, and what a link encoder shows.
+  void add_findings_of(const IdentifiedModel& refitted, IdentifiedModel& model) const;
+  /// Joints whose BLS does not lower their error, on what judges. @param beside fitted beside the base's parameters
+  std::vector<std::size_t> without_gain(Training& out, bool beside) const;
+  /// The fitter's structure without any BLS.
+  Fitter bare_fitter() const;
+  void drop(Training& out, const std::vector<std::size_t>& joints);
+  void finish(Training& out);
+  std::vector<GateErrors> gate_errors(const Training& out) const;
 
   const Project& project_;
   const TrainSettings& settings_;
@@ -55,6 +79,12 @@ class Trainer {
   Progress& progress_;
   KeptEffects kept_;
   Fitter fitter_;
+  IdentifiedModel base_;             ///< what a joint without a BLS has: the diagnosed model, or a fit after it
+  std::vector<JointFit> base_fits_;  ///< .. as far as the fitter has columns for it
+  bool base_is_diagnosed_ = true;
+  std::optional<PhysicalFit> base_bodies_;
+  StageErrors diagnosed_errors_, base_errors_;
+  std::vector<JointFit> fits_;  ///< of the model, where it is not the new fit
 };
 
 /// The same structure without effects and BLS, refitted: its errors are the stage `rigid`.

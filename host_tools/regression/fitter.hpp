@@ -106,6 +106,10 @@ class Fitter {
                                                     const std::vector<Eigen::Index>& sizes,
                                                     const std::vector<double>& ridges) const;
 
+  /// The same with base parameters that are known: each joint's own coefficients are fitted to the other blocks.
+  /// @param beta of the logs of all blocks: it flatters every design alike
+  std::vector<Judgement> held_out_beside(const Eigen::VectorXd& beta) const;
+
   /// Rigid-body torque in the logs [samples x joints], for inputs of a BLS that need it. Of a model that was identified
   /// before: where the fit ends elsewhere, once more with that.
   void set_structural(std::vector<Eigen::MatrixXd> torque);
@@ -138,6 +142,9 @@ class Fitter {
   /// Information of the train rows and the prior with the current weights, a BLS's ridge included: what a recursion
   /// over later logs starts from.
   SquareRootInformation information() const;
+  /// Each joint's own coefficients beside known base parameters, of the train rows.
+  /// @param bounded those of effects keep the catalogue's bounds
+  Solution estimate_beside(const Eigen::VectorXd& beta, bool bounded) const;
   /// x as beta and theta.
   Solution split(const Eigen::VectorXd& x) const { return split(offsets(), x); }
   /// Names of the unknowns: of base parameters, then "joint: effect, parameter".
@@ -177,6 +184,7 @@ class Fitter {
   NormalEquations assemble(const std::vector<std::size_t>& blocks, const std::vector<const MomentsByBlock*>& own,
                            const std::vector<const JointFit*>& design) const;
   Solution solve(const NormalEquations& equations) const;
+  Solution solve_beside(const NormalEquations& equations, const Eigen::VectorXd& beta, bool bounded) const;
   Solution split(const std::vector<Eigen::Index>& offset, const Eigen::VectorXd& x) const;
   /// d(torque) / d(log shape) of the joint's sign width and of its effects' widths and distances, rows x shapes.
   Eigen::MatrixXd shape_rows(std::size_t joint, const Eigen::VectorXd& theta) const;

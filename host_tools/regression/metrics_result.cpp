@@ -160,6 +160,35 @@ std::vector<TrainedJoint> training_of(const json& file) {
 
 }  // namespace
 
+namespace {
+
+json gate_errors_json(const std::vector<GateErrors>& joints) {
+  json out = json::array();
+  for (const GateErrors& joint : joints) {
+    out.push_back({{"joint", joint.joint},
+                   {"index", out.size() + 1},
+                   {"unit", joint.unit},
+                   {"friction", joint.friction ? json(*joint.friction) : json(nullptr)},
+                   {"diagnosed", joint.diagnosed},
+                   {"bls", joint.bls},
+                   {"exported", joint.exported}});
+  }
+  return out;
+}
+
+std::vector<GateErrors> gate_errors_of(const json& file) {
+  std::vector<GateErrors> out;
+  for (const json& joint : file) {
+    const json& friction = joint.at("friction");
+    out.push_back({joint.at("joint"), joint.at("unit"),
+                   friction.is_null() ? std::nullopt : std::optional(number(friction)), number(joint.at("diagnosed")),
+                   number(joint.at("bls")), joint.at("exported")});
+  }
+  return out;
+}
+
+}  // namespace
+
 PhysicalResult physical_result(const Robot& robot, const DhChain& chain, const PhysicalFit& fit) {
   const MassCheck check = mass_check(robot, chain, fit);
   PhysicalResult out{fit.constrained, fit.prior, {check.mass, check.mass_share}, check.urdf_mass, {}};
@@ -192,6 +221,7 @@ json to_json(const MetricsResult& result) {
   out["stages"] = to_json(result.stages);
   if (result.fit) add_fit(*result.fit, out);
   if (result.training) out["training"] = training_json(*result.training);
+  if (!result.gate_errors.empty()) out["gate_errors"] = gate_errors_json(result.gate_errors);
   return out;
 }
 
@@ -208,6 +238,7 @@ MetricsResult metrics_of(const json& file) {
   out.stages = stages_of(file);
   if (file.contains("method")) out.fit = fit_of(file);
   if (file.contains("training")) out.training = training_of(file.at("training"));
+  if (file.contains("gate_errors")) out.gate_errors = gate_errors_of(file.at("gate_errors"));
   return out;
 }
 

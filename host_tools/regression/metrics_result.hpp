@@ -82,6 +82,15 @@ struct TrainedJoint {
   std::optional<Choice> choice;
 };
 
+/// Errors of the stages at one joint on what judges [N*m | N]: RMS over the validate logs, else over train logs that
+/// judge one another, each by a fit of the others. And the stage that the joint has in model.json.
+struct GateErrors {
+  std::string joint, unit;
+  std::optional<double> friction;  ///< none: nominal.json is not there
+  double diagnosed = 0, bls = 0;
+  std::string exported;  ///< diagnosed or bls
+};
+
 /// Content of metrics.json.
 struct MetricsResult {
   std::vector<LogErrors> logs;
@@ -93,6 +102,7 @@ struct MetricsResult {
   std::vector<StageErrors> stages{};
   std::optional<FitResult> fit{};                       ///< none: the diagnosis made the model
   std::optional<std::vector<TrainedJoint>> training{};  ///< none: not trained
+  std::vector<GateErrors> gate_errors{};                ///< empty: not trained
 };
 nlohmann::json to_json(const MetricsResult& result);
 MetricsResult metrics_of(const nlohmann::json& file);

@@ -200,6 +200,18 @@ Solution physical_solution(Solution solution, const PhysicalFit& fit) {
   return solution;
 }
 
+std::vector<std::string> share_comments(const PhysicalFit& fit) {
+  std::vector<std::string> out;
+  for (const DataShare& share : fit.share) {
+    out.push_back(fmt::format(
+        "data_share mass {:.2f}, centre {:.2f} {:.2f} {:.2f}, first moment {:.2f} {:.2f} {:.2f}: from {:.2f} on the "
+        "logs determined it, 0 is the prior ({})",
+        share.mass, share.centre.x(), share.centre.y(), share.centre.z(), share.first_moment.x(),
+        share.first_moment.y(), share.first_moment.z(), determined_share, fit.prior));
+  }
+  return out;
+}
+
 MassCheck mass_check(const Robot& robot, const DhChain& chain, const PhysicalFit& fit) {
   MassCheck check;
   check.mass = fit.mass;

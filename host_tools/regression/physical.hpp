@@ -60,6 +60,9 @@ PhysicalFit fit_physical(const Fitter& fitter, const Robot& robot, Eigen::Matrix
 /// A fitter's solution with beta and theta of the physical fit in place of its own.
 Solution physical_solution(Solution solution, const PhysicalFit& fit);
 
+/// Of each link, for people who read only its inertia: how much of it the data decided.
+std::vector<std::string> share_comments(const PhysicalFit& fit);
+
 /// Masses and centres of the fit beside the URDF's, in the links' URDF frames.
 struct LinkMass {
   std::string link;

@@ -1,5 +1,8 @@
 #include <fmt/format.h>
 
+#include <optional>
+#include <utility>
+
 #include "host_tools/page/page.hpp"
 #include "host_tools/report/section.hpp"
 
@@ -62,13 +65,40 @@ std::string choice_table(const json& training) {
 
 }  // namespace
 
-std::string bls_section(const ReportInput&, const json& result) {
+namespace {
+
+/// Errors of a joint on the logs that are shown, before training and after it [N*m | N]; none: no such stages.
+std::optional<std::pair<double, double>> shown_errors(const std::vector<StageErrors>& stages, Role role,
+                                                      std::size_t joint) {
+  std::optional<double> before, after;
+  for (const StageErrors& stage : stages) {
+    if (stage.stage == "diagnosed") before = pooled_error(stage.logs, role, joint).rmse;
+    if (stage.stage == "bls") after = pooled_error(stage.logs, role, joint).rmse;
+  }
+  return before && after ? std::optional(std::pair(*before, *after)) : std::nullopt;
+}
+
+}  // namespace
+
+std::string bls_section(const ReportInput& input, const json& result) {
   std::string out = section("Broad Learning System");
   if (!result.contains("training")) return out + paragraph("Not trained.");
   const json& training = result.at("training");
   if (training.empty()) return out + paragraph("Switched off in the project file.");
-  Table table({{"joint"}, {"unit"}, {"held out without", "n"}, {"held out with", "n"}, {"change", "n"}, {"decision"}});
-  for (const json& joint : training) {
+  const std::string& role = input.results.role;
+  Table table({{"joint"},
+               {"unit"},
+               {"held out without", "n"},
+               {"held out with", "n"},
+               {"change", "n"},
+               {"decision"},
+               {role + " logs diagnosed", "n"},
+               {role + " logs as exported", "n"}});
+  const std::vector<StageErrors> stages = stages_of(result);
+  for (std::size_t j = 0; j < training.size(); ++j) {
+    const json& joint = training.at(j);
+    const auto shown = shown_errors(stages, role_of(role), j);
+    const bool disagree = shown && shown->second > shown->first;
     const double without = joint.at("held_out_without"), with = joint.at("held_out_with");
     const bool kept = joint.at("kept"), found = !joint.contains("choice") || !joint.at("choice").is_null();
     table.add({{text(joint.at("joint"))},
@@ -79,12 +109,19 @@ std::string bls_section(const ReportInput&, const json& result) {
                {kept    ? "kept"
                 : found ? "not kept"
                         : "none that fixed point could hold",
-                kept ? "good" : ""}});
+                !kept      ? ""
+                : disagree ? "amber"
+                           : "good"},
+               shown ? number(shown->first) : Cell{"-", "n"},
+               shown ? number(shown->second) : Cell{"-", "n"}});
   }
   return out + table.html() +
          paragraph(
              "Held-out RMSE on the gate data (see Data), not on the test logs. It is kept where that falls by at least "
-             "5 % (20 % where blocks of one log judge). Physical inputs are velocity and three presliding states; "
+             "5 % (20 % where blocks of one log judge), for the model as it is exported, too. Amber: kept, and worse "
+             "on the logs "
+             "beside it. Where it is not kept the joint stays as diagnosed. Physical inputs are velocity and three "
+             "presliding states; "
              "extended ones add load, angle and acceleration; the state has no memory.") +
          choice_table(training);
 }

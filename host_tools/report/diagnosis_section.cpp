@@ -21,6 +21,8 @@ constexpr const char* plus_minus = " ± ";
 
 std::string what_it_means(const json& diagnosis) {
   const std::string verdict = diagnosis.value("verdict", "");
+  if (verdict == "explained" && !words::not_borne_out(diagnosis).empty())
+    return "Explained on the data that judged: it confirms the effects below. The test logs do not bear them all out.";
   if (verdict == "explained")
     return "Explained: the model lacked physics; held-out data confirms the effects below, and what is left is noise.";
   if (verdict == "partly_explained")
@@ -35,6 +37,8 @@ std::string what_it_means(const json& diagnosis) {
 
 std::string figures(const json& diagnosis) {
   std::string out;
+  if (const std::string those = words::not_borne_out(diagnosis); !those.empty())
+    out += paragraph("The test logs disagree (amber): with what was found the error rises at " + those + ".");
   if (const std::string on = words::figures_on(diagnosis); !on.empty()) out += paragraph("Gaps on " + on + ".");
   const std::string hidden = words::list(diagnosis.value("not_identifiable", json::array()));
   if (!hidden.empty()) out += paragraph("Not identifiable on the robot as a whole: " + hidden + ".");
@@ -45,6 +49,7 @@ Cell n(const std::string& text) { return {text, "n"}; }
 
 const char* colour_of(const json& joint) {
   const std::string verdict = joint.value("verdict", "");
+  if (joint.value("carries_over", json()) == false) return verdict == "unexplained" ? "bad" : "amber";
   if (verdict == "nothing_missing" || verdict == "explained") return "good";
   return verdict == "unexplained" ? "bad" : "";
 }
@@ -55,6 +60,8 @@ std::string joint_table(const json& joints) {
                {"verdict"},
                {"gap before", "n"},
                {"gap after", "n"},
+               {"gate before", "n"},
+               {"gate after", "n"},
                {"noise floor", "n"},
                {"left unexplained", "n"},
                {"where the gap sits"},
@@ -69,6 +76,8 @@ std::string joint_table(const json& joints) {
                {words::verdict(joint), colour_of(joint)},
                n(words::figure(joint, "gap_before")),
                n(words::figure(joint, "gap_after")),
+               n(words::figure(joint, "gate_before")),
+               n(words::figure(joint, "gate_after")),
                n(words::figure(joint, "noise_floor")),
                n(words::left(joint)),
                {found_where},
@@ -77,7 +86,9 @@ std::string joint_table(const json& joints) {
   return table.html() +
          paragraph(
              "The gap is the RMS of measured minus model torque on held-out logs, both filtered alike, noise not "
-             "subtracted. Noise floor: what of the gap after has no structure, on the data that accepted the names: no "
+             "subtracted. Gate: the same on the data that accepted the names. Amber: it falls there, and rises on the "
+             "test "
+             "logs. Noise floor: what of the gap after has no structure, on the data that accepted the names: no "
              "model could explain it. Left unexplained: the share of the gap's power above the noise that no finding "
              "explains, with its 95 % interval. Not identifiable: effects that this motion could not show.");
 }

@@ -203,6 +203,8 @@ std::string diagnosis_table(const json& diagnosis) {
   const json joints = diagnosis.value("joints", json::array());
   std::string out = "\ndiagnosis: " + words::verdict(diagnosis) + "\n";
   if (const std::string on = words::figures_on(diagnosis); !on.empty()) out += "gaps on " + on + "\n";
+  if (const std::string those = words::not_borne_out(diagnosis); !those.empty())
+    out += indented("the test logs disagree, the error rises", those);
   out += clamped_lines(diagnosis) + joint_rows(joints) + robot_lines(diagnosis) + where_lines(joints) +
          undecided_lines(diagnosis) + alternative_lines(diagnosis) + hidden_lines(diagnosis) +
          evidence_lines(diagnosis);

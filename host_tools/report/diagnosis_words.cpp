@@ -94,6 +94,19 @@ std::string joint(const json& of, std::size_t place) {
   return name.empty() ? fmt::format("joint {}", of.value("index", place + 1)) : name;
 }
 
+std::string not_borne_out(const json& diagnosis) {
+  std::string out;
+  const json joints = diagnosis.value("joints", json::array());
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    const json& of = joints[j];
+    if (of.value("carries_over", json()) != false) continue;
+    out += fmt::format("{}{} ({} -> {} {}; {} -> {} on the gate data)", out.empty() ? "" : ", ", joint(of, j),
+                       figure(of, "gap_before"), figure(of, "gap_after"), of.value("unit", ""),
+                       figure(of, "gate_before"), figure(of, "gate_after"));
+  }
+  return out;
+}
+
 std::string figures_on(const json& diagnosis) {
   std::string out = text(diagnosis, "figures_on");
   if (const std::string gate = text(diagnosis, "gate"); !out.empty() && !gate.empty() && gate != out)

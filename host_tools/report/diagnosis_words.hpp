@@ -25,6 +25,9 @@ std::string effect(const nlohmann::json& of, const char* plus_minus);
 std::string parameters(const nlohmann::json& of, const char* plus_minus);
 /// Sentence on where a joint's gap sits, and the further regions; "" where there is none.
 std::string where(const nlohmann::json& joint);
+/// "joint_2 (4.45 -> 5.37 N*m; 1.6 -> 1.2 on the gate data)": joints at which the error rises on the test logs; "":
+/// none.
+std::string not_borne_out(const nlohmann::json& diagnosis);
 /// Items "a, b" of a list of names (or of objects with "effect").
 std::string list(const nlohmann::json& of);
 /// "joint_1", or "joint 1" where it has no name.

@@ -21,7 +21,8 @@ h3 { font-size: 1em; margin: 1.6em 0 .2em; } p { margin: .4em 0; max-width: 52em
 table { border-collapse: collapse; margin: .6em 0; font-size: .92em; }
 th, td { padding: .22em .7em; border-bottom: 1px solid #ddd; text-align: left; vertical-align: top; }
 th { background: #f4f4f4; } td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-td.bad { background: #fde5e0; } td.good { background: #e6f4e6; } .split { columns: 2; column-gap: 3em; }
+td.bad { background: #fde5e0; } td.good { background: #e6f4e6; }
+td.amber { background: #fdf0d0; } .split { columns: 2; column-gap: 3em; }
 .split tr { break-inside: avoid; } svg { width: 100%; height: auto; } .scroll { overflow-x: auto; }
 )";
 

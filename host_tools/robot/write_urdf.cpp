@@ -131,15 +131,24 @@ class Layout {
   std::string link_;
 };
 
-std::string inertial_text(const Inertial& body, const std::string& indent, const std::string& line_end) {
+/// Two hyphens would end a comment of XML before its time.
+std::string comment_text(std::string words) {
+  for (std::size_t at = 0; (at = words.find("--", at)) != std::string::npos;) words.replace(at, 2, "- -");
+  return "<!-- " + words + " -->";
+}
+
+/// @param comment empty: none
+std::string inertial_text(const Inertial& body, const std::string& comment, const std::string& indent,
+                          const std::string& line_end) {
   const Eigen::Vector3d& c = body.centre;
   const Eigen::Matrix3d& t = body.tensor;
   const std::string inside = line_end + indent + "  ";
   return fmt::format(
-      "<inertial>{0}<origin xyz=\"{1:.17g} {2:.17g} {3:.17g}\" rpy=\"0 0 0\"/>{0}<mass value=\"{4:.17g}\"/>"
+      "<inertial>{12}{0}<origin xyz=\"{1:.17g} {2:.17g} {3:.17g}\" rpy=\"0 0 0\"/>{0}<mass value=\"{4:.17g}\"/>"
       "{0}<inertia ixx=\"{5:.17g}\" ixy=\"{6:.17g}\" ixz=\"{7:.17g}\" iyy=\"{8:.17g}\" iyz=\"{9:.17g}\" "
       "izz=\"{10:.17g}\"/>{11}</inertial>",
-      inside, c.x(), c.y(), c.z(), body.mass, t(0, 0), t(0, 1), t(0, 2), t(1, 1), t(1, 2), t(2, 2), line_end + indent);
+      inside, c.x(), c.y(), c.z(), body.mass, t(0, 0), t(0, 1), t(0, 2), t(1, 1), t(1, 2), t(2, 2), line_end + indent,
+      comment.empty() ? "" : inside + comment_text(comment));
 }
 
 /// The blanks before `at` on its line; empty if something else stands there.
@@ -161,7 +170,8 @@ Span with_line(const std::string& text, Span span) {
 }  // namespace
 
 void write_urdf(const std::filesystem::path& original, const std::filesystem::path& out, const Robot& robot,
-                const DhChain& chain, const std::vector<LinkInertia<Real>>& inertia) {
+                const DhChain& chain, const std::vector<LinkInertia<Real>>& inertia,
+                const std::vector<std::string>& comments) {
   std::string text = read_file(original);
   const Layout layout(text);
   const std::string line_end = text.find("\r\n") == std::string::npos ? "\n" : "\r\n";
@@ -181,17 +191,19 @@ void write_urdf(const std::filesystem::path& original, const std::filesystem::pa
     }
     const LinkText& link = found->second;
     const Inertial body = to_inertial(inertia[i], chain.urdf_in_dh[i]);
+    const std::string comment = comments.empty() ? "" : comments.at(i);
     const std::string outer = indent_of(text, link.start_tag.from), indent = outer + "  ";
     if (!link.inertials.empty()) {
       const Span first = link.inertials.front();
-      edits.push_back({first, inertial_text(body, indent_of(text, first.from), line_end)});
+      edits.push_back({first, inertial_text(body, comment, indent_of(text, first.from), line_end)});
       remove(link.inertials, 1);
     } else if (link.end_tag.to > 0) {
       edits.push_back(
-          {{link.start_tag.to, link.start_tag.to}, line_end + indent + inertial_text(body, indent, line_end)});
+          {{link.start_tag.to, link.start_tag.to}, line_end + indent + inertial_text(body, comment, indent, line_end)});
     } else {
-      edits.push_back({{link.start_tag.to - 2, link.start_tag.to},
-                       ">" + line_end + indent + inertial_text(body, indent, line_end) + line_end + outer + "</link>"});
+      edits.push_back(
+          {{link.start_tag.to - 2, link.start_tag.to},
+           ">" + line_end + indent + inertial_text(body, comment, indent, line_end) + line_end + outer + "</link>"});
     }
     // whatever is fixed to it
     std::vector<std::string> carried{robot.joints[i].link};

@@ -64,7 +64,7 @@ project good $now h.csv baseline k.csv baseline
 for verb in diagnose train export report; do
   "$fxdyn" $verb good.toml --out verbs >verb.txt 2>&1 || fail "$verb: $(tail -1 verb.txt)"
 done
-for file in model.json nominal.json metrics.json diagnosis.json export.json tables.hpp tables.bin report.html; do
+for file in model.json nominal.json metrics.json diagnosis.json identified.urdf export.json tables.hpp tables.bin report.html; do
   cmp -s run/$file verbs/$file || fail "$file: run and the verbs differ"
 done
 # named FILE EFFECT COUNT: effects that are marked as named
@@ -77,6 +77,18 @@ named run/model.json ripple 2
 for effect in presliding delay payload; do named run/model.json $effect 1; done
 grep -q '"stage": "trained"' run/model.json || fail "not trained"
 for stage in rigid friction diagnosed bls; do grep -q "\"stage\": \"$stage\"" run/metrics.json || fail "no stage $stage"; done
+# A joint without a BLS is exported exactly as diagnosed; every moving link says what of it the logs decided.
+python3 - <<'PY' || fail "a joint without a BLS changed"
+import json
+metrics = json.load(open("run/metrics.json"))
+stages = {stage["stage"]: stage["logs"] for stage in metrics["stages"]}
+for j, joint in enumerate(metrics["training"]):
+    assert metrics["gate_errors"][j]["exported"] == ("bls" if joint["kept"] else "diagnosed")
+    for before, after in zip(stages["diagnosed"], stages["bls"]):
+        assert joint["kept"] or before["joints"][j]["rmse"] == after["joints"][j]["rmse"], joint["joint"]
+assert len(metrics["training"]) == 2
+PY
+[ "$(grep -c '<!-- data_share mass' run/identified.urdf)" -eq 2 ] || fail "identified.urdf without shares"
 "$fxdyn" predict --model run/model.json --log c.csv --numbers fixed --out prediction >/dev/null 2>&1 || fail "predict"
 worst=$(grep -o '"relative": [0-9.e-]*' prediction/metrics.json | awk '{ if ($2 > w) w = $2 } END { print w }')
 awk -v w="$worst" 'BEGIN { exit !(w < 0.02) }' || fail "fixed point: relative error $worst with the named effects"

@@ -42,6 +42,9 @@ DiagnosisResult example() {
   moving.gap_before = 1.9;
   moving.gap_after = 0.4;
   moving.noise_floor = 0.35;
+  moving.gate_before = 1.8;
+  moving.gate_after = 0.38;
+  moving.carries_over = false;
   moving.closure = 0.83;
   moving.left = GapLeft{0.2, 0.1, 0.3};
   moving.where = {"61 % of the gap is slow", {{"dq", -0.05, 0.05, 0.61, 0.08, ""}, {"t", 3, 3.1, {}, {}, "b.csv"}}};
@@ -81,6 +84,9 @@ TEST(DiagnosisResult, WhatIsNotKnownIsNullOrNotThere) {
   const json &moving = file.at("joints").at(0), &still = file.at("joints").at(1);
   EXPECT_EQ(moving.at("verdict"), "partly_explained");
   EXPECT_EQ(moving.at("left"), (json{{"share", 0.2}, {"low", 0.1}, {"high", 0.3}}));
+  EXPECT_EQ(moving.at("gate_after"), 0.38);
+  EXPECT_EQ(moving.at("carries_over"), false);
+  EXPECT_TRUE(still.at("carries_over").is_null());
   EXPECT_EQ(moving.at("undecided"), json::parse(R"([["presliding", "lugre"]])"));
   EXPECT_EQ(moving.at("effects").at(0).at("certainty"), "established");
   EXPECT_EQ(moving.at("effects").at(0).at("log10_odds_rival"), 3.7);
@@ -95,7 +101,7 @@ TEST(DiagnosisResult, WhatIsNotKnownIsNullOrNotThere) {
   EXPECT_EQ(regions.at(0).at("share_of_time"), 0.08);
   EXPECT_FALSE(regions.at(0).contains("log"));
   EXPECT_TRUE(regions.at(1).at("share_of_gap").is_null());
-  for (const char* key : {"gap_before", "gap_after", "noise_floor", "closure", "left"})
+  for (const char* key : {"gap_before", "gap_after", "gate_before", "gate_after", "noise_floor", "closure", "left"})
     EXPECT_TRUE(still.at(key).is_null());
   EXPECT_TRUE(still.at("lack_of_fit").at("state_p").is_null());
   EXPECT_EQ(still.at("effects"), json::array());
@@ -110,6 +116,14 @@ TEST(DiagnosisResult, AFigureThatIsNoNumberIsReadAsNone) {
   const DiagnosisResult read = diagnosis_of(json::parse(to_json(result).dump()));
   EXPECT_FALSE(read.joints[0].gap_after);
   EXPECT_TRUE(std::isnan(read.joints[0].effects[0].score));
+}
+
+TEST(DiagnosisResult, AFileWithoutTheGatesErrorsIsRead) {
+  json file = to_json(example());
+  for (const char* key : {"gate_before", "gate_after", "carries_over"}) file["joints"][0].erase(key);
+  const DiagnosisResult read = diagnosis_of(file);
+  EXPECT_FALSE(read.joints[0].gate_after || read.joints[0].carries_over);
+  EXPECT_EQ(read.joints[0].gap_after, 0.4);
 }
 
 TEST(DiagnosisResult, AnUnknownVerdictIsRefused) {

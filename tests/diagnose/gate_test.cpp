@@ -85,6 +85,7 @@ TEST_F(NamesAtTheGate, OnlyWhatBringsSomethingStays) {
   EXPECT_LT(joint.at("left").at("share"), 0.1);
   EXPECT_LE(joint.at("left").at("low"), joint.at("left").at("share"));
   EXPECT_GE(joint.at("left").at("high"), joint.at("left").at("share"));
+  EXPECT_TRUE(joint.at("carries_over").is_null());  // no test logs
   EXPECT_LT(joint.at("gap_after"), 0.3 * joint.at("gap_before").get<double>());
   EXPECT_EQ(report.at("joints").at(2).at("verdict"), "nothing_missing");
 }
@@ -99,6 +100,66 @@ TEST_F(NamesAtTheGate, NothingIsBelievedThatClosesTooLittle) {
   const Gate gate = pass(outcome_, nominal_, logs_, still_);
   ASSERT_EQ(gate.groups.size(), 1U);
   EXPECT_FALSE(gate.accepted[1]);
+}
+
+TEST_F(NamesAtTheGate, ANameThatTheTestLogsDoNotBearOutIsToldWithBothErrors) {
+  const Gate gate = pass(outcome_, nominal_, logs_, still_);
+  weigh_evidence(outcome_, gate);
+  const auto joint = [&](double ripple) {
+    IdentifiedModel robot = nominal_;
+    robot.joints[1].effects.push_back(test::effect("ripple", {14}, {ripple, 0.4 * ripple}));
+    const std::vector<ProcessedLog> test{test::small_session_log(robot, Role::test, 3).log};
+    const std::vector<std::optional<Impacts>> no_impacts(6);
+    const Deflections no_deflections;
+    return to_json(verdicts(
+        {nominal_, outcome_.models.current, outcome_, gate, {}, no_deflections, no_impacts, still_, processed_, test}));
+  };
+  const json other = joint(-0.5), same = joint(0.5);
+  const json &shows = other.at("joints").at(1), &bears_out = same.at("joints").at(1);
+  EXPECT_EQ(shows.at("carries_over"), false);
+  EXPECT_EQ(bears_out.at("carries_over"), true);
+  EXPECT_EQ(other.at("joints").at(2).at("carries_over"), true);
+  // Test logs change no verdict.
+  EXPECT_EQ(shows.at("verdict"), "explained");
+  EXPECT_GT(shows.at("gap_after"), 1.5 * shows.at("gap_before").get<double>());
+  EXPECT_LT(shows.at("gate_after"), 0.5 * shows.at("gate_before").get<double>());
+  EXPECT_EQ(shows.at("gate_after"), bears_out.at("gate_after"));
+  EXPECT_LE(shows.at("noise_floor"), shows.at("gap_before"));
+  EXPECT_NE(other.at("notes").dump().find("on the logs that judged it goes from"), std::string::npos)
+      << other.at("notes");
+}
+
+TEST_F(NamesAtTheGate, WhatRaisesAJointsErrorGoesEvenIfItPassedBefore) {
+  EXPECT_FALSE(harmful_finding(outcome_, nominal_, outcome_.models.current, logs_));
+  IdentifiedModel worse = nominal_;
+  worse.joints[1].effects.push_back(test::effect("ripple", {14}, {-0.5, -0.2}));
+  const std::optional<EffectId> gone = harmful_finding(outcome_, nominal_, worse, logs_);
+  ASSERT_TRUE(gone);
+  EXPECT_EQ(gone->joint, 1U);  // though the spring at joint 3 has less evidence
+  take_out(outcome_, *gone, logs_);
+  ASSERT_EQ(outcome_.found.size(), 1U);
+  EXPECT_EQ(outcome_.found[0].id.joint, 2U);
+  EXPECT_EQ(outcome_.models.current.joints[1].find("ripple"), nullptr);
+}
+
+/// The same, of two train logs that judge one another.
+class NamesWithoutValidation : public NamesAtTheGate {
+ protected:
+  NamesWithoutValidation() {
+    logs_[1].fits = true;
+    logs_[1].log.role = Role::train;
+    outcome_.look_again(logs_);
+  }
+};
+
+TEST_F(NamesWithoutValidation, StayWhereTheyLowerTheError) {
+  EXPECT_TRUE(plain_error(nominal_, logs_).size() == 0);
+  EXPECT_EQ(pass(outcome_, nominal_, logs_, still_).groups.size(), 1U);
+}
+
+TEST_F(NamesWithoutValidation, GoWhereTheyRaiseItMoreThanTheyMay) {
+  outcome_.models.options.gate.worse = 0;  // no error is that low
+  EXPECT_TRUE(pass(outcome_, nominal_, logs_, still_).groups.empty());
 }
 
 /// A large ripple and, beside it at the same joint, one with half a percent of its power.

@@ -2,9 +2,12 @@
 
 #include "host_tools/pipeline/training.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "tests/support/small_project.hpp"
 
@@ -58,7 +61,7 @@ TEST(Training, ABetterFitTakesTheModelsPlace) {
   EXPECT_NEAR(viscous_of(training.model), 1.5, 0.01);
   EXPECT_EQ(training.model.stage, "trained");
   EXPECT_TRUE(training.outcomes.empty());
-  EXPECT_EQ(work.asked, (std::vector<std::string>{"rigid", "bls", "bls"}));
+  EXPECT_EQ(work.asked, (std::vector<std::string>{"rigid", "diagnosed", "bls"}));
   EXPECT_EQ(work.effects, (std::vector<std::size_t>{0, 2, 2}));
   EXPECT_LT(validation_error(training.trained), validation_error(training.rigid));
   // Where an update goes on: at this model.
@@ -103,6 +106,85 @@ TEST(Training, ABlsLearnsWhatNoEffectExplains) {
   EXPECT_EQ(joint.held_out_with, training.outcomes[0].error_with);
   EXPECT_TRUE(joint.kept);
   EXPECT_EQ(joint.choice->nodes, training.outcomes[0].shape.nodes);
+}
+
+/// Two joints with friction, of which only the first one's has a minimum that the diagnosed model does not know.
+IdentifiedModel one_unknown() {
+  IdentifiedModel plant = test::model_of(test::pendulum(2), friction());
+  plant.joints[0].effects.push_back(test::effect_fit("stribeck", {0.3}, {3}));
+  return plant;
+}
+
+TEST(Training, AJointThatKeepsNoBlsStaysAsItWas) {
+  const IdentifiedModel plant = one_unknown();
+  Work work(plant, test::train_and_validate(plant, 0.01), friction());
+  work.project.train.enabled = true;
+  work.project.train.nodes = 8;
+  const Training training = work.run();
+  ASSERT_TRUE(training.outcomes[0].kept);
+  ASSERT_FALSE(training.outcomes[1].kept);
+  const ProcessedLog& validate = work.data.logs[1];
+  const Eigen::MatrixXd before = predict(work.diagnosed, validate), after = predict(training.model, validate);
+  EXPECT_TRUE(before.col(1) == after.col(1));
+  EXPECT_GT((before.col(0) - after.col(0)).norm(), 0.03 * before.col(0).norm());
+  const auto &known = training.gate_errors[1], &learned = training.gate_errors[0];
+  EXPECT_EQ(known.exported, "diagnosed");
+  EXPECT_EQ(known.bls, known.diagnosed);
+  EXPECT_EQ(learned.exported, "bls");
+  EXPECT_LT(learned.bls, 0.5 * learned.diagnosed);
+  // What is told is of the model as it is exported.
+  EXPECT_EQ(learned.bls, pooled_error(training.trained.logs, Role::validate, 0).rmse);
+  EXPECT_EQ(learned.bls, judge(validate, after)[0].rmse);
+  EXPECT_EQ(static_cast<std::size_t>(training.stored.information.solve().size()), training.stored.unknowns.size());
+}
+
+TEST(Training, ABlsIsNotKeptThatIsBetterThanItsOwnFitAloneAndWorseThanTheDiagnosedModel) {
+  // The train log is of a warm robot; a baseline taught the diagnosed model what holds on the validate log.
+  std::vector<EffectFit> effects = friction();
+  effects.push_back(test::effect_fit("stribeck", {0.3}, {2.5}));
+  const IdentifiedModel plant = test::model_of(test::pendulum(), effects);
+  std::vector<EffectFit> warm = effects;
+  warm[0].linear[0] = 2.5;
+  std::vector<Log> logs = test::train_and_validate(plant, 0.01);
+  logs[0] = test::exact_log(test::model_of(test::pendulum(), warm), Role::train, 1);
+  Work work(plant, std::move(logs), friction());
+  work.diagnosed = Work(plant, test::train_and_validate(plant, 0.01), friction()).diagnosed;
+  work.project.train.enabled = true;
+  work.project.train.nodes = 8;
+  const Training training = work.run();
+  const TrainOutcome& outcome = training.outcomes[0];
+  ASSERT_TRUE(outcome.bls);
+  EXPECT_FALSE(outcome.kept);
+  EXPECT_GT(outcome.error_with, outcome.error_without);
+  EXPECT_FALSE(training.model.joints[0].bls);
+  EXPECT_TRUE(predict(training.model, work.data.logs[1]) == predict(work.diagnosed, work.data.logs[1]));
+  EXPECT_EQ(training.gate_errors[0].exported, "diagnosed");
+  const std::string notes = fmt::format("{}", fmt::join(training.model.notes, "; "));
+  EXPECT_NE(notes.find("no BLS on joint_1"), std::string::npos) << notes;
+}
+
+TEST(Training, TestLogsChooseNothing) {
+  const IdentifiedModel plant = one_unknown();
+  IdentifiedModel models[2];
+  for (const bool loaded : {false, true}) {
+    std::vector<Log> logs = test::train_and_validate(plant, 0.01);
+    Work work(plant, std::move(logs), friction());
+    work.project.train.enabled = true;
+    work.project.train.nodes = 8;
+    // Errors on a test log are asked for and shown, whatever they are.
+    const auto of_gate = work.errors();
+    const Trainer::ErrorsOf with_test = [&](const IdentifiedModel& model, const std::string& stage) {
+      StageErrors out = of_gate(model, stage);
+      out.logs.push_back(out.logs.back());
+      out.logs.back().role = Role::test;
+      for (auto& joint : out.logs.back().joints) joint.metrics.rmse = loaded && stage == "bls" ? 1e3 : 1e-3;
+      return out;
+    };
+    Progress progress;
+    ResumeFile none;
+    models[loaded] = Trainer(work.project, work.data, work.diagnosed, with_test, progress).run(none).model;
+  }
+  EXPECT_EQ(to_json(models[0]), to_json(models[1]));
 }
 
 TEST(Training, RigidErrorsAreOfTheBodiesAlone) {

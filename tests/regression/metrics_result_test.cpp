@@ -40,6 +40,7 @@ MetricsResult example() {
                     .stages = {{"friction", {errors(Role::train)}}, {"bls", {errors(Role::test)}}},
                     .fit = fit};
   out.training = {{"joint_1", "N*m", 0.5, 0.4, true, 360, choice}, {"joint_2", "N", 0.5, 0.5, false, 10, {}}};
+  out.gate_errors = {{"joint_1", "N*m", 0.9, 0.5, 0.4, "bls"}, {"joint_2", "N", {}, 0.5, 0.5, "diagnosed"}};
   return out;
 }
 
@@ -58,6 +59,9 @@ TEST(MetricsResult, ComesBackFromItsFile) {
   EXPECT_EQ(read.fit->recursion->estimates[1][2], 3.5);
   EXPECT_EQ(read.training->at(0).choice->generations, 12);
   EXPECT_FALSE(read.training->at(1).choice);
+  EXPECT_EQ(read.gate_errors[0].friction, 0.9);
+  EXPECT_EQ(read.gate_errors[1].exported, "diagnosed");
+  EXPECT_TRUE(file.at("gate_errors").at(1).at("friction").is_null());
 }
 
 TEST(MetricsResult, SaysWhichParametersTheDataDetermines) {
@@ -71,8 +75,9 @@ TEST(MetricsResult, ADiagnosisHasNoFitAndAPredictionHasLogsAlone) {
   MetricsResult diagnosed = example();
   diagnosed.fit.reset();
   diagnosed.training.reset();
+  diagnosed.gate_errors.clear();
   const json file = to_json(diagnosed);
-  EXPECT_FALSE(file.contains("method") || file.contains("training"));
+  EXPECT_FALSE(file.contains("method") || file.contains("training") || file.contains("gate_errors"));
   EXPECT_EQ(to_json(metrics_of(file)), file);
   const json predicted = to_json(MetricsResult{.logs = {errors(Role::test)}, .numbers = "fixed"});
   EXPECT_EQ(predicted.size(), 3U);

@@ -11,6 +11,7 @@
 
 #include "host_tools/page/comparison_plots.hpp"
 #include "host_tools/support/files.hpp"
+#include "tests/diagnose/example.hpp"
 #include "tests/diagnose/small_log.hpp"
 #include "tests/support/files.hpp"
 
@@ -78,6 +79,103 @@ TEST(ModelSections, ShowBaseParametersAndEffects) {
              {"<h2>Base parameters</h2>", "hx3", "-1.5", "0.75", "50 %", "kg*m", "scale with torque_gain"});
   expect_all(drawn("effects", nullptr, nowhere, model),
              {"<h2>Effects</h2>", "viscous", "coefficient = 2.25 N*m*s/rad"});
+}
+
+/// metrics.json of two joints: their errors in three stages, on the validate log and on the test log.
+json metrics(const std::vector<std::array<double, 2>>& validate, const std::vector<std::array<double, 2>>& shown) {
+  json out{{"logs", json::array()}, {"stages", json::array()}};
+  const std::vector<std::string> names{"friction", "diagnosed", "bls"};
+  for (std::size_t s = 0; s < names.size(); ++s) {
+    json logs = json::array();
+    for (const auto& [role, errors] : {std::pair{"validate", validate[s]}, std::pair{"test", shown[s]}}) {
+      json joints = json::array();
+      for (const double rmse : errors) {
+        joints.push_back({{"joint", "j"},
+                          {"unit", "N*m"},
+                          {"rmse", rmse},
+                          {"relative", 0.1},
+                          {"rmse_raw", rmse},
+                          {"noise_floor", 0.1},
+                          {"bias", 0}});
+      }
+      logs.push_back({{"file", "a.csv"}, {"role", role}, {"from_s", 0}, {"to_s", 1}, {"joints", joints}});
+    }
+    out["stages"].push_back({{"stage", names[s]}, {"logs", logs}});
+    out["logs"] = logs;
+  }
+  const std::vector<std::string> exported{"bls", "diagnosed"};
+  for (std::size_t j = 0; j < 2; ++j) {
+    out["gate_errors"].push_back({{"joint", "j"},
+                                  {"friction", validate[0][j]},
+                                  {"diagnosed", validate[1][j]},
+                                  {"bls", validate[2][j]},
+                                  {"exported", exported[j]}});
+  }
+  return out;
+}
+
+/// A section of two joints, its results on test logs.
+std::string section_page(std::string_view name, const json& metrics) {
+  IdentifiedModel model = test::plant_of(read_urdf(test::puma560));
+  model.joints.resize(2);
+  model.robot.joints.resize(2);
+  model.inertia.resize(2);
+  Results results;
+  results.files["metrics"] = metrics;
+  results.role = "test";
+  const auto sections = report_sections();
+  const auto section = std::find_if(sections.begin(), sections.end(), [&](const auto& s) { return s.name == name; });
+  const std::vector<ProcessedLog> logs;
+  const auto directory = test::folder();
+  return draw_sections({model, to_json(model), logs, results, directory}, {&*section, 1});
+}
+
+TEST(ErrorSection, TheExportedStageIsGreenWhereItIsTheBest) {
+  const std::string page = section_page(
+      "error", metrics({{{2.5, 3.5}, {0.75, 1.25}, {0.5, 1.25}}}, {{{2.6, 3.6}, {0.85, 1.35}, {0.55, 1.35}}}));
+  expect_all(page, {"<td class=\"\">+ BLS: exported</td><td class=\"n\">0.5</td><td class=\"n good\">0.55</td>",
+                    "<td class=\"\">+ diagnosed: exported</td><td class=\"n\">1.25</td><td class=\"n good\">1.35</td>",
+                    "<td class=\"\">+ BLS</td><td class=\"n\">1.25</td><td class=\"n\">1.35</td>"});
+  EXPECT_EQ(page.find("amber\""), std::string::npos);
+}
+
+TEST(ErrorSection, ItIsAmberWhereTheTestLogsOrTheGateSayOtherwise) {
+  // On the test logs joint 1 was better before it got a BLS; on the gate joint 2 was better without any effect.
+  const std::string page = section_page(
+      "error", metrics({{{2.5, 1.15}, {0.75, 1.25}, {0.5, 1.25}}}, {{{2.6, 3.6}, {0.85, 1.35}, {0.95, 1.35}}}));
+  expect_all(page,
+             {"<td class=\"\">+ BLS: exported</td><td class=\"n\">0.5</td><td class=\"n amber\">0.95</td>",
+              "<td class=\"\">+ diagnosed: exported</td><td class=\"n\">1.25</td><td class=\"n amber\">1.35</td>"});
+  EXPECT_EQ(page.find("n good"), std::string::npos);
+}
+
+TEST(BlsSection, ABlsThatTheTestLogsDoNotLikeIsKeptInAmber) {
+  json result = metrics({{{2.5, 3.5}, {0.75, 1.25}, {0.5, 1.05}}}, {{{2.6, 3.6}, {0.85, 1.35}, {0.95, 1.15}}});
+  for (const double with : {0.5, 1.05}) {
+    result["training"].push_back(
+        {{"joint", "j"}, {"unit", "N*m"}, {"held_out_without", 1.5 * with}, {"held_out_with", with}, {"kept", true}});
+  }
+  const std::string page = section_page("bls", result);
+  expect_all(page, {"<td class=\"amber\">kept</td><td class=\"n\">0.85</td><td class=\"n\">0.95</td>",
+                    "<td class=\"good\">kept</td><td class=\"n\">1.35</td><td class=\"n\">1.15</td>"});
+}
+
+TEST(DiagnosisSection, AJointThatTheTestLogsDoNotBearOutIsAmberWithBothFigures) {
+  json diagnosis = test::diagnosis();
+  json& shoulder = diagnosis["joints"][0];
+  shoulder["gap_before"] = 9.47;
+  shoulder["gap_after"] = 23.4;
+  shoulder["gate_before"] = 21.5;
+  shoulder["gate_after"] = 18.5;
+  shoulder["carries_over"] = false;
+  diagnosis["verdict"] = "explained";
+  const std::string page = drawn("diagnosis", diagnosis);
+  expect_all(page, {"<td class=\"amber\">explained</td>", "The test logs disagree (amber)",
+                    "shoulder (9.47 -&gt; 23.4 N*m; 21.5 -&gt; 18.5 on the gate data)",
+                    "<td class=\"n\">21.5</td><td class=\"n\">18.5</td>"});
+  EXPECT_EQ(page.find("what is left is noise"), std::string::npos);
+  shoulder["carries_over"] = true;
+  expect_all(drawn("diagnosis", diagnosis), {"<td class=\"good\">explained</td>", "what is left is noise"});
 }
 
 TEST(TorqueSection, DrawsEveryJointOfEveryLog) {

@@ -23,12 +23,12 @@ std::vector<LinkInertia<Real>> bodies(const Robot& robot, const DhChain& chain, 
 }
 
 /// Writes new bodies, reads them back and compares the torques.
-std::string expect_reproduced(const fs::path& original) {
+std::string expect_reproduced(const fs::path& original, const std::vector<std::string>& comments = {}) {
   Robot robot = read_urdf(original);
   const DhChain chain = to_dh(robot);
   const auto inertia = bodies(robot, chain, 3);
   const fs::path out = test::folder() / "written.urdf";
-  write_urdf(original, out, robot, chain, inertia);
+  write_urdf(original, out, robot, chain, inertia, comments);
   const Robot back = read_urdf(out);
   EXPECT_EQ(back.size(), robot.size());
   for (std::size_t i = 0; i < robot.size(); ++i) {
@@ -87,6 +87,18 @@ TEST(WriteUrdf, ReplacesInsertsAndMergesAndLeavesTheRestAlone) {
   // Once written, only numbers change: writing the same bodies again gives the same bytes.
   const fs::path first = test::write("first.urdf", text);
   EXPECT_EQ(expect_reproduced(first), text);
+}
+
+TEST(WriteUrdf, AnInertialHasItsLinksComment) {
+  const fs::path file = test::write("commented.urdf", awkward);
+  const std::string text = expect_reproduced(file, {"data_share mass 0.03", "first --- then"});
+  EXPECT_NE(text.find("<inertial>\n      <!-- data_share mass 0.03 -->\n      <origin"), std::string::npos) << text;
+  // Two hyphens end a comment for some readers and are an error for others.
+  EXPECT_NE(text.find("<!-- first - - - then -->"), std::string::npos) << text;
+  // The next time they take the place of these.
+  const fs::path first = test::write("commented_first.urdf", text);
+  EXPECT_EQ(expect_reproduced(first, {"data_share mass 0.03", "first --- then"}), text);
+  EXPECT_EQ(expect_reproduced(first), expect_reproduced(file));
 }
 
 TEST(WriteUrdf, KeepsLineEndings) {
