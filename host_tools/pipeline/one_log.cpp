@@ -160,8 +160,11 @@ std::string identify_torque_gains(const fs::path& model_file, const fs::path& un
                                  unloaded.string(), loaded.string()));
   }
   const Log without = read_log_for(model, unloaded, {}, {}), with = read_log_for(model, loaded, {}, {});
+  ProcessSettings settings;
+  const auto seconds = [](const Log& log) { return log.step_s * static_cast<double>(log.samples()); };
+  settings.shortest_interval_s = (seconds(without) + seconds(with)) / GateOptions{}.most_rows;
   const std::vector<JointGain> gains =
-      identify_gains(model, load, process(without, model.filter), process(with, model.filter));
+      identify_gains(model, load, process(without, model.filter, settings), process(with, model.filter, settings));
   const GainResult result = gain_result(gains, load, model.robot, gain);
   const std::string unknown = unknown_gains(result);
   write_file(directory / "payload.json", to_json(result).dump(1) + "\n");
