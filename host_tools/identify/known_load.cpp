@@ -168,10 +168,15 @@ MatrixXd velocities(const ProcessedLog& log, const std::vector<bool>& rest) {
   return out;
 }
 
-/// Mean square difference of motions, b's rows being `later` ones: of some thousand rows, as many lags are tried.
+/// Rows that a comparison takes, so that many lags can be tried.
+constexpr Index rows_enough = 4000;
+/// Mean square difference of velocities that are shares of their RMS; two that have nothing in common have 2.
+constexpr double unlike = 1;
+
+/// Mean square difference of motions, b's rows being `later` ones.
 double difference(const MatrixXd& a, const MatrixXd& b, Index later) {
   const Index from_a = std::max<Index>(0, -later), from_b = std::max<Index>(0, later),
-              count = std::min(a.rows() - from_a, b.rows() - from_b), stride = 1 + count / 4000;
+              count = std::min(a.rows() - from_a, b.rows() - from_b), stride = 1 + count / rows_enough;
   double sum = 0;
   Index rows = 0;
   for (Index k = 0; k < count; k += stride, ++rows) sum += (a.row(from_a + k) - b.row(from_b + k)).squaredNorm();
@@ -185,7 +190,7 @@ double period_of(const MatrixXd& velocity, double same) {
   double least = same;
   for (Index lag = 1; lag <= velocity.rows() / 2; ++lag) {
     const double square = difference(velocity, velocity, lag);
-    away = away || square > 1;  // of two motions that have nothing to do with each other it is 2
+    away = away || square > unlike;
     if (!away) continue;
     if (square < least) {
       least = square;

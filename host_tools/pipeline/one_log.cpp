@@ -95,17 +95,15 @@ std::string unknown_gains(const GainResult& result) {
 
 std::string gain_table(const GainResult& result, const Robot& robot) {
   const std::size_t width = widest_name(robot);
-  std::string out = fmt::format("known load on {}: {:g} kg at {:g} {:g} {:g} m in its URDF frame\n  {:<{}}{:<26}{}\n",
+  std::string out = fmt::format("known load on {}: {:g} kg at {:g} {:g} {:g} m in its URDF frame\n  {:<{}}{:<42}{}\n",
                                 result.link, result.mass, result.com[0], result.com[1], result.com[2], "joint", width,
                                 "its torque_gain times", "torque of the load (RMS)");
   for (const GainResult::Joint& joint : result.joints) {
-    out += fmt::format(
-        "  {:<{}}{:<26}{:.3g} {}{}\n", joint.name, width,
-        joint.felt ? with_deviation(joint.factor, joint.std) : "did not feel the load", joint.load_rms, joint.unit,
-        joint.felt ? ""
-        : joint.std == 0
-            ? ": its gain stays unknown"
-            : fmt::format(": its gain stays unknown (to {:.2g} %)", 100 * joint.std / std::fabs(joint.factor)));
+    const std::string factor = joint.felt       ? with_deviation(joint.factor, joint.std)
+                               : joint.std == 0 ? "did not feel the load"
+                                                : fmt::format("did not feel the load enough (+- {:.2g} %)",
+                                                              100 * joint.std / std::fabs(joint.factor));
+    out += fmt::format("  {:<{}}{:<42}{:.3g} {}\n", joint.name, width, factor, joint.load_rms, joint.unit);
   }
   const std::string unknown = unknown_gains(result);
   out += fmt::format("for [signals] of the project{}:\n{}\n", unknown.empty() ? "" : ", as before for " + unknown,
@@ -160,8 +158,11 @@ std::string identify_torque_gains(const fs::path& model_file, const fs::path& un
                                  unloaded.string(), loaded.string()));
   }
   const Log without = read_log_for(model, unloaded, {}, {}), with = read_log_for(model, loaded, {}, {});
+  ProcessSettings settings;
+  const auto seconds = [](const Log& log) { return log.step_s * static_cast<double>(log.samples()); };
+  settings.shortest_interval_s = (seconds(without) + seconds(with)) / GateOptions{}.most_rows;
   const std::vector<JointGain> gains =
-      identify_gains(model, load, process(without, model.filter), process(with, model.filter));
+      identify_gains(model, load, process(without, model.filter, settings), process(with, model.filter, settings));
   const GainResult result = gain_result(gains, load, model.robot, gain);
   const std::string unknown = unknown_gains(result);
   write_file(directory / "payload.json", to_json(result).dump(1) + "\n");

@@ -153,6 +153,7 @@ TEST(KnownLoad, GivesHiddenGainsToThreePercentOrSaysThatTheyAreUnknown) {
   Random random(5);
   int felt = 0, unknown = 0;
   double worst = 0;
+  Eigen::VectorXi by_joint = Eigen::VectorXi::Zero(6);
   for (std::uint64_t robot = 0; robot < 5; ++robot) {
     Plant plant;
     for (double& gain : plant.gain) gain = random.uniform(0.5, 1.5);
@@ -165,6 +166,7 @@ TEST(KnownLoad, GivesHiddenGainsToThreePercentOrSaysThatTheyAreUnknown) {
         const JointGain& one = gains[static_cast<std::size_t>(j)];
         ++(one.felt ? felt : unknown);
         if (!one.felt) continue;
+        ++by_joint[j];
         const double error = std::fabs(one.factor / plant.gain[j] - 1);
         worst = std::max(worst, error);
         EXPECT_LT(error, 0.03) << "robot " << robot << " joint " << j + 1 << " speed " << speed;
@@ -174,6 +176,7 @@ TEST(KnownLoad, GivesHiddenGainsToThreePercentOrSaysThatTheyAreUnknown) {
   }
   RecordProperty("felt", felt);
   RecordProperty("unknown", unknown);
+  RecordProperty("by_joint", fmt::format("{}", fmt::join(by_joint.begin(), by_joint.end(), " ")));
   RecordProperty("worst", std::to_string(worst));
   EXPECT_GE(felt, 20);
   EXPECT_GE(unknown, 10);
