@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <tuple>
+#include <utility>
 
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
@@ -161,12 +163,10 @@ ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangem
   prior.topLeftCorner(bodies, bodies) = design.information / (mass_error * mass_error);
   VectorXd mean = VectorXd::Zero(all);
   mean.head(bodies) = design.mean;
-  VectorXd whole(n), gain(n), variance(n);
-  std::vector<Index> from(static_cast<std::size_t>(n));
+  VectorXd whole(n), variance(n);
+  const auto& [from, gain] = std::tie(arrangement.torque_from, arrangement.torque_gain);
   for (Index j = 0; j < n; ++j) {
     const auto joint = static_cast<std::size_t>(j);
-    from[joint] = arrangement.torque_from[joint];
-    gain[j] = arrangement.torque_gain[j];
     whole[j] = std::max(gain[j] * gain[j] * torque_square_[from[joint]], 1e-300);
     prior.diagonal().segment(bodies + own * j, own) =
         design.own_square[joint] / (options_.own_share * options_.own_share * whole[j]);
@@ -203,8 +203,8 @@ ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangem
       const double square =
           whole[j] +
           (x.dot(design.gram[joint] * x) - 2 * gain[j] * x.dot(design.projection[joint].col(from[joint]))) / rows;
-      const double before = variance[j];
-      variance[j] = std::max(square, options_.perfect * options_.perfect * whole[j]);
+      const double before =
+          std::exchange(variance[j], std::max(square, options_.perfect * options_.perfect * whole[j]));
       settled = settled && std::fabs(variance[j] - before) < options_.settled * before;
       // Friction brakes and a rotor is heavy: else there is none from here on, and what it would explain is left.
       const auto take_out = [&](Index i) {

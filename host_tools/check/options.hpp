@@ -40,6 +40,9 @@ struct ArrangementOptions {
   double least_turn = 0.35;
   /// s; torque further from the motion's time is told; theory: identify tries up to StructureOptions::longest_lead_s
   double least_lead_s = 0.010;
+  /// share of what stays unexplained; torque is told to be late where moving it leaves less; hand: friction with a
+  /// memory looks late, and leaves 0.6
+  double lead_leaves = 0.5;
   /// s; longest one that is tried; that of [signals] torque_lead_s
   double longest_lead_s = 0.1;
   /// share of the torque's RMS; q and tau are exchanged where more than the first stays as given and less than the

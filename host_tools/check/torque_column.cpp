@@ -60,6 +60,7 @@ std::optional<TorqueLead> find_long_torque_lead(const Project& project, const st
     attempt(centre - step);
   }
   if (given.nats - best.nats < options.gain || std::fabs(lead) < options.least_lead_s) return {};
+  if (best.left > options.lead_leaves * given.left) return {};
   return TorqueLead{known + lead, given.left, best.left};
 }
 

@@ -140,15 +140,40 @@ void Trainer::settle(Training& out) {
   // Where there is no BLS, choose_base() has made this fit if anybody wanted it.
   if (!all(with, false) || out.model.base.empty()) fit_anew(out);
   while (!all(with, false)) {
-    const bool beside = !all(with, true);
-    if (beside) fit_beside(out);
+    if (!fitter_.has_validation() && all(with, true)) {
+      together_ = true;  // blocks of train logs do not judge what was fitted to all of them
+    } else {
+      choose_fit(out);
+    }
     out.trained = errors_(out.model, "bls");
-    const std::vector<std::size_t> gone = without_gain(out, beside);
+    const std::vector<std::size_t> gone = without_gain(out, !together_);
     if (gone.empty()) return;
     drop(out, gone);
     with = joints_with_bls();
   }
+  together_ = false;
   take_base(out);
+}
+
+void Trainer::choose_fit(Training& out) {
+  fit_anew(out);
+  const IdentifiedModel together = out.model;
+  const StageErrors errors = errors_(together, "bls");
+  fit_beside(out);
+  together_ = together_is_better(errors, errors_(out.model, "bls"));
+  if (!together_) return;
+  out.model = together;
+  follow(together);
+}
+
+bool Trainer::together_is_better(const StageErrors& together, const StageErrors& beside) const {
+  if (!fitter_.has_validation()) return false;
+  for (std::size_t j = 0; j < fitter_.joints(); ++j) {
+    if (fitter_.design(j).bls) continue;
+    if (pooled_error(together.logs, Role::validate, j).rmse > pooled_error(base_errors_.logs, Role::validate, j).rmse)
+      return false;
+  }
+  return validation_error(together) < validation_error(beside);
 }
 
 void Trainer::drop(Training& out, const std::vector<std::size_t>& joints) {
@@ -242,17 +267,15 @@ std::vector<std::size_t> Trainer::without_gain(Training& out, bool beside) const
 }
 
 void Trainer::finish(Training& out) {
-  const std::vector<bool> with = joints_with_bls();
-  const bool whole = std::find(with.begin(), with.end(), false) == with.end();
   out.gate_errors = gate_errors(out);
-  if (!whole) {
+  if (!together_) {
     if (base_bodies_ && out.estimate.physical) base_bodies_->constrained = out.estimate.physical->constrained;
     out.estimate.physical = base_bodies_;
     // The information of the train logs holds around what this model has from elsewhere too.
     follow(out.model);
   }
   out.stored = stored_information(fitter_);
-  if (!whole) out.stored.information.recentre(coefficients_of(out.model, fits_));
+  if (!together_) out.stored.information.recentre(coefficients_of(out.model, fits_));
   out.model.stage = "trained";
 }
 
@@ -267,7 +290,8 @@ std::vector<GateErrors> Trainer::gate_errors(const Training& out) const {
   for (std::size_t j = 0; j < fitter_.joints(); ++j) {
     const Joint& joint = project_.robot.joints[j];
     const bool bls = fitter_.design(j).bls.has_value();
-    GateErrors one{joint.name, joint.torque_unit(), {}, 0, 0, bls || !base_is_diagnosed_ ? "bls" : "diagnosed"};
+    GateErrors one{
+        joint.name, joint.torque_unit(), {}, 0, 0, bls || together_ || !base_is_diagnosed_ ? "bls" : "diagnosed"};
     one.diagnosed = validated ? pooled_error(diagnosed_errors_.logs, Role::validate, j).rmse : without[j].rmse;
     one.bls =
         validated ? pooled_error(out.trained.logs, Role::validate, j).rmse : (bls ? with[j].rmse : without[j].rmse);

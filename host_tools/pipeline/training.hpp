@@ -30,8 +30,9 @@ struct Training {
 };
 
 /// A BLS beside the effects that diagnosis found. A joint has one in the end only where it lowers the joint's error on
-/// the data that judge; any other joint stays as diagnosis left it. So where some joints have none, the base
-/// parameters, which they share with the others, stay too, and a BLS is fitted beside them.
+/// the data that judge. There are two models: all is fitted together, or the base parameters stay, with everything of
+/// the joints without a BLS, and each BLS is fitted beside them. The first is taken where it is better on the validate
+/// logs, and on no joint without a BLS worse than the diagnosed model; without validate logs where all joints have one.
 class Trainer {
  public:
   /// Errors of a model on all logs, under a stage's name.
@@ -58,9 +59,13 @@ class Trainer {
   std::vector<bool> joints_with_bls() const;
   /// Drops each BLS that does not lower the error of its joint.
   void settle(Training& out);
+  /// Together, or beside the base's parameters.
+  void choose_fit(Training& out);
   /// The base model with the BLS of some joints, and these joints' coefficients fitted beside its base parameters.
   void fit_beside(Training& out);
   void take_base(Training& out);
+  /// On the validate logs, see above.
+  bool together_is_better(const StageErrors& together, const StageErrors& beside) const;
   /// What of the new fit every model says: notes, and what a link encoder shows.
   void add_findings_of(const IdentifiedModel& refitted, IdentifiedModel& model) const;
   /// Joints whose BLS does not lower their error, on what judges. @param beside fitted beside the base's parameters
@@ -82,6 +87,7 @@ class Trainer {
   IdentifiedModel base_;             ///< what a joint without a BLS has: the diagnosed model, or a fit after it
   std::vector<JointFit> base_fits_;  ///< .. as far as the fitter has columns for it
   bool base_is_diagnosed_ = true;
+  bool together_ = false;  ///< the model is the fit of everything together
   std::optional<PhysicalFit> base_bodies_;
   StageErrors diagnosed_errors_, base_errors_;
   std::vector<JointFit> fits_;  ///< of the model, where it is not the new fit

@@ -55,7 +55,7 @@ struct Recording {
       for (unsigned j = 0; j < robot.size(); ++j) {
         const double scale = j < 3 ? 4 : 0.3;
         log.tau(i, j) =
-            tau(j) + scale * std::copysign(std::sqrt(std::fabs(dq(j))), dq(j)) + 0.1 * scale * random.normal();
+            tau(j) + scale * std::copysign(std::sqrt(std::fabs(dq(j))), dq(j)) + 0.02 * scale * random.normal();
       }
     }
   }

@@ -280,7 +280,7 @@ std::string scenario() {
     }
   }
   for (const char* log : {"a", "b", "c"})
-    text += fmt::format("[[log]]\nname = \"{}\"\nduration_s = 10\nspeed = 0.4\nseed = {}\n", log, int{log[0]});
+    text += fmt::format("[[log]]\nname = \"{}\"\nduration_s = 20\nspeed = 0.6\nseed = {}\n", log, int{log[0]});
   return test::write("arm.toml", text).filename().string();
 }
 
