@@ -53,7 +53,7 @@ struct Recording {
       }
       solver.CartToJnt(q, dq, ddq, KDL::Wrenches(chain.getNrOfSegments()), tau);
       for (unsigned j = 0; j < robot.size(); ++j) {
-        const double scale = j < 3 ? 4 : 0.3;
+        const double scale = j < 3 ? 2.5 : 0.2;
         log.tau(i, j) =
             tau(j) + scale * std::copysign(std::sqrt(std::fabs(dq(j))), dq(j)) + 0.02 * scale * random.normal();
       }
