@@ -51,13 +51,18 @@ std::optional<TorqueLead> find_long_torque_lead(const Project& project, const st
     best = next;
     lead = seconds;
   };
-  for (double step = options.least_lead_s; step <= options.longest_lead_s; step *= 2)
+  double step = options.least_lead_s;
+  while (step <= options.longest_lead_s) {
     for (const double sign : {1.0, -1.0}) attempt(sign * step);
+    step *= 2;
+  }
   if (lead == 0) return {};
-  for (double step = std::fabs(lead) / 2; step > options.least_lead_s / 10; step /= 2) {
+  step = std::fabs(lead) / 2;
+  while (step > options.least_lead_s / 10) {
     const double centre = lead;
     attempt(centre + step);
     attempt(centre - step);
+    step /= 2;
   }
   if (given.nats - best.nats < options.gain || std::fabs(lead) < options.least_lead_s) return {};
   if (best.left > options.lead_leaves * given.left) return {};
@@ -76,6 +81,7 @@ bool are_exchanged(const Project& project, const std::vector<Log>& train, const 
     }
     const FilterFit filter = choose_filter(logs, {});
     std::vector<ProcessedLog> processed;
+    processed.reserve(logs.size());
     for (Log& log : logs) processed.push_back(process(std::move(log), filter));
     const Explained explained = explain(project.robot, sample_torque(processed, options.samples), options);
     return explained.enough ? explained.left : 1.0;

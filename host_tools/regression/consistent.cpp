@@ -28,18 +28,22 @@ constexpr double edge_at_the_end = 1e-4;
 /// Share of the way to the edge of what is possible that a step may go.
 constexpr double share_of_way = 0.5;
 
-/// Variables of the Newton steps: y = [beta; the other standard parameters; theta].
+/// Variables of the Newton steps: y = [beta; the other standard parameters; rotors; theta].
 class Path {
  public:
   explicit Path(const ConsistentProblem& problem) : p_(problem) {
-    const Index nb = static_cast<Index>(p_.columns.size()), all = p_.grouping.cols();
+    const Index nb = static_cast<Index>(p_.columns.size());
+    rotors_ = p_.rotor_prior.size();
+    const Index all = p_.grouping.cols() + rotors_;
+    MatrixXd grouping(nb, all);
+    grouping << p_.grouping, p_.rotors.reshaped(nb, rotors_);
     std::vector<bool> is_base(static_cast<std::size_t>(all), false);
     for (const Index c : p_.columns) is_base[static_cast<std::size_t>(c)] = true;
     for (Index c = 0; c < all; ++c) {
       if (!is_base[static_cast<std::size_t>(c)]) others_.push_back(c);
     }
     base_ = nb;
-    bodies_ = all;
+    masses_ = all;
     thetas_ = p_.information.rows() - nb;
     // pi = map * [beta; others]
     map_ = MatrixXd::Zero(all, all);
@@ -47,7 +51,7 @@ class Path {
     for (std::size_t i = 0; i < others_.size(); ++i) {
       const Index at = nb + static_cast<Index>(i);
       map_(others_[i], at) = 1;
-      for (Index b = 0; b < nb; ++b) map_(p_.columns[static_cast<std::size_t>(b)], at) = -p_.grouping(b, others_[i]);
+      for (Index b = 0; b < nb; ++b) map_(p_.columns[static_cast<std::size_t>(b)], at) = -grouping(b, others_[i]);
     }
     for (const Matrix4d& prior : p_.prior) {
       prior_inverse_.push_back(prior.inverse());
@@ -57,8 +61,9 @@ class Path {
     VectorXd pi(all);
     for (std::size_t i = 0; i < p_.prior.size(); ++i)
       pi.segment(static_cast<Index>(i) * ten, ten) = pseudo_inertia_parameters(p_.prior[i]);
+    pi.tail(rotors_) = p_.rotor_prior;
     y_.resize(all + thetas_);
-    y_.head(nb) = p_.grouping * pi;
+    y_.head(nb) = grouping * pi;
     for (std::size_t i = 0; i < others_.size(); ++i) y_[nb + static_cast<Index>(i)] = pi[others_[i]];
     for (Index i = 0; i < thetas_; ++i) {
       const double information = p_.information(nb + i, nb + i);
@@ -74,7 +79,7 @@ class Path {
   }
 
   ConsistentFit run() {
-    const double start = excess(y_) / (4.0 * static_cast<double>(p_.prior.size()));
+    const double start = excess(y_) / static_cast<double>(4 * p_.prior.size() + static_cast<std::size_t>(rotors_));
     const double end = final_weight * p_.variance;
     for (double weight = std::max(start, end);; weight = std::max(end, weight * 0.2)) {
       centre(weight, 50, 1e-2);
@@ -88,6 +93,8 @@ class Path {
     fit.beta = fit.constrained ? y_.head(base_) : target_.head(base_);
     fit.theta = fit.constrained ? y_.tail(thetas_) : target_.tail(thetas_);
     fit.bodies = matrices(y_);
+    fit.rotors = rotors(y_);
+    fit.excess = fit.constrained ? excess(y_) / p_.variance : 0;
     return fit;
   }
 
@@ -96,11 +103,13 @@ class Path {
   bool has_upper(Index i) const { return p_.upper[i] < unbounded_theta; }
 
   std::vector<Matrix4d> matrices(const VectorXd& y) const {
-    const VectorXd pi = map_ * y.head(bodies_);
+    const VectorXd pi = map_ * y.head(masses_);
     std::vector<Matrix4d> out;
-    for (Index i = 0; i < bodies_; i += ten) out.push_back(pseudo_inertia(pi.segment(i, ten)));
+    for (Index i = 0; i < masses_ - rotors_; i += ten) out.push_back(pseudo_inertia(pi.segment(i, ten)));
     return out;
   }
+  /// None of them is among the base columns.
+  VectorXd rotors(const VectorXd& y) const { return y.segment(masses_ - rotors_, rotors_); }
   VectorXd deviation(const VectorXd& y) const {
     VectorXd z(base_ + thetas_);
     z << y.head(base_), y.tail(thetas_);
@@ -121,13 +130,18 @@ class Path {
       sum += pull_ * (prior_inverse_[i] * bodies[i]).trace();
       for (int k = 0; k < 4; ++k) sum -= 2 * std::log(llt.matrixLLT()(k, k));
     }
+    const VectorXd ratios = rotors(y).cwiseQuotient(p_.rotor_prior);
+    for (const double ratio : ratios) {
+      if (ratio <= margin) return INFINITY;
+      sum += pull_ * ratio - std::log(ratio - margin);
+    }
     return sum;
   }
   /// The same with barriers of theta.
   double barrier(const VectorXd& y) const {
     double sum = barrier_of_bodies(y);
     for (Index i = 0; i < thetas_; ++i) {
-      const double value = y[bodies_ + i];
+      const double value = y[masses_ + i];
       if ((has_lower(i) && value <= p_.lower[i]) || (has_upper(i) && value >= p_.upper[i])) return INFINITY;
       if (has_lower(i)) sum -= edge_ * std::log(value - p_.lower[i]);
       if (has_upper(i)) sum -= edge_ * std::log(p_.upper[i] - value);
@@ -137,7 +151,7 @@ class Path {
 
   /// Gradient and Hessian of the barrier.
   void derivatives(const VectorXd& y, VectorXd& gradient, MatrixXd& hessian) const {
-    VectorXd of_pi(bodies_);
+    VectorXd of_pi(masses_);
     MatrixXd map = map_;  // becomes blockdiag(Hessians) * map
     const auto bodies = matrices(y);
     for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -146,12 +160,19 @@ class Path {
       of_pi.segment(at, ten) = inner_products(pull_ * prior_inverse_[i] - inverse);
       map.middleRows(at, ten) = barrier_hessian(inverse) * map_.middleRows(at, ten);
     }
+    const VectorXd inertias = rotors(y);
+    for (Index i = 0; i < rotors_; ++i) {
+      const Index at = masses_ - rotors_ + i;
+      const double inside = inertias[i] - margin * p_.rotor_prior[i];
+      of_pi[at] = pull_ / p_.rotor_prior[i] - 1 / inside;
+      map.row(at) /= inside * inside;
+    }
     gradient.setZero(y.size());
     hessian.setZero(y.size(), y.size());
-    gradient.head(bodies_) = map_.transpose() * of_pi;
-    hessian.topLeftCorner(bodies_, bodies_) = map_.transpose() * map;
+    gradient.head(masses_) = map_.transpose() * of_pi;
+    hessian.topLeftCorner(masses_, masses_) = map_.transpose() * map;
     for (Index i = 0; i < thetas_; ++i) {
-      const Index k = bodies_ + i;
+      const Index k = masses_ + i;
       for (const double distance :
            {has_lower(i) ? y[k] - p_.lower[i] : INFINITY, has_upper(i) ? y[k] - p_.upper[i] : -INFINITY}) {
         gradient[k] -= edge_ / distance;
@@ -170,8 +191,12 @@ class Path {
       const double lowest = solver.eigenvalues().minCoeff();
       if (lowest < 0) t = std::min(t, -1 / lowest);
     }
+    const VectorXd inertias = rotors(y_), changes = rotors(step);
+    for (Index i = 0; i < rotors_; ++i) {
+      if (changes[i] < 0) t = std::min(t, (margin * p_.rotor_prior[i] - inertias[i]) / changes[i]);
+    }
     for (Index i = 0; i < thetas_; ++i) {
-      const double d = step[bodies_ + i], value = y_[bodies_ + i];
+      const double d = step[masses_ + i], value = y_[masses_ + i];
       if (has_lower(i) && d < 0) t = std::min(t, (p_.lower[i] - value) / d);
       if (has_upper(i) && d > 0) t = std::min(t, (p_.upper[i] - value) / d);
     }
@@ -212,7 +237,7 @@ class Path {
       if ((has_lower(i) && value < p_.lower[i]) || (has_upper(i) && value > p_.upper[i])) return false;
     }
     const VectorXd kept = y_;
-    const Index free = bodies_ - base_;
+    const Index free = masses_ - base_;
     VectorXd gradient;
     MatrixXd hessian;
     bool there = false;
@@ -230,7 +255,7 @@ class Path {
       }
       double t = longest(step);
       if (there) {
-        const double before = barrier_of_bodies(y_), slope = gradient.head(bodies_).dot(step.head(bodies_));
+        const double before = barrier_of_bodies(y_), slope = gradient.head(masses_).dot(step.head(masses_));
         while (t > 1e-8 && !(barrier_of_bodies(y_ + t * step) <= before + 0.1 * t * slope)) t /= 2;
         if (t <= 1e-8) break;
       }
@@ -248,7 +273,7 @@ class Path {
   const ConsistentProblem& p_;
   double pull_ = pull_on_the_way;  ///< factor of tr(P0^-1 P)
   double edge_ = 1;                ///< factor of theta's barriers
-  Index base_ = 0, bodies_ = 0, thetas_ = 0;
+  Index base_ = 0, masses_ = 0, rotors_ = 0, thetas_ = 0;
   std::vector<Index> others_;
   MatrixXd map_;
   std::vector<Matrix4d> prior_inverse_;

@@ -21,6 +21,8 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr auto ten = static_cast<Index>(parameters_per_link);
+/// nats; what rotors must bring beyond bodies alone; hand: log 1000, as for a name beside another
+constexpr double rotors_bring = 6.9;
 
 /// A solid ellipsoid of density 1000 kg/m^3 around the segment from a link's joint to the next one, in its URDF frame.
 Inertial ellipsoid(const Robot& robot, std::size_t link) {
@@ -98,21 +100,56 @@ Prior make_prior(const PhysicalProblem& problem, const Reduced& data) {
   return prior;
 }
 
-/// Fills in what the data decided.
+/// Rotors that the base parameters absorb. Prior: as much inertia as the prior's bodies have about the joint at its
+/// zero.
+struct Rotors {
+  std::vector<Index> joints;
+  MatrixXd in_base;
+  VectorXd prior;
+};
+Rotors absorbed_rotors(const PhysicalProblem& problem, const std::vector<Matrix4d>& bodies) {
+  const auto n = static_cast<Index>(problem.robot.size());
+  VectorXd pi(n * ten);
+  for (std::size_t i = 0; i < bodies.size(); ++i)
+    pi.segment(static_cast<Index>(i) * ten, ten) = pseudo_inertia_parameters(bodies[i]);
+  Regressor regressor(problem.chain);
+  const VectorXd zero = VectorXd::Zero(n);
+  Rotors out;
+  std::vector<VectorXd> in_base;
+  std::vector<double> prior;
+  for (Index j = 0; j < n; ++j) {
+    VectorXd column = rotor_in_base(problem.chain, problem.base, j);
+    if (column.size() == 0) continue;
+    const double moved = regressor(zero, zero, VectorXd::Unit(n, j)).row(j) * pi;
+    const double held = regressor(zero, zero, zero).row(j) * pi;
+    out.joints.push_back(j);
+    in_base.push_back(std::move(column));
+    prior.push_back(moved - held);
+  }
+  out.in_base.resize(static_cast<Index>(problem.base.columns.size()), static_cast<Index>(in_base.size()));
+  for (std::size_t i = 0; i < in_base.size(); ++i) out.in_base.col(static_cast<Index>(i)) = in_base[i];
+  out.prior = Eigen::Map<const VectorXd>(prior.data(), static_cast<Index>(prior.size()));
+  return out;
+}
+
+/// Fills in what the data decided. Rotors: those of the fit; none, where it has none.
 void add_shares(const PhysicalProblem& problem, const Reduced& data, const std::vector<Matrix4d>& prior,
-                PhysicalFit& fit) {
-  const Index all = problem.base.grouping.cols();
+                const Rotors& rotors, PhysicalFit& fit) {
+  const Index of_bodies = problem.base.grouping.cols(), all = of_bodies + rotors.prior.size();
   MatrixXd before = MatrixXd::Zero(all, all);  // covariance of the prior
   for (std::size_t i = 0; i < prior.size(); ++i) {
     const Index at = static_cast<Index>(i) * ten;
     before.block(at, at, ten, ten) = barrier_hessian(prior[i].inverse()).inverse();
   }
+  before.diagonal().tail(rotors.prior.size()) = rotors.prior.cwiseAbs2();
+  MatrixXd grouping(problem.base.grouping.rows(), all);
+  grouping << problem.base.grouping, rotors.in_base;
   // information = root^T root, S = root G: covariance after = before - (S before)^T (1 + S before S^T)^-1 (S before)
   MatrixXd from_logs = data.information / problem.variance;
   if (problem.known.size() > 0) from_logs -= problem.known;
   const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(from_logs);
-  const MatrixXd seen = solver.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() * solver.eigenvectors().transpose() *
-                        problem.base.grouping;
+  const MatrixXd seen =
+      solver.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() * solver.eigenvectors().transpose() * grouping;
   const MatrixXd seen_before = seen * before;
   const Eigen::LLT<MatrixXd> llt(MatrixXd::Identity(seen.rows(), seen.rows()) + seen_before * seen.transpose());
   const auto share = [&](const VectorXd& direction) {
@@ -147,10 +184,25 @@ void add_shares(const PhysicalProblem& problem, const Reduced& data, const std::
 PhysicalFit fit_physical(const PhysicalProblem& problem) {
   const Reduced data = without_theta(problem);
   const Prior prior = make_prior(problem, data);
-  const ConsistentFit consistent =
-      fit_consistent({problem.information, problem.projection, problem.lower, problem.upper, problem.base.grouping,
-                      problem.base.columns, prior.bodies, problem.variance});
+  const ConsistentProblem bodies{problem.information,   problem.projection,   problem.lower, problem.upper,
+                                 problem.base.grouping, problem.base.columns, prior.bodies,  problem.variance};
+  ConsistentFit consistent = fit_consistent(bodies);
   PhysicalFit fit;
+  fit.rotor = VectorXd::Zero(static_cast<Index>(problem.robot.size()));
+  Rotors used{{}, MatrixXd(problem.base.grouping.rows(), 0), {}};
+  if (consistent.constrained) {
+    Rotors rotors = absorbed_rotors(problem, prior.bodies);
+    ConsistentProblem more = bodies;
+    more.rotors = rotors.in_base;
+    more.rotor_prior = rotors.prior;
+    ConsistentFit with_rotors = fit_consistent(more);
+    if (with_rotors.excess < consistent.excess - rotors_bring) {
+      consistent = std::move(with_rotors);
+      used = std::move(rotors);
+      for (std::size_t i = 0; i < used.joints.size(); ++i)
+        fit.rotor[used.joints[i]] = consistent.rotors[static_cast<Index>(i)];
+    }
+  }
   fit.beta = consistent.beta;
   fit.theta = consistent.theta;
   fit.constrained = consistent.constrained;
@@ -161,7 +213,7 @@ PhysicalFit fit_physical(const PhysicalProblem& problem) {
         Eigen::SelfAdjointEigenSolver<Matrix4d>(body, Eigen::EigenvaluesOnly).eigenvalues()[0]);
     fit.mass += body(3, 3);
   }
-  add_shares(problem, data, prior.bodies, fit);
+  add_shares(problem, data, prior.bodies, used, fit);
   return fit;
 }
 
@@ -208,6 +260,8 @@ std::vector<std::string> share_comments(const PhysicalFit& fit) {
         "logs determined it, 0 is the prior ({})",
         share.mass, share.centre.x(), share.centre.y(), share.centre.z(), share.first_moment.x(),
         share.first_moment.y(), share.first_moment.z(), determined_share, fit.prior));
+    if (const double rotor = fit.rotor[static_cast<Index>(out.size()) - 1]; rotor > 0)
+      out.back() += fmt::format("; beside it the joint's rotor with {:.3g} kg*m^2 (slides: kg), reflected", rotor);
   }
   return out;
 }

@@ -42,13 +42,15 @@ struct PhysicalFit {
   bool constrained = false;                 ///< false: beta and theta are the unconstrained solution itself
   std::vector<double> smallest_eigenvalue;  ///< of each pseudo-inertia
   std::vector<DataShare> share;
+  Eigen::VectorXd rotor;  ///< by joint: inertia in beta that turns faster than a link, reflected to it [kg m^2 | kg]
   std::string prior;      ///< what it was, for people
   double mass = 0;        ///< of all links together [kg]
   double mass_share = 0;  ///< how much of that the data decided
 };
 
 /// Prior: the URDF's inertias where it has them; for other links solid ellipsoids of one density around the segment to
-/// the next joint, the density that fits the data best.
+/// the next joint, the density that fits the data best. Where bodies alone explain the data worse, the joints whose
+/// rotor the base parameters absorb get one: as much about one axis, and nothing about the others, no body has.
 PhysicalFit fit_physical(const PhysicalProblem& problem);
 
 /// The same of a fitter whose weights are one over the residuals' variance; coefficients keep the bounds of the

@@ -23,7 +23,7 @@ class FirstError : public console_bridge::OutputHandler {
     console_bridge::setLogLevel(console_bridge::CONSOLE_BRIDGE_LOG_ERROR);
     console_bridge::useOutputHandler(this);
   }
-  ~FirstError() {
+  ~FirstError() override {
     console_bridge::restorePreviousOutputHandler();
     console_bridge::setLogLevel(level_);
   }

@@ -141,9 +141,7 @@ std::string words(const ArrangementMove& move) {
   return fmt::format("{} {} {:.3g}", to_string(move.mistake), move.joint + 1, move.value);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   fxdyn::keep_freed_memory();
   CLI::App app{
       "Mistakes in columns, signs, zeros, axes, gravity and gains: how many are found, and how many sound robots "
@@ -223,5 +221,17 @@ int main(int argc, char** argv) {
     fmt::print("{:<18}{:>8}{:>8.3f}{:>8.3f}{:>8.3f}{:>10.2f}{:>8}{:>8}\n", name, count.all,
                static_cast<double>(count.found) / count.all, static_cast<double>(count.right) / count.all,
                static_cast<double>(count.told) / count.all, most, count.hidden, count.wrong);
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "check_study: {}\n", error.what());
+    return 2;
   }
 }

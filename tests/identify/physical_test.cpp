@@ -86,6 +86,15 @@ VectorXd all_parameters(const PhysicalFit& fit) {
   return out;
 }
 
+/// Base parameters of rotors, one a joint.
+VectorXd in_base(const Experiment& e, const VectorXd& rotor) {
+  VectorXd out = VectorXd::Zero(e.beta.size());
+  for (Index j = 0; j < rotor.size(); ++j) {
+    if (rotor[j] != 0) out += rotor[j] * rotor_in_base(e.chain, e.base, j);
+  }
+  return out;
+}
+
 void expect_possible(const PhysicalFit& fit) {
   for (const auto& link : fit.inertia) {
     EXPECT_EQ(Eigen::LLT<Eigen::Matrix4d>(pseudo_inertia(link)).info(), Eigen::Success);
@@ -147,8 +156,39 @@ TEST(Physical, PointsAndRodsAreNotMovedByTheMargin) {
                                           problem.upper, problem.variance});
     expect_possible(fit);
     EXPECT_LT((fit.beta - e.beta).norm(), 1e-9 * e.beta.norm());
-    EXPECT_LT((e.base.grouping * all_parameters(fit) - e.beta).norm(), 1e-9 * e.parameters.norm());
+    EXPECT_LT((e.base.grouping * all_parameters(fit) + in_base(e, fit.rotor) - e.beta).norm(),
+              1e-9 * e.parameters.norm());
   }
+}
+
+TEST(Physical, RotorsOfTheFirstJointsAreNoBodies) {
+  // The PUMA's gears make more of its rotors than its links have. Joint 2's, here twice as large, is in no body: joint
+  // 1 would have to turn it, too.
+  const Robot robot = read_urdf(test::puma560);
+  VectorXd rotor = VectorXd::Zero(6);
+  rotor[0] = 1.14;
+  rotor[1] = 2 * 4.71;
+  Experiment e(robot, 0.01, 4);
+  e.tau += e.x.leftCols(e.beta.size()) * in_base(e, rotor);
+  e.beta += in_base(e, rotor);
+  const PhysicalProblem p = e.problem();
+  const PhysicalFit fit = fit_physical(p);
+  expect_possible(fit);
+  EXPECT_LT((e.base.grouping * all_parameters(fit) + in_base(e, fit.rotor) - fit.beta).norm(), 1e-9 * fit.beta.norm());
+  const double truth = e.rms_error(e.beta, e.theta);
+  EXPECT_LT(e.rms_error(fit.beta, fit.theta), 1.001 * truth);
+  EXPECT_GT(fit.rotor[1], 2);
+  EXPECT_EQ(fit.rotor.tail(4).maxCoeff(), 0);  // these have a column of their own
+  EXPECT_NE(share_comments(fit)[1].find("rotor with"), std::string::npos);
+  // Bodies alone do worse.
+  std::vector<Eigen::Matrix4d> prior;
+  for (Index i = 0; i < 6; ++i)
+    prior.push_back(pseudo_inertia(to_link_inertia(possible_body(*robot.joints[static_cast<std::size_t>(i)].inertial),
+                                                   e.chain.urdf_in_dh[static_cast<std::size_t>(i)])));
+  const ConsistentFit bodies = fit_consistent(
+      {p.information, p.projection, p.lower, p.upper, e.base.grouping, e.base.columns, prior, p.variance});
+  EXPECT_TRUE(bodies.constrained);
+  EXPECT_GT(e.rms_error(bodies.beta, bodies.theta), 1.05 * truth);
 }
 
 TEST(Physical, NoisyDataGivesPossibleBodiesAtLittleCost) {

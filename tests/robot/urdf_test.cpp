@@ -11,7 +11,7 @@ namespace {
 
 std::filesystem::path write(const std::string& text) {
   const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-  const auto file = std::filesystem::path(testing::TempDir()) / (std::string(info->name()) + ".urdf");
+  auto file = std::filesystem::path(testing::TempDir()) / (std::string(info->name()) + ".urdf");
   std::ofstream(file) << text;
   return file;
 }
