@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "host_tools/check/column_words.hpp"
@@ -29,6 +30,56 @@ bool is_in_each_log(const Robot& robot, const std::vector<ProcessedLog>& logs, d
     const ArrangementEvidence evidence(robot, sample_torque({&log, 1}, options.samples, lead_s), options);
     return !evidence.enough() || evidence(after).nats < evidence(before).nats;
   });
+}
+
+std::string of_limit(const std::optional<double>& share) {
+  return share ? fmt::format("{:.0f} %", 100 * *share) : std::string("-");
+}
+
+std::string joint_table(const std::vector<JointFacts>& joints) {
+  std::string out = fmt::format("\n{:<20} {:>19} {:>8} {:>10} {:>8} {:>10} {:>10} {:>10}\n", "joint", "range",
+                                "of URDF", "speed /s", "of URDF", "resolution", "torque", "saturated");
+  for (const JointFacts& joint : joints) {
+    out += fmt::format("{:<20} {:>8.3g} .. {:<5.3g}{:>4} {:>7} {:>10.3g} {:>8} {:>10} {:>10.3g} {:>8.2g} %\n",
+                       joint.name, joint.lower, joint.upper, joint.unit, of_limit(joint.range_share), joint.speed,
+                       of_limit(joint.speed_share),
+                       joint.encoder_step > 0 ? fmt::format("{:.2g}", joint.encoder_step) : std::string("-"),
+                       joint.largest_torque, 100 * joint.saturated_share);
+  }
+  return out;
+}
+
+std::string signal_lines(const SignalFacts& signals) {
+  std::string out = fmt::format("motion up to {:.3g} Hz; position filtered at {:.3g} Hz, torque at {:.3g} Hz; ",
+                                signals.excited_hz, signals.position_cutoff_hz, signals.torque_cutoff_hz);
+  if (!signals.torque_lead) return out + "the logs don't tell whether the torque is of the motion's time\n";
+  const auto [seconds, resolution] = *signals.torque_lead;
+  return out + fmt::format("torque {:.1f} ms {} the motion, to {:.1f} ms\n", 1000 * std::fabs(seconds),
+                           seconds < 0 ? "behind" : "ahead of", 1000 * resolution);
+}
+
+json to_json(const JointFacts& joint) {
+  json out = {{"joint", joint.name},
+              {"q_lower", joint.lower},
+              {"q_upper", joint.upper},
+              {"speed", joint.speed},
+              {"encoder_step", joint.encoder_step},
+              {"largest_torque", joint.largest_torque},
+              {"saturated_share", joint.saturated_share}};
+  if (joint.range_share) out["range_share"] = *joint.range_share;
+  if (joint.speed_share) out["speed_share"] = *joint.speed_share;
+  return out;
+}
+
+json to_json(const SignalFacts& signals) {
+  json out = {{"excited_hz", signals.excited_hz},
+              {"position_cutoff_hz", signals.position_cutoff_hz},
+              {"torque_cutoff_hz", signals.torque_cutoff_hz}};
+  if (signals.torque_lead) {
+    out["torque_lead_s"] = signals.torque_lead->seconds;
+    out["torque_lead_resolution_s"] = signals.torque_lead->resolution;
+  }
+  return out;
 }
 
 }  // namespace
@@ -58,6 +109,7 @@ CheckResult check(const Project& project, const std::filesystem::path& directory
     for (const Log& log : read_logs(project, role, directory, &known))
       result.logs.push_back(facts_of(log, options.facts));
   }
+  std::vector<ProcessedLog> train;
   if (project.has_role(Role::train)) {
     if (project.check.columns &&
         are_exchanged(project, read_logs(project, Role::train, directory), options.arrangement)) {
@@ -70,8 +122,13 @@ CheckResult check(const Project& project, const std::filesystem::path& directory
     } else {
       const GateData data = read_gate_data(project, directory);
       result.findings = check_columns(project, data.logs, options.arrangement);
+      const FilterFit& filter = data.logs.front().filter;
+      result.signals = {filter.excited_hz, filter.position_cutoff_hz, filter.torque_cutoff_hz, {}};
+      if (project.check.columns) result.signals->torque_lead = torque_lead(project, data.logs, options.arrangement);
+      train = data.logs;
     }
   }
+  result.joints = joints_of(result.logs, project.robot, train);
   for (CheckFinding& finding : findings_of(result.logs, project.robot, options.facts))
     result.findings.push_back(std::move(finding));
   return result;
@@ -83,6 +140,8 @@ std::string check_table(const CheckResult& result) {
     out += fmt::format("{:<24} {:<9} {:>9.4g} {:>9.4g} {:>6.0f} %{}\n", log.name, to_string(log.role), log.seconds,
                        log.rate_hz, 100 * log.rest_share, log.resampled ? "  irregular stamps" : "");
   }
+  out += joint_table(result.joints);
+  if (result.signals) out += signal_lines(*result.signals);
   for (const CheckFinding& finding : result.findings) {
     out += fmt::format("{}: {}{}\n", finding.error ? "error" : "warning", finding.log.empty() ? "" : finding.log + ": ",
                        finding.text);
@@ -118,7 +177,11 @@ json to_json(const CheckResult& result) {
     if (!finding.fix.empty()) one["fix"] = finding.fix;
     findings.push_back(one);
   }
-  return {{"schema", "fxdyn.check/1"}, {"logs", logs}, {"findings", findings}};
+  json joints = json::array();
+  for (const JointFacts& joint : result.joints) joints.push_back(to_json(joint));
+  json out = {{"schema", "fxdyn.check/1"}, {"logs", logs}, {"joints", joints}, {"findings", findings}};
+  if (result.signals) out["signals"] = to_json(*result.signals);
+  return out;
 }
 
 }  // namespace fxdyn

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "host_tools/check/options.hpp"
+#include "host_tools/check/torque_column.hpp"
 #include "host_tools/identify/gate_data.hpp"
 #include "host_tools/project/project.hpp"
 
@@ -43,13 +44,35 @@ struct LogFacts {
   Eigen::VectorXd largest_torque;            ///< [N*m | N]
 };
 
+/// What all logs together show of a joint, before any fit.
+struct JointFacts {
+  std::string name, unit;                          ///< of its position
+  double lower = 0, upper = 0, speed = 0;          ///< [rad | m], [rad/s | m/s]
+  std::optional<double> range_share, speed_share;  ///< of the URDF's limits, where it has them
+  double encoder_step = 0;                         ///< largest of the logs [rad | m], 0: none is seen
+  double largest_torque = 0;                       ///< [N*m | N]
+  double saturated_share = 0;                      ///< of the train logs' samples: the drive was at its limit
+};
+
+/// What the train logs show together.
+struct SignalFacts {
+  double excited_hz = 0;  ///< holds 99.9 % of the velocities' energy
+  double position_cutoff_hz = 0, torque_cutoff_hz = 0;
+  std::optional<MeasuredLead> torque_lead;  ///< see torque_lead(); none: the logs don't tell
+};
+
 struct CheckResult {
   std::vector<LogFacts> logs;
+  std::vector<JointFacts> joints;
+  std::optional<SignalFacts> signals;  ///< none: there is no train log
   std::vector<CheckFinding> findings;
   bool has_error() const;
 };
 
 LogFacts facts_of(const Log& log, const LogFactOptions& options);
+/// @param train processed; may be empty
+std::vector<JointFacts> joints_of(const std::vector<LogFacts>& logs, const Robot& robot,
+                                  const std::vector<ProcessedLog>& train);
 /// What each log alone, and all of a role together, show.
 std::vector<CheckFinding> findings_of(const std::vector<LogFacts>& logs, const Robot& robot,
                                       const LogFactOptions& options);
@@ -60,7 +83,7 @@ std::vector<CheckFinding> check_columns(const Project& project, const std::vecto
 /// All of it. Logs of scenarios are made below `directory`.
 CheckResult check(const Project& project, const std::filesystem::path& directory, const CheckOptions& options = {});
 
-/// For the terminal: a line a log, then the findings with the lines to write.
+/// For the terminal: a line a log, one a joint, one on the signals, then the findings with the lines to write.
 std::string check_table(const CheckResult& result);
 nlohmann::json to_json(const CheckResult& result);
 

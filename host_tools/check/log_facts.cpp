@@ -79,6 +79,39 @@ LogFacts facts_of(const Log& log, const LogFactOptions& options) {
   return facts;
 }
 
+std::vector<JointFacts> joints_of(const std::vector<LogFacts>& logs, const Robot& robot,
+                                  const std::vector<ProcessedLog>& train) {
+  std::vector<JointFacts> out;
+  for (std::size_t j = 0; j < robot.size(); ++j) {
+    const Joint& joint = robot.joints[j];
+    const auto at = static_cast<Index>(j);
+    JointFacts facts;
+    facts.name = joint.name;
+    facts.unit = joint.position_unit();
+    facts.lower = INFINITY;
+    facts.upper = -INFINITY;
+    for (const LogFacts& log : logs) {
+      facts.lower = std::min(facts.lower, log.q_lower[at]);
+      facts.upper = std::max(facts.upper, log.q_upper[at]);
+      facts.speed = std::max(facts.speed, log.speed[at]);
+      facts.encoder_step = std::max(facts.encoder_step, log.encoder_step[at]);
+      facts.largest_torque = std::max(facts.largest_torque, log.largest_torque[at]);
+    }
+    if (joint.limits && !joint.continuous && joint.limits->upper > joint.limits->lower)
+      facts.range_share = (facts.upper - facts.lower) / (joint.limits->upper - joint.limits->lower);
+    if (joint.limits && joint.limits->velocity > 0) facts.speed_share = facts.speed / joint.limits->velocity;
+    Index saturated = 0, samples = 0;
+    for (const ProcessedLog& log : train) {
+      samples += log.samples();
+      if (log.saturated.empty()) continue;
+      for (const auto& [from, to] : log.saturated[j]) saturated += to - from;
+    }
+    facts.saturated_share = static_cast<double>(saturated) / static_cast<double>(std::max<Index>(1, samples));
+    out.push_back(std::move(facts));
+  }
+  return out;
+}
+
 std::vector<CheckFinding> findings_of(const std::vector<LogFacts>& logs, const Robot& robot,
                                       const LogFactOptions& options) {
   std::vector<CheckFinding> out;

@@ -43,6 +43,9 @@ struct ArrangementOptions {
   /// share of what stays unexplained; torque is told to be late where moving it leaves less; hand: friction with a
   /// memory looks late, and leaves 0.6
   double lead_leaves = 0.5;
+  /// share of what stays unexplained, squared; a shift that adds less is not told from none; hand: what friction with a
+  /// memory adds on the measured sets
+  double blurred = 0.1;
   /// s; longest one that is tried; that of [signals] torque_lead_s
   double longest_lead_s = 0.1;
   /// share of the torque's RMS; q and tau are exchanged where more than the first stays as given and less than the

@@ -1,6 +1,7 @@
 #include "host_tools/check/torque_column.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "host_tools/check/arrangement.hpp"
@@ -67,6 +68,22 @@ std::optional<TorqueLead> find_long_torque_lead(const Project& project, const st
   if (given.nats - best.nats < options.gain || std::fabs(lead) < options.least_lead_s) return {};
   if (best.left > options.lead_leaves * given.left) return {};
   return TorqueLead{known + lead, given.left, best.left};
+}
+
+std::optional<MeasuredLead> torque_lead(const Project& project, const std::vector<ProcessedLog>& logs,
+                                        const ArrangementOptions& options) {
+  const double known = project.signals.torque_lead_s.value_or(0), step = options.least_lead_s;
+  std::array<double, 3> square{};
+  for (std::size_t i = 0; i < square.size(); ++i) {
+    const double seconds = known + (static_cast<double>(i) - 1) * step;
+    const Explained one = explain(project.robot, sample_torque(logs, options.samples, seconds), options);
+    if (!one.enough) return {};
+    square[i] = one.left * one.left;
+  }
+  const double bend = square[0] - 2 * square[1] + square[2];
+  const double vertex = bend > 0 ? step * (square[0] - square[2]) / (2 * bend) : INFINITY;
+  if (std::fabs(vertex) > step) return {};
+  return MeasuredLead{known + vertex, step * std::sqrt(2 * options.blurred * square[1] / bend)};
 }
 
 bool are_exchanged(const Project& project, const std::vector<Log>& train, const ArrangementOptions& options) {

@@ -19,6 +19,16 @@ struct TorqueLead {
 std::optional<TorqueLead> find_long_torque_lead(const Project& project, const std::vector<ProcessedLog>& logs,
                                                 const ArrangementOptions& options);
 
+struct MeasuredLead {
+  double seconds = 0;     ///< torque ahead of the motion
+  double resolution = 0;  ///< [s] a shift by that raises what stays unexplained (squared) by the share `blurred`
+};
+/// How far the torque is ahead of the motion: the vertex of a parabola through what stays unexplained (squared) at
+/// three shifts, `least_lead_s` apart; good to a quarter of that. None: too few samples, or the middle one is not the
+/// best.
+std::optional<MeasuredLead> torque_lead(const Project& project, const std::vector<ProcessedLog>& logs,
+                                        const ArrangementOptions& options);
+
 /// Whether positions stand in the torque's columns and torques in the position's: the exchanged columns are explained
 /// by the URDF, the given ones are not.
 bool are_exchanged(const Project& project, const std::vector<Log>& train, const ArrangementOptions& options);

@@ -49,6 +49,28 @@ std::vector<std::string> kinds(const Log& log, const Robot& robot) {
 }
 using Kinds = std::vector<std::string>;
 
+TEST(LogFacts, OfAJointAreOverAllLogs) {
+  const Robot robot = two_joints(2, 4);
+  const LogFacts slow = facts_of(log_of(0, 1, 1), {}), fast = facts_of(log_of(0, 0.5, 2), {});
+  ProcessedLog train;
+  train.q.setZero(5000, 2);
+  train.saturated = {{}, {{0, 100}, {200, 350}}};
+  const std::vector<JointFacts> joints = joints_of({slow, fast}, robot, {train});
+  ASSERT_EQ(joints.size(), 2U);
+  EXPECT_NEAR(joints[0].lower, -1, 1e-3);
+  EXPECT_NEAR(joints[0].upper, 1, 1e-3);
+  EXPECT_NEAR(joints[0].speed, 2, 0.01);
+  EXPECT_NEAR(joints[0].range_share.value(), 0.5, 1e-3);
+  EXPECT_NEAR(joints[0].speed_share.value(), 0.5, 0.01);
+  EXPECT_EQ(joints[0].saturated_share, 0);
+  EXPECT_NEAR(joints[1].saturated_share, 0.05, 1e-12);
+  Robot free = robot;
+  free.joints[0].continuous = true;
+  free.joints[0].limits->velocity = 0;
+  const JointFacts unlimited = joints_of({slow}, free, {})[0];
+  EXPECT_FALSE(unlimited.range_share || unlimited.speed_share);
+}
+
 TEST(LogFacts, OfAnOrdinaryLogAreNoFindings) {
   const Log log = log_of(0, 1, 2);
   const LogFacts facts = facts_of(log, {});

@@ -60,10 +60,21 @@ struct Recording {
     }
   }
 
-  std::optional<TorqueLead> lead() const {
-    return find_long_torque_lead(project, {process(log, choose_filter({log}, {}))}, {});
-  }
+  std::vector<ProcessedLog> processed() const { return {process(log, choose_filter({log}, {}))}; }
+  std::optional<TorqueLead> lead() const { return find_long_torque_lead(project, processed(), {}); }
 };
+
+TEST(TorqueColumn, ShortLeadsAreMeasured) {
+  for (const double late : {0.0, 0.006, -0.004}) {
+    const Recording recording(late);
+    const MeasuredLead lead = torque_lead(recording.project, recording.processed(), {}).value();
+    EXPECT_NEAR(lead.seconds, -late, 0.0025) << late;  // a quarter of the step
+    EXPECT_NEAR(lead.seconds, -late, lead.resolution) << late;
+    EXPECT_LT(lead.resolution, 0.02);
+  }
+  const Recording far(0.05);
+  EXPECT_FALSE(torque_lead(far.project, far.processed(), {}));
+}
 
 TEST(TorqueColumn, OfTheMotionsTimeIsLeftAlone) { EXPECT_FALSE(Recording().lead().has_value()); }
 
