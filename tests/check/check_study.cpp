@@ -54,11 +54,13 @@ std::vector<Planted> plant(const Robot& robot, const TorqueSamples& samples, Ran
   const auto n = static_cast<Index>(robot.size());
   const auto any = [&] { return static_cast<Index>(random.next() % static_cast<std::uint64_t>(n)); };
   std::vector<Planted> out;
+  out.reserve(16);  // those that were planted stay where they are
   const auto add = [&](std::string name, Mistake mistake, Index joint, Index other = -1) -> Planted& {
     return out.emplace_back(Planted{std::move(name), robot, samples, mistake, joint, other});
   };
   const Index a = any();
-  const Index b = (a + 1 + static_cast<Index>(random.next() % static_cast<std::uint64_t>(n - 1))) % n;
+  const Index b =
+      (a + 1 + static_cast<Index>(random.next() % static_cast<std::uint64_t>(std::max<Index>(1, n - 1)))) % n;
   if (n > 1 && robot.joints[static_cast<std::size_t>(a)].type == robot.joints[static_cast<std::size_t>(b)].type) {
     Planted& joints = add("swapped joints", Mistake::swapped_joints, std::min(a, b), std::max(a, b));
     for (Eigen::MatrixXd* m : {&joints.samples.q, &joints.samples.dq, &joints.samples.ddq, &joints.samples.tau})
