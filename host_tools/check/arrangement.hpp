@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <array>
 #include <string>
 #include <vector>
 
@@ -53,6 +54,10 @@ class ArrangementEvidence {
   const Robot& robot() const { return robot_; }
   /// A joint that never moves holds any torque, as does its brake. By its column of the motion.
   bool moves(Eigen::Index column) const { return moves_[static_cast<std::size_t>(column)]; }
+  /// Lowest and highest position in a column.
+  std::array<double, 2> range(Eigen::Index column) const {
+    return {samples_.q.col(column).minCoeff(), samples_.q.col(column).maxCoeff()};
+  }
   /// Twice as many samples as unknowns: fewer prove nothing.
   bool enough() const;
 

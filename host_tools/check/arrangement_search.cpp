@@ -16,6 +16,8 @@ std::string to_string(Mistake mistake) {
   switch (mistake) {
     case Mistake::swapped_joints:
       return "swapped_joints";
+    case Mistake::swapped_motion:
+      return "swapped_motion";
     case Mistake::swapped_torques:
       return "swapped_torques";
     case Mistake::mirrored_motion:
@@ -46,6 +48,11 @@ constexpr double pi = std::numbers::pi;
 
 bool is_gain(Mistake mistake) { return mistake == Mistake::torque_gain || mistake == Mistake::torque_unit; }
 
+bool has_all_masses(const Robot& robot) {
+  return std::all_of(robot.joints.begin(), robot.joints.end(),
+                     [](const Joint& one) { return one.inertial.has_value(); });
+}
+
 bool changes_motion(Mistake mistake) {
   return mistake != Mistake::swapped_torques && mistake != Mistake::mirrored_torque && !is_gain(mistake);
 }
@@ -53,7 +60,8 @@ bool changes_motion(Mistake mistake) {
 /// All single changes of an arrangement, continuous ones on a grid.
 class Moves {
  public:
-  Moves(const ArrangementEvidence& evidence, const Arrangement& now) : evidence_(evidence), now_(now) {
+  Moves(const ArrangementEvidence& evidence, const Arrangement& now, const ArrangementOptions& options)
+      : evidence_(evidence), now_(now), options_(options) {
     const auto n = static_cast<Index>(evidence.robot().size());
     for (Index j = 0; j < n; ++j) {
       for (Index other = j + 1; other < n; ++other) swap(j, other);
@@ -69,9 +77,7 @@ class Moves {
 
  private:
   void units_of_torque() {
-    const std::vector<Joint>& joints = evidence_.robot().joints;
-    // Without masses there is nothing to compare with.
-    if (!std::all_of(joints.begin(), joints.end(), [](const Joint& one) { return one.inertial.has_value(); })) return;
+    if (!has_all_masses(evidence_.robot())) return;  // nothing to compare with
     for (const double gain : {1e-3, 0.01, 0.03, 0.1, 0.3, 3.0, 10.0, 30.0, 100.0, 1e3}) {
       ArrangementMove& move = add(Mistake::torque_unit, 0);
       move.value = gain;
@@ -92,6 +98,11 @@ class Moves {
       std::swap(torques.result.torque_from[i], torques.result.torque_from[k]);
     }
     if (joint(a).type != joint(b).type) return;
+    if (evidence_.moves(now_.motion_from[i]) && evidence_.moves(now_.motion_from[k])) {
+      ArrangementMove& motion = add(Mistake::swapped_motion, a);
+      motion.other = b;
+      std::swap(motion.result.motion_from[i], motion.result.motion_from[k]);
+    }
     ArrangementMove& joints = add(Mistake::swapped_joints, a);
     joints.other = b;
     std::swap(joints.result.torque_from[i], joints.result.torque_from[k]);
@@ -134,9 +145,23 @@ class Moves {
     }
   }
 
+  /// Whether a joint can have gone so far: within the URDF's range and as far again, or within `widest` where it has
+  /// none.
+  bool is_possible(Index j, double range) const {
+    const auto& limits = joint(j).limits;
+    const bool known = limits && !joint(j).continuous && limits->upper > limits->lower;
+    return range < (known ? 2 * (limits->upper - limits->lower) : options_.widest);
+  }
+
+  /// Another unit of the position: only where the range as given is none that the joint can have. A smaller motion
+  /// always explains a joint that hardly feels its own, and a larger one is told from it by nothing but the torque.
   void units(Index j) {
-    const std::vector<double> factors =
-        joint(j).type == JointType::revolute ? std::vector<double>{pi / 180} : std::vector<double>{1e-3, 1e3};
+    const auto [lower, upper] = evidence_.range(now_.motion_from[static_cast<std::size_t>(j)]);
+    const double range = std::fabs(now_.motion_gain[j]) * (upper - lower);
+    const bool turns = joint(j).type == JointType::revolute;
+    std::vector<double> factors;
+    if (!is_possible(j, range)) factors = turns ? std::vector<double>{pi / 180} : std::vector<double>{1e-3, 0.01};
+    if (!turns && range < options_.shortest_slide) factors.push_back(1e3);
     for (const double factor : factors) {
       ArrangementMove& move = add(Mistake::position_unit, j);
       move.value = factor;
@@ -162,6 +187,7 @@ class Moves {
 
   const ArrangementEvidence& evidence_;
   const Arrangement& now_;
+  const ArrangementOptions& options_;
 };
 
 struct Scored {
@@ -250,14 +276,19 @@ bool same_thing(const ArrangementMove& a, const ArrangementMove& b) {
 std::vector<Scored> best_of_each(const ArrangementEvidence& evidence, const Arrangement& now, double nats,
                                  const ArrangementOptions& options) {
   std::vector<Scored> best;
-  for (Scored& one : score_all(evidence, now, Moves(evidence, now).all)) {
+  for (Scored& one : score_all(evidence, now, Moves(evidence, now, options).all)) {
     const bool known =
         std::any_of(best.begin(), best.end(), [&](const Scored& b) { return same_thing(b.move, one.move); });
     if (!known) best.push_back(std::move(one));
   }
   // A grid point beside a sharp minimum may be no better than nothing.
   parallel_for(best.size(), [&](std::size_t i) {
-    if (best[i].score.nats < nats + options.gain) refine(evidence, now, best[i]);
+    if (best[i].score.nats >= nats + options.gain) return;
+    const Scored simple = best[i];
+    refine(evidence, now, best[i]);
+    // What no joint feels of a direction would be noise.
+    if (simple.move.mistake == Mistake::gravity && simple.score.nats < best[i].score.nats + options.as_good)
+      best[i] = simple;
   });
   std::sort(best.begin(), best.end(), [](const Scored& a, const Scored& b) { return a.score.nats < b.score.nats; });
   return best;
@@ -280,6 +311,9 @@ std::vector<ArrangementFinding> find_mistakes(const ArrangementEvidence& evidenc
     finding.after = best.front().score.rms[finding.felt];
     for (std::size_t i = 1; i < best.size() && best[i].score.nats < best.front().score.nats + options.as_good; ++i)
       finding.as_good.push_back(best[i].move);
+    // A URDF without masses explains next to any torque a little better in some other way.
+    const bool doubtful = !has_all_masses(evidence.robot()) && finding.after > options.vague_leaves * finding.before;
+    if (doubtful) break;
     const bool small = is_small(best.front().move, now, options);
     now = best.front().move.result;
     score = best.front().score;

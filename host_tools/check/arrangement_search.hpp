@@ -12,6 +12,7 @@ namespace fxdyn {
 /// What may be wrong with the columns or the URDF.
 enum class Mistake {
   swapped_joints,   ///< all columns of two joints
+  swapped_motion,   ///< their motion alone
   swapped_torques,  ///< their torques alone
   mirrored_motion,  ///< q runs against the URDF's axis, the torque does not
   mirrored_torque,  ///< the torque alone

@@ -32,8 +32,29 @@ bool is_in_each_log(const Robot& robot, const std::vector<ProcessedLog>& logs, d
   });
 }
 
+/// In the order of a project's columns.
+std::vector<std::string> signals_in(const std::vector<ProcessedLog>& logs) {
+  const ProcessedLog& log = logs.front();
+  std::vector<std::string> out{"t", "q"};
+  if (log.measured_dq.size() > 0) out.emplace_back("dq");
+  if (log.measured_ddq.size() > 0) out.emplace_back("ddq");
+  out.emplace_back("tau");
+  if (log.qlink.size() > 0) out.emplace_back("qlink");
+  return out;
+}
+
 std::string of_limit(const std::optional<double>& share) {
   return share ? fmt::format("{:.0f} %", 100 * *share) : std::string("-");
+}
+
+/// The lines to paste each on a line of its own.
+std::string indented(const std::string& lines) {
+  std::string out;
+  for (const char c : lines) {
+    out += c;
+    if (c == '\n') out += "    ";
+  }
+  return out;
 }
 
 std::string joint_table(const std::vector<JointFacts>& joints) {
@@ -94,11 +115,14 @@ std::vector<CheckFinding> check_columns(const Project& project, const std::vecto
   const TorqueSamples samples = sample_torque(logs, options.samples, lead_s);
   const ArrangementEvidence evidence(project.robot, samples, options);
   Arrangement before = as_given(project.robot);
-  for (const ArrangementFinding& finding : find_mistakes(evidence, options)) {
+  std::vector<ArrangementFinding> found;
+  for (ArrangementFinding& finding : find_mistakes(evidence, options)) {
     if (!is_in_each_log(project.robot, logs, lead_s, before, finding.move.result, options)) break;
     before = finding.move.result;
-    out.push_back(in_words(finding, project, options));
+    found.push_back(std::move(finding));
   }
+  const std::vector<std::string> signals = signals_in(logs);
+  for (const ArrangementFinding& finding : found) out.push_back(in_words(finding, before, project, signals, options));
   return out;
 }
 
@@ -113,12 +137,13 @@ CheckResult check(const Project& project, const std::filesystem::path& directory
   if (project.has_role(Role::train)) {
     if (project.check.columns &&
         are_exchanged(project, read_logs(project, Role::train, directory), options.arrangement)) {
-      result.findings.push_back({true,
-                                 "exchanged",
-                                 {},
-                                 "",
-                                 "the columns of q and tau look exchanged: the URDF explains the positions as torques",
-                                 "exchange the columns of q and tau in columns = { ... }"});
+      result.findings.push_back(
+          {true,
+           "exchanged",
+           {},
+           "",
+           "the columns of q and tau look exchanged: the URDF explains the positions as torques",
+           "the columns of tau as those of q, and those of q as tau:\ncolumns = { q = .., tau = .. }"});
     } else {
       const GateData data = read_gate_data(project, directory);
       result.findings = check_columns(project, data.logs, options.arrangement);
@@ -129,6 +154,12 @@ CheckResult check(const Project& project, const std::filesystem::path& directory
     }
   }
   result.joints = joints_of(result.logs, project.robot, train);
+  for (CheckFinding& finding : saturation_of(result.joints, options.facts))
+    result.findings.push_back(std::move(finding));
+  if (train.empty() && !project.has_role(Role::train)) {
+    result.findings.push_back(
+        {false, "no_train_log", {}, "", "no log has role = \"train\": nothing is compared with the URDF", ""});
+  }
   for (CheckFinding& finding : findings_of(result.logs, project.robot, options.facts))
     result.findings.push_back(std::move(finding));
   return result;
@@ -145,7 +176,7 @@ std::string check_table(const CheckResult& result) {
   for (const CheckFinding& finding : result.findings) {
     out += fmt::format("{}: {}{}\n", finding.error ? "error" : "warning", finding.log.empty() ? "" : finding.log + ": ",
                        finding.text);
-    if (!finding.fix.empty()) out += fmt::format("    write: {}\n", finding.fix);
+    if (!finding.fix.empty()) out += fmt::format("    write {}\n", indented(finding.fix));
   }
   if (result.findings.empty()) out += "nothing is wrong with these logs\n";
   return out;

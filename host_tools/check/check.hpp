@@ -70,9 +70,13 @@ struct CheckResult {
 };
 
 LogFacts facts_of(const Log& log, const LogFactOptions& options);
+/// A time of a log for a project file: whole milliseconds, also of stamps that count from 1970.
+std::string seconds_text(double seconds);
 /// @param train processed; may be empty
 std::vector<JointFacts> joints_of(const std::vector<LogFacts>& logs, const Robot& robot,
                                   const std::vector<ProcessedLog>& train);
+/// Joints whose torque is at its limit for long.
+std::vector<CheckFinding> saturation_of(const std::vector<JointFacts>& joints, const LogFactOptions& options);
 /// What each log alone, and all of a role together, show.
 std::vector<CheckFinding> findings_of(const std::vector<LogFacts>& logs, const Robot& robot,
                                       const LogFactOptions& options);

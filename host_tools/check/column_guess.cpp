@@ -10,6 +10,7 @@
 #include <limits>
 #include <optional>
 
+#include "host_tools/signals/foreign_format.hpp"
 #include "host_tools/signals/text_file.hpp"
 #include "host_tools/support/error.hpp"
 
@@ -71,18 +72,25 @@ std::optional<Kind> kind_of(const std::vector<std::string>& words) {
   return {};
 }
 
-/// What was asked of the robot rather than measured.
+/// What was made of the measured signal: taken where that is missing.
+bool is_processed(const std::vector<std::string>& words) {
+  return std::any_of(words.begin(), words.end(), [](const std::string& word) {
+    return is_one_of(word, {"filtered", "filt", "smoothed", "est", "estimated"});
+  });
+}
+
+/// What was asked of the robot, or what the controller thinks of the outside, rather than measured.
 bool is_command(const std::vector<std::string>& words) {
   return std::any_of(words.begin(), words.end(), [](const std::string& word) {
-    return is_one_of(word,
-                     {"target", "desired", "cmd", "command", "commanded", "ref", "reference", "goal", "error", "des"});
+    return is_one_of(word, {"target", "desired", "cmd", "command", "commanded", "ref", "reference", "goal", "error",
+                            "des", "ext", "external", "residual"});
   });
 }
 
 struct Column {
   std::string name;
   Kind kind{};
-  bool command = false;
+  std::size_t rank = 0;              ///< 0: measured, 1: made of it, 2: commanded or of the controller's model
   std::optional<std::size_t> joint;  ///< by its name
   std::optional<int> number;         ///< the last one in its name
 };
@@ -111,18 +119,19 @@ Column describe(const std::string& name, const Robot& robot) {
   }
   const auto kind = kind_of(words);
   out.kind = kind.value_or(kinds);
-  out.command = is_command(words);
+  out.rank = is_command(words) ? 2 : is_processed(words) ? 1 : 0;
   return out;
 }
 
-/// One column a joint of a kind: by the joints' names, else by numbers from 0 or 1. Measured ones before commands.
-std::vector<std::string> columns_of(const std::vector<Column>& all, Kind kind, std::size_t joints) {
-  for (const bool command : {false, true}) {
+/// One column a joint of a kind: by the joints' names, else by numbers from 0 or 1. Those of lower rank first.
+std::vector<std::string> columns_of(const std::vector<Column>& all, Kind kind, std::size_t joints,
+                                    std::initializer_list<std::size_t> ranks = {0, 1, 2}) {
+  for (const std::size_t rank : ranks) {
     std::vector<std::string> named(joints), counted(joints);
     for (const int first : {1, 0}) {
       std::fill(counted.begin(), counted.end(), "");
       for (const Column& column : all) {
-        if (column.kind != kind || column.command != command) continue;
+        if (column.kind != kind || column.rank != rank) continue;
         if (column.joint && named[*column.joint].empty()) named[*column.joint] = column.name;
         const int at = column.number ? *column.number - first : (joints == 1 ? 0 : -1);
         if (at >= 0 && at < static_cast<int>(joints) && counted[static_cast<std::size_t>(at)].empty())
@@ -146,16 +155,31 @@ ColumnGuess by_names(const CsvHead& head, const Robot& robot) {
   std::vector<Column> all;
   for (const std::string& name : head.names) all.push_back(describe(name, robot));
   const auto t = std::find_if(all.begin(), all.end(), [](const Column& column) { return column.kind == time; });
-  if (t != all.end()) {
+  const auto is_nano = [](const Column& column) {
+    const std::vector<std::string> words = words_of(column.name);
+    return std::any_of(words.begin(), words.end(), [](const std::string& word) {
+      return is_one_of(word, {"nanosec", "nsec", "nsecs", "nanoseconds"});
+    });
+  };
+  if (t != all.end() && std::any_of(all.begin(), all.end(), is_nano) && words_of(t->name).back() == "sec") {
+    out.missing.push_back(fmt::format("t in one column ({} has whole seconds: add its nanoseconds / 1e9)", t->name));
+  } else if (t != all.end()) {
     out.format.columns["t"] = t->name;
   } else {
     out.missing.push_back("t");
   }
   for (const Kind kind : {position, velocity, acceleration, torque}) {
-    std::vector<std::string> names = columns_of(all, kind, robot.size());
-    if (kind == torque && names.empty()) {
-      names = columns_of(all, current, robot.size());
-      out.torque_is_current = !names.empty();
+    std::vector<std::string> names;
+    if (kind == torque) {
+      names = columns_of(all, torque, robot.size(), {0, 1});
+      if (names.empty()) names = columns_of(all, current, robot.size(), {0, 1});
+      out.torque_is_current = !names.empty() && describe(names.front(), robot).kind == current;
+    }
+    if (names.empty()) {
+      names = columns_of(all, kind, robot.size());
+      if (kind == torque && !names.empty())
+        out.notes.push_back(
+            "no measured torque or current is seen: these are commanded, or the controller's own estimate");
     }
     if (!names.empty()) {
       out.format.joint_columns[signal_of(kind)] = names;
@@ -225,6 +249,8 @@ ColumnGuess by_numbers(const CsvHead& head, const Robot& robot) {
 CsvHead read_head(const std::filesystem::path& file, std::size_t rows) {
   CsvHead head;
   MappedFile mapped(file.string());
+  if (const std::string other = foreign_format(mapped.text()); !other.empty())
+    throw InputError(fmt::format("{}: {}", file.string(), other));
   LineReader lines(mapped.text());
   std::string_view line;
   while (head.rows.size() < rows && lines.next(line)) {
@@ -240,6 +266,9 @@ CsvHead read_head(const std::filesystem::path& file, std::size_t rows) {
     std::vector<double>& row = head.rows.emplace_back();
     for (const std::string& field : fields) row.push_back(number_of(field));
   }
+  const bool one_field = head.columns == 1 && !head.names.empty();
+  if (one_field && head.names.front().find_first_of("; \t") != std::string::npos)
+    throw InputError(file.string() + ": its fields are not apart by commas: write them with commas");
   if (head.rows.size() < 2) throw InputError(file.string() + ": no rows of numbers with commas between them");
   return head;
 }

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 namespace fxdyn {
 
@@ -21,9 +22,13 @@ std::string times(double value) {
 
 class MoveWords {
  public:
-  explicit MoveWords(const Project& project) : project_(project) {
+  /// @param signals that the logs have
+  MoveWords(const Project& project, std::vector<std::string> signals)
+      : project_(project), signals_(std::move(signals)) {
     for (const LogEntry& entry : project.logs) {
-      if (entry.role == Role::train) format_ = &entry.format;
+      if (entry.role != Role::train) continue;
+      format_ = &entry.format;
+      table_ = entry.own_format ? "[[log]]" : "[signals]";
     }
   }
 
@@ -32,6 +37,8 @@ class MoveWords {
     switch (move.mistake) {
       case Mistake::swapped_joints:
         return fmt::format("the columns of {} and {} look swapped", joint(j), joint(move.other));
+      case Mistake::swapped_motion:
+        return fmt::format("q of {} and {} look swapped, their torques not", joint(j), joint(move.other));
       case Mistake::swapped_torques:
         return fmt::format("torques of {} and {} look swapped", joint(j), joint(move.other));
       case Mistake::mirrored_motion:
@@ -63,31 +70,33 @@ class MoveWords {
     return "";
   }
 
-  std::string fix(const ArrangementMove& move) const {
-    const Arrangement& now = move.result;
+  /// What to write, and on the lines after it the keys themselves. `now`: all changes that were found together, so that
+  /// each key is right whatever else is written.
+  std::string fix(const ArrangementMove& move, const Arrangement& now) const {
     switch (move.mistake) {
       case Mistake::swapped_joints:
-        return fmt::format("[signals] columns = {{ q = {}, tau = {} }}", columns("q", now.motion_from),
-                           columns("tau", now.torque_from));
+        return in_signals(columns(now, true, true));
+      case Mistake::swapped_motion:
+        return in_signals(columns(now, true, false));
       case Mistake::swapped_torques:
-        return fmt::format("[signals] columns = {{ tau = {} }}", columns("tau", now.torque_from));
+        return in_signals(columns(now, false, true));
       case Mistake::mirrored_motion:
       case Mistake::position_unit:
-        return "[signals] " + position_gain(now);
+        return in_signals(position_gain(now));
       case Mistake::mirrored_torque:
       case Mistake::torque_gain:
       case Mistake::torque_unit:
-        return "[signals] " + torque_gain(now);
+        return in_signals(torque_gain(now));
       case Mistake::mirrored_joint:
-        return fmt::format("[signals] {}, {}", position_gain(now), torque_gain(now));
+        return in_signals(position_gain(now) + "\n" + torque_gain(now));
       case Mistake::zero:
-        return fmt::format("[signals] position_offset = [{}]", offsets(now));
+        return in_signals(fmt::format("position_offset = [{}]", offsets(now)));
       case Mistake::axis:
-        return fmt::format("in the URDF, joint '{}': <axis xyz=\"{} {} {}\"/>",
-                           project_.robot.joints[static_cast<std::size_t>(move.joint)].name, move.direction.x(),
-                           move.direction.y(), move.direction.z());
+        return fmt::format("in the URDF, joint '{}':\n<axis xyz=\"{:g} {:g} {:g}\"/>",
+                           project_.robot.joints[static_cast<std::size_t>(move.joint)].name, move.direction.x() + 0.0,
+                           move.direction.y() + 0.0, move.direction.z() + 0.0);
       case Mistake::gravity:
-        return fmt::format("[robot] gravity = {}", vector(move.direction, 2));
+        return "in [robot]:\ngravity = " + vector(move.direction, 2);
     }
     return "";
   }
@@ -112,8 +121,33 @@ class MoveWords {
                        times(move.value), move.value < 1 ? "large" : "small");
   }
 
-  /// The file's columns in another order, as a list.
-  std::string columns(const std::string& signal, const std::vector<Index>& from) const {
+  std::string in_signals(const std::string& lines) const { return "in " + table_ + ":\n" + lines; }
+
+  static std::string quoted(const std::string& name) {
+    return name.starts_with('#') ? name.substr(1) : '"' + name + '"';
+  }
+
+  /// All columns that are named, those of motion or torque in the order that was found.
+  std::string columns(const Arrangement& now, bool motion, bool torque) const {
+    std::vector<std::string> keys;
+    for (const std::string& signal : signals_) {
+      const bool of_torque = signal == "tau";
+      const std::vector<Index>& from = of_torque ? now.torque_from : now.motion_from;
+      if (signal != "t" && (of_torque ? torque : motion)) {
+        keys.push_back(fmt::format("{} = {}", signal, list(signal, from)));
+      } else if (format_ != nullptr && format_->joint_columns.contains(signal)) {
+        std::vector<Index> in_order(from.size());
+        std::iota(in_order.begin(), in_order.end(), 0);
+        keys.push_back(fmt::format("{} = {}", signal, list(signal, in_order)));
+      } else if (format_ != nullptr && format_->columns.contains(signal)) {
+        keys.push_back(fmt::format("{} = {}", signal, quoted(format_->columns.at(signal))));
+      }
+    }
+    return fmt::format("columns = {{ {} }}", fmt::join(keys, ", "));
+  }
+
+  /// The columns of a signal in another order.
+  std::string list(const std::string& signal, const std::vector<Index>& from) const {
     std::vector<std::string> names;
     for (const Index j : from) {
       const auto at = static_cast<std::size_t>(j);
@@ -125,17 +159,20 @@ class MoveWords {
           name = fmt::format("{}{}", prefix->second, j + 1);
         }
       }
-      names.push_back(name.starts_with('#') ? name.substr(1) : '"' + name + '"');
+      names.push_back(quoted(name));
     }
     return fmt::format("[{}]", fmt::join(names, ", "));
   }
 
-  /// What the project has, times what was found.
+  /// What the project has, as it stands there, times what was found: signs and units as they are, else three digits.
   static std::string product(const std::vector<double>* given, const Eigen::VectorXd& found) {
     std::vector<std::string> out;
     for (Index j = 0; j < found.size(); ++j) {
       const double before = given == nullptr || given->empty() ? 1 : (*given)[static_cast<std::size_t>(j)];
-      out.push_back(fmt::format("{:.3g}", before * found[j]));
+      const double digit = std::pow(10, std::floor(std::log10(std::fabs(found[j]))) - 2);
+      const double rounded = std::round(found[j] / digit) * digit;
+      const bool unit = std::fabs(found[j] * 180 / std::numbers::pi) == 1;
+      out.push_back(fmt::format("{:.10g}", before * (unit ? found[j] : rounded)));
     }
     return fmt::format("[{}]", fmt::join(out, ", "));
   }
@@ -156,7 +193,9 @@ class MoveWords {
   }
 
   const Project& project_;
+  std::vector<std::string> signals_;
   const LogFormat* format_ = nullptr;
+  std::string table_ = "[signals]";
 };
 
 /// A gain of other units; a smaller one may be masses that the URDF has wrong.
@@ -167,8 +206,9 @@ bool is_sure(const ArrangementMove& move) {
 
 }  // namespace
 
-CheckFinding in_words(const ArrangementFinding& finding, const Project& project, const ArrangementOptions& options) {
-  const MoveWords words(project);
+CheckFinding in_words(const ArrangementFinding& finding, const Arrangement& all, const Project& project,
+                      const std::vector<std::string>& signals, const ArrangementOptions& options) {
+  const MoveWords words(project, signals);
   CheckFinding out;
   out.error = is_sure(finding.move) && finding.after < options.sure * finding.before;
   out.kind = to_string(finding.move.mistake);
@@ -176,17 +216,19 @@ CheckFinding in_words(const ArrangementFinding& finding, const Project& project,
     out.joint = static_cast<std::size_t>(finding.move.joint);
   const double odds = finding.nats / std::numbers::ln10;
   out.text = words.what(finding.move);
-  if (finding.move.mistake == Mistake::torque_unit) {  // errors before and after are in different units
+  // Errors before and after may be in different units. A fit that is hardly better may still need far less likely
+  // bodies.
+  if (finding.move.mistake == Mistake::torque_unit || finding.after > options.hardly * finding.before) {
     out.text += fmt::format(" (odds 10^{:.0f})", odds);
   } else {
     out.text +=
         fmt::format(": with that the torque error of {} falls from {:.3g} to {:.3g} {} (odds 10^{:.0f})",
                     words.joint(finding.felt), finding.before, finding.after, words.torque_unit(finding.felt), odds);
   }
-  out.fix = words.fix(finding.move);
+  out.fix = words.fix(finding.move, all);
   for (const ArrangementMove& other : finding.as_good) {
     out.text += fmt::format("; or {}", words.what(other));
-    if (const std::string fix = words.fix(other); !fix.empty()) out.fix += fmt::format(", or {}", fix);
+    if (const std::string fix = words.fix(other, other.result); !fix.empty()) out.fix += "\nor " + fix;
   }
   return out;
 }
@@ -200,7 +242,7 @@ CheckFinding in_words(const TorqueLead& lead) {
       fmt::format("torque is recorded {:.0f} ms {} the motion: {:.0f} % of it is not explained, {:.0f} % with it moved",
                   1000 * std::fabs(lead.seconds), lead.seconds > 0 ? "ahead of" : "behind", 100 * lead.before,
                   100 * lead.after),
-      fmt::format("[signals] torque_lead_s = {:.3g}", lead.seconds)};
+      fmt::format("in [signals]:\ntorque_lead_s = {:.3g}", lead.seconds)};
 }
 
 }  // namespace fxdyn

@@ -7,8 +7,10 @@
 
 namespace fxdyn {
 
-/// A mistake of columns or URDF for people: what, how much the torque error falls, and the line to write.
-CheckFinding in_words(const ArrangementFinding& finding, const Project& project, const ArrangementOptions& options);
+/// A mistake of columns or URDF for people: what, how much the torque error falls, and the lines to write.
+/// @param all the arrangement with all mistakes undone @param signals that the logs have: "t", "q", ..
+CheckFinding in_words(const ArrangementFinding& finding, const Arrangement& all, const Project& project,
+                      const std::vector<std::string>& signals, const ArrangementOptions& options);
 /// A warning: motion and torque were recorded at different times.
 CheckFinding in_words(const TorqueLead& lead);
 

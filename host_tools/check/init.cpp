@@ -95,8 +95,8 @@ void write_log_entry(const Recorded& log, const fs::path& directory, const std::
   const LogFacts& facts = log.facts;
   out += fmt::format("\n# {:.4g} s at {:.4g} Hz\n[[log]]\nfile = \"{}\"\nrole = \"{}\"\n", facts.seconds, facts.rate_hz,
                      fs::relative(log.file, directory).generic_string(), role);
-  if (from > facts.begin_s) out += fmt::format("from_s = {:.6g}\n", from);
-  if (to < facts.end_s) out += fmt::format("to_s = {:.6g}\n", to);
+  if (from > facts.begin_s) out += fmt::format("from_s = {}\n", seconds_text(from));
+  if (to < facts.end_s) out += fmt::format("to_s = {}\n", seconds_text(to));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "host_tools/check/check.hpp"
 
@@ -12,12 +13,24 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// Speeds over a window of at least 20 ms: single steps of a coarse encoder are no motion.
-Eigen::MatrixXd coarse_speed(const Log& log, Index& window) {
+/// Speeds over a window: single steps of a coarse encoder are no motion, nor is its noise.
+Eigen::MatrixXd coarse_speed(const Log& log, double window_s, Index& window) {
   window =
-      std::clamp<Index>(static_cast<Index>(std::ceil(0.02 / log.step_s)), 1, std::max<Index>(1, log.samples() / 4));
+      std::clamp<Index>(static_cast<Index>(std::ceil(window_s / log.step_s)), 1, std::max<Index>(1, log.samples() / 4));
   const Index rows = log.samples() - window;
   return (log.q.bottomRows(rows) - log.q.topRows(rows)) / (static_cast<double>(window) * log.step_s);
+}
+
+/// Deviation of white noise of a position, from the median of its third differences, of which motion has next to none.
+double noise_of(const Eigen::Ref<const VectorXd>& q) {
+  const Index n = q.size() - 3;
+  if (n < 8) return 0;
+  const VectorXd third = q.tail(n) - 3 * q.segment(2, n) + 3 * q.segment(1, n) - q.head(n);
+  std::vector<double> size(third.size());
+  std::transform(third.begin(), third.end(), size.begin(), [](double x) { return std::fabs(x); });
+  std::nth_element(size.begin(), size.begin() + n / 2, size.end());
+  constexpr double median_of_normal = 0.6745;
+  return size[static_cast<std::size_t>(n / 2)] / (median_of_normal * std::sqrt(20.0));
 }
 
 std::string of_joint(const Robot& robot, Index j) {
@@ -30,18 +43,26 @@ void add_rest(const LogFacts& log, const LogFactOptions& options, double begin, 
   if (!front && !back) return;
   std::string text, fix;
   if (front) {
-    text = fmt::format("at rest from {:.6g} to {:.6g} s", begin, log.rest_until_s);
-    fix = fmt::format("from_s = {:.6g}", log.rest_until_s);
+    text = fmt::format("at rest from {} to {} s", seconds_text(begin), seconds_text(log.rest_until_s));
+    fix = "from_s = " + seconds_text(log.rest_until_s);
   }
   if (back) {
-    text += fmt::format("{}at rest from {:.6g} to {:.6g} s", front ? ", " : "", log.rest_from_s, end);
-    fix += fmt::format("{}to_s = {:.6g}", front ? ", " : "", log.rest_from_s);
+    text +=
+        fmt::format("{}at rest from {} to {} s", front ? ", " : "", seconds_text(log.rest_from_s), seconds_text(end));
+    fix += fmt::format("{}to_s = {}", front ? "\n" : "", seconds_text(log.rest_from_s));
   }
   text += ": stiction holds any torque there, and the fit takes it for friction";
   out.push_back({false, "rest", {}, log.name, text, fix});
 }
 
 }  // namespace
+
+std::string seconds_text(double seconds) {
+  std::string text = fmt::format("{:.3f}", seconds);
+  while (text.back() == '0') text.pop_back();
+  if (text.back() == '.') text += '0';
+  return text;
+}
 
 LogFacts facts_of(const Log& log, const LogFactOptions& options) {
   LogFacts facts;
@@ -53,9 +74,9 @@ LogFacts facts_of(const Log& log, const LogFactOptions& options) {
   facts.time_note = log.time_note;
   facts.q_lower = log.q.colwise().minCoeff().transpose();
   facts.q_upper = log.q.colwise().maxCoeff().transpose();
-  Index window = 1;
-  const Eigen::MatrixXd speed = coarse_speed(log, window).cwiseAbs();
-  facts.speed = speed.colwise().maxCoeff().transpose();
+  Index short_window = 1, window = 1;
+  facts.speed = coarse_speed(log, options.speed_window_s, short_window).cwiseAbs().colwise().maxCoeff().transpose();
+  const Eigen::MatrixXd speed = coarse_speed(log, options.rest_window_s, window).cwiseAbs();
   facts.largest_torque =
       log.tau.size() > 0 ? VectorXd(log.tau.cwiseAbs().colwise().maxCoeff().transpose()) : VectorXd::Zero(log.joints());
   facts.encoder_step.resize(log.joints());
@@ -64,7 +85,9 @@ LogFacts facts_of(const Log& log, const LogFactOptions& options) {
 
   // A joint rests where it moves by less than two steps of its encoder, or by next to nothing of its speed.
   const double window_s = static_cast<double>(window) * log.step_s;
-  const VectorXd rest = (options.rest_speed * facts.speed).cwiseMax(2.01 / window_s * facts.encoder_step);
+  VectorXd rest = (options.rest_speed * facts.speed).cwiseMax(2.01 / window_s * facts.encoder_step);
+  for (Index j = 0; j < log.joints(); ++j)
+    rest[j] = std::max(rest[j], options.noise_deviations * std::numbers::sqrt2 * noise_of(log.q.col(j)) / window_s);
   const auto resting = [&](Index k) { return (speed.row(k).transpose().array() <= rest.array()).all(); };
   Index first = 0, last = speed.rows(), count = 0;
   for (Index k = 0; k < speed.rows(); ++k) count += resting(k);
@@ -72,8 +95,11 @@ LogFacts facts_of(const Log& log, const LogFactOptions& options) {
   while (last > first && resting(last - 1)) --last;
   facts.rest_share = static_cast<double>(count) / static_cast<double>(std::max<Index>(1, speed.rows()));
   const bool moves = first < last;
-  facts.rest_until_s = moves ? log.t[first] : log.t[0];
-  facts.rest_from_s = moves ? log.t[std::min(last - 1 + window, log.samples() - 1)] : log.t[log.samples() - 1];
+  // Of the first window that is not at rest only its end has moved.
+  const Index margin = window - short_window;
+  facts.rest_until_s = moves ? log.t[first > 0 ? first + margin : 0] : log.t[0];
+  facts.rest_from_s =
+      moves ? log.t[last < speed.rows() ? last - 1 + short_window : log.samples() - 1] : log.t[log.samples() - 1];
   facts.begin_s = log.t[0];
   facts.end_s = log.t[log.samples() - 1];
   return facts;
@@ -108,6 +134,20 @@ std::vector<JointFacts> joints_of(const std::vector<LogFacts>& logs, const Robot
     }
     facts.saturated_share = static_cast<double>(saturated) / static_cast<double>(std::max<Index>(1, samples));
     out.push_back(std::move(facts));
+  }
+  return out;
+}
+
+std::vector<CheckFinding> saturation_of(const std::vector<JointFacts>& joints, const LogFactOptions& options) {
+  std::vector<CheckFinding> out;
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    if (joints[j].saturated_share < options.saturated) continue;
+    out.push_back(
+        {false, "saturated", j, "",
+         fmt::format("torque of joint {} ({}) is at a limit for {:.0f} % of the train logs: that part is left "
+                     "out; record with less load or speed",
+                     j + 1, joints[j].name, 100 * joints[j].saturated_share),
+         ""});
   }
   return out;
 }

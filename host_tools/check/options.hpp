@@ -28,6 +28,15 @@ struct ArrangementOptions {
   double gain = 15;
   /// share of the error of the joint that feels it most; where more is left, it is a warning; hand
   double sure = 0.8;
+  /// share of the error of the joint that feels it most; a finding leaves no more where the URDF has not all masses;
+  /// hand
+  double vague_leaves = 0.5;
+  /// rad | m; range of a joint without limits; hand: four turns, or a long rail
+  double widest = 25;
+  /// m; a slide that covers less may be in km or its URDF in mm; hand
+  double shortest_slide = 0.01;
+  /// share of that error; where more is left, the odds alone are told; hand
+  double hardly = 0.95;
   /// nats; an arrangement that is nearer to the best is told as well; theory: log 1000
   double as_good = 6.9;
   /// rad; a smaller offset of the zero is no finding; hand: the issue asks for 20 degrees
@@ -57,8 +66,16 @@ struct ArrangementOptions {
 
 /// Thresholds of what is seen in each log alone.
 struct LogFactOptions {
+  /// share of the samples at the drive's limit that is told; hand
+  double saturated = 0.01;
   /// s; standstill at an end of a log that is worth cutting; hand
   double rest = 1;
+  /// s; the largest speed is a mean over it; hand: a step of a coarse encoder is no motion
+  double speed_window_s = 0.02;
+  /// s; at rest the mean over it is next to zero; hand: the noise of an encoder is no motion
+  double rest_window_s = 0.1;
+  /// standard deviations of a speed by noise alone; below a joint rests; theory: one in 10^4 samples exceeds it
+  double noise_deviations = 4;
   /// share of the joint's largest speed; below all joints rest; hand
   double rest_speed = 0.005;
   /// share of the URDF's range; a joint that covers less is told; hand

@@ -84,8 +84,7 @@ VectorXd diluted(const Linearised& problem) {
       r0 += x.squaredNorm();
       // Bartlett's window over two seconds
       const ProcessedLog& log = problem.logs()[b.log].log;
-      const auto span =
-          std::min<Index>(b.count, static_cast<Index>(2 / (log.step_s * static_cast<double>(log.decimation))));
+      const auto span = std::min<Index>(b.count, whole(2 / (log.step_s * static_cast<double>(log.decimation))));
       for (Index lag = 1; lag < span; ++lag)
         sum += 2 * (1 - static_cast<double>(lag) / static_cast<double>(span)) *
                x.head(b.count - lag).dot(x.tail(b.count - lag));
@@ -93,6 +92,17 @@ VectorXd diluted(const Linearised& problem) {
     if (r0 > 0) weights[static_cast<Index>(j)] /= std::max(1.0, 1 + sum / r0);
   }
   return weights;
+}
+
+/// Whether two models have the same effects in the same places.
+bool same_unknowns(const IdentifiedModel& a, const IdentifiedModel& b) {
+  const auto same = [](const std::vector<EffectFit>& of_a, const std::vector<EffectFit>& of_b) {
+    return std::equal(of_a.begin(), of_a.end(), of_b.begin(), of_b.end(),
+                      [](const EffectFit& x, const EffectFit& y) { return x.effect == y.effect; });
+  };
+  return same(a.body, b.body) &&
+         std::equal(a.joints.begin(), a.joints.end(), b.joints.begin(), b.joints.end(),
+                    [&](const JointFit& x, const JointFit& y) { return same(x.effects, y.effects); });
 }
 
 /// One diagnosis, step by step.
@@ -211,8 +221,8 @@ class Diagnoser {
   IdentifiedModel concluded(Outcome& outcome, const Gate& gate) const {
     Models& found = outcome.models;
     if (gate.groups.empty() && deflections_.found.empty()) {
-      if (found.rotors.size() != models_.rotors.size()) {
-        // The search gave up a rotor that the baseline has.
+      if (found.rotors.size() != models_.rotors.size() || !same_unknowns(found.current, models_.current)) {
+        // The search gave up a rotor that the baseline has, or leaves one that nothing of the link's torque shows now.
         found = models_;
         outcome.look_again(logs_);
       }

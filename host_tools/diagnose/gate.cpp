@@ -50,8 +50,7 @@ void add_stretches(const Linearised& problem, const Fold& fold, const VectorXd& 
     const Block& block = problem.blocks().all[b];
     if (block.healthy) continue;
     const ProcessedLog& log = problem.logs()[block.log].log;
-    const auto rows =
-        std::max<Index>(1, static_cast<Index>(stretch_s / (log.step_s * static_cast<double>(log.decimation))));
+    const auto rows = std::max<Index>(1, whole(stretch_s / (log.step_s * static_cast<double>(log.decimation))));
     for (Index first = 0; first < block.count; first += rows) {
       const Index from = block.first + first, count = std::min(rows, block.count - first);
       to.push_back({weight * before.segment(from, count).squaredNorm(),

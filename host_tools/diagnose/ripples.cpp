@@ -43,7 +43,7 @@ OverAngle over_angle(const Linearised& problem, std::size_t joint, const VectorX
     full = log.filter_columns(full);
     const auto& motion = problem.motion(l);
     // exp(i n q) g lives below the cut-off wherever the filter lets the ripple through
-    const auto stride = std::max<Index>(1, static_cast<Index>(1 / (log.step_s * 6 * cutoff_hz)));
+    const auto stride = std::max<Index>(1, whole(1 / (log.step_s * 6 * cutoff_hz)));
     for (Index k = log.first; k < log.last; k += stride) {
       out.q.push_back(motion.q(k, j));
       out.g.push_back(full[k] * static_cast<double>(stride));

@@ -28,7 +28,7 @@ void smooth(SessionLog& entry, const SessionOptions& options) {
   double& cutoff = log.filter.position_cutoff_hz;
   const double wanted = std::max(options.position_band * log.filter.excited_hz, options.lowest_position_hz);
   if (log.measured_dq.size() > 0 || wanted >= std::min(cutoff, 0.4 / log.step_s)) return;
-  const auto edge = static_cast<Index>(std::ceil(options.edge_periods / (wanted * log.step_s)));
+  const auto edge = whole_up(options.edge_periods / (wanted * log.step_s));
   const Index first = std::max(log.first, edge), last = std::min(log.last, log.samples() - edge);
   if (last - first < (log.last - log.first) / 2) return;
   cutoff = wanted;
@@ -59,7 +59,7 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
     cutoff = std::min({cutoff, options.highest_cutoff_hz, entry.log.filter.position_cutoff_hz});
     smooth(entry, options);
     entry.log.decimation = std::max<Index>(log.decimation > 8 ? log.decimation / 8 : 1,
-                                           static_cast<Index>(1 / (log.step_s * options.rows_per_period * cutoff)));
+                                           whole(1 / (log.step_s * options.rows_per_period * cutoff)));
     out.push_back(std::move(entry));
   };
   for (const ProcessedLog& log : now) add(log, false, one ? windows.front()[0] : log.t[0]);

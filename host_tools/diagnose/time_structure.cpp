@@ -89,7 +89,7 @@ TimeStructure slow_changes(const std::vector<SessionLog>& logs, const Blocks& bl
   double sum[2] = {0, 0}, count[2] = {0, 0}, rows = 0, whole = 0;
   const auto add = [&](const Block& b) {
     const ProcessedLog& log = logs[b.log].log;
-    const auto length = static_cast<Index>(options.stretch_s / (log.step_s * static_cast<double>(log.decimation)));
+    const auto length = fxdyn::whole(options.stretch_s / (log.step_s * static_cast<double>(log.decimation)));
     if (length < 2) return;
     for (Index k = 0; k + length <= b.count; k += length) {
       const double mean = e.segment(b.first + k, length).mean();

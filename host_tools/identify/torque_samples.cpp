@@ -25,6 +25,18 @@ std::vector<Index> spread_samples(Index first, Index last, Index stride) {
   return out;
 }
 
+/// Whether a drive was at its limit, or so shortly before or after that the filter shows it: the torque is not what the
+/// motion asks for.
+bool is_saturated(const ProcessedLog& log, Index sample) {
+  const Index near = whole_up(1 / (log.filter.torque_cutoff_hz * log.step_s));
+  for (const auto& ranges : log.saturated) {
+    for (const auto& [from, to] : ranges) {
+      if (sample >= from - near && sample < to + near) return true;
+    }
+  }
+  return false;
+}
+
 }  // namespace
 
 TorqueSamples sample_torque(std::span<const ProcessedLog> logs, Index wanted, double lead_s) {
@@ -40,6 +52,7 @@ TorqueSamples sample_torque(std::span<const ProcessedLog> logs, Index wanted, do
   Index rows = 0;
   for (const ProcessedLog& log : logs) {
     at.push_back(log.role == Role::train ? spread_samples(log.first, log.last, stride) : std::vector<Index>{});
+    std::erase_if(at.back(), [&](Index k) { return is_saturated(log, k); });
     rows += static_cast<Index>(at.back().size());
   }
   const Index joints = logs.front().q.cols();

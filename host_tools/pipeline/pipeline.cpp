@@ -1,6 +1,7 @@
 #include "host_tools/pipeline/pipeline.hpp"
 
 #include <fmt/format.h>
+#include <algorithm>
 
 #include <chrono>
 #include <nlohmann/json.hpp>
@@ -80,13 +81,22 @@ std::optional<IdentifiedModel> Pipeline::written(std::initializer_list<std::stri
   return wanted && is_current(model) ? std::optional(std::move(model)) : std::nullopt;
 }
 
+namespace {
+
+std::string one_line(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+}  // namespace
+
 void Pipeline::check_data() {
   if (checked_) return;
   checked_ = true;
   for (const CheckFinding& finding : check_columns(project_, data().logs)) {
     if (finding.error) {
-      throw DataError(
-          fmt::format("{}; write {}, or [check] columns = false if the columns are right", finding.text, finding.fix));
+      throw DataError(fmt::format("{}; write {}, or [check] columns = false if the columns are right", finding.text,
+                                  one_line(finding.fix)));
     }
     data_notes_.push_back(finding.text);
   }

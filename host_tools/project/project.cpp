@@ -398,6 +398,7 @@ class ProjectReader {
     set(entry.to_s, table.find("to_s"), as_number);
     if (entry.from_s && entry.to_s && !(*entry.from_s < *entry.to_s)) table.place().fail("from_s is not below to_s");
     entry.format = read_format(table, default_format_);
+    entry.own_format = entry.format != default_format_;
     if (auto payload = table.table("payload")) {
       Load load;
       if (const auto mass = payload->find("mass")) {

@@ -20,6 +20,7 @@ struct LogEntry {
   Role role = Role::train;
   std::optional<double> from_s, to_s;
   LogFormat format;
+  bool own_format = false;   ///< its [[log]] says something of it, not only [signals]
   std::optional<Load> load;  ///< a known load of this run
   int line = 0;              ///< of the [[log]] in the project file
 };

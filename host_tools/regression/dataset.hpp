@@ -11,6 +11,7 @@
 #include "host_tools/effects/forward.hpp"
 #include "host_tools/signals/log.hpp"
 #include "host_tools/signals/motion.hpp"
+#include "host_tools/signals/whole.hpp"
 
 namespace fxdyn {
 
