@@ -268,6 +268,12 @@ bool is_small(const ArrangementMove& move, const Arrangement& now, const Arrange
   }
 }
 
+/// A direction of gravity as robots are mounted, or a unit.
+bool is_simple(const ArrangementMove& move) {
+  if (move.mistake == Mistake::gravity) return true;
+  return is_gain(move.mistake) && std::fabs(std::remainder(std::log10(move.value), 1.0)) < 1e-9;
+}
+
 bool same_thing(const ArrangementMove& a, const ArrangementMove& b) {
   return a.mistake == b.mistake && a.joint == b.joint && a.other == b.other;
 }
@@ -286,9 +292,8 @@ std::vector<Scored> best_of_each(const ArrangementEvidence& evidence, const Arra
     if (best[i].score.nats >= nats + options.gain) return;
     const Scored simple = best[i];
     refine(evidence, now, best[i]);
-    // What no joint feels of a direction would be noise.
-    if (simple.move.mistake == Mistake::gravity && simple.score.nats < best[i].score.nats + options.as_good)
-      best[i] = simple;
+    // What no joint feels of a direction would be noise; and units are powers of ten.
+    if (is_simple(simple.move) && simple.score.nats < best[i].score.nats + options.as_good) best[i] = simple;
   });
   std::sort(best.begin(), best.end(), [](const Scored& a, const Scored& b) { return a.score.nats < b.score.nats; });
   return best;

@@ -55,6 +55,8 @@ struct PlausibleOptions {
   double flip = 1;
   /// score; another unit must gain; theory: likewise by 63 %; the level by hand
   double unit = 2;
+  /// -; a smaller factor of one joint's torque is a gain, which check tells; theory: between 5 and 10
+  double unit_factor = 7;
   /// score; units that are nearer to the best are as good; hand
   double as_good = 1;
   /// share of the torque's RMS; residuals below count as this; hand: perfect fits are not better than perfect

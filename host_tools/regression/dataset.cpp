@@ -84,7 +84,7 @@ double noise_floor(const VectorXd& raw, const VectorXd& filtered, double cutoff_
 /// Whether velocity holds anything above the cut-off: noise, or motion that a filter would bend.
 bool is_noisy(const VectorXd& velocity, double cutoff_hz, double step_s) {
   const VectorXd above = velocity - ZeroPhaseFilter(cutoff_hz, step_s).apply(velocity);
-  const Index edge = std::min<Index>(velocity.rows() / 4, whole(2 / (cutoff_hz * step_s)));
+  const Index edge = std::min<Index>(velocity.rows() / 4, static_cast<Index>(2 / (cutoff_hz * step_s)));
   const Index rows = velocity.rows() - 2 * edge;
   return above.middleRows(edge, rows).norm() > 1e-6 * velocity.middleRows(edge, rows).norm();
 }
@@ -136,7 +136,7 @@ bool ProcessedLog::is_saturated(Index joint, Index row) const {
   if (is_left_out(joint)) return true;
   const auto& runs = saturated[static_cast<std::size_t>(joint)];
   // The filter spreads a sample over about one period of its cut-off.
-  const auto reach = whole(1 / (filter.torque_cutoff_hz * step_s));
+  const auto reach = static_cast<Index>(1 / (filter.torque_cutoff_hz * step_s));
   const Index sample = first + row * decimation;
   return std::any_of(runs.begin(), runs.end(),
                      [&](const auto& run) { return sample >= run[0] - reach && sample < run[1] + reach; });
@@ -260,7 +260,7 @@ ProcessedLog process(Log log, const FilterFit& filter, const ProcessSettings& se
   out.load = log.load;
   out.filter = filter;
   const Index samples = log.samples(), n = log.joints();
-  const auto edge = whole_up(filter.edge_s / log.step_s);
+  const auto edge = static_cast<Index>(std::ceil(filter.edge_s / log.step_s));
   out.first = edge;
   out.last = samples - edge;
   if (out.last - out.first < 10) {
@@ -305,8 +305,9 @@ ProcessedLog process(Log log, const FilterFit& filter, const ProcessSettings& se
   out.qlink = std::move(log.qlink);
   out.tau = std::move(log.tau);
   // Eight samples a period of the cut-off lose nothing and spare work.
-  out.decimation = std::max<Index>(1, whole(1 / (log.step_s * 8 * filter.torque_cutoff_hz)));
-  out.decimation = std::max(out.decimation, whole_up(settings.shortest_interval_s / log.step_s));
+  out.decimation = std::max<Index>(1, static_cast<Index>(1 / (log.step_s * 8 * filter.torque_cutoff_hz)));
+  out.decimation =
+      std::max(out.decimation, static_cast<Index>(std::ceil(settings.shortest_interval_s / log.step_s - 1e-9)));
   return out;
 }
 

@@ -1,5 +1,4 @@
 #include "host_tools/regression/noise_cutoff.hpp"
-#include "host_tools/signals/whole.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -28,7 +27,7 @@ struct Load {
 
   void add(const Log& log, Index joint, double band_hz) {
     const ZeroPhaseFilter filter(band_hz, log.step_s);
-    const auto edge = std::min<Index>(log.samples() / 4, whole(1 / (band_hz * log.step_s)));
+    const auto edge = std::min<Index>(log.samples() / 4, static_cast<Index>(1 / (band_hz * log.step_s)));
     const VectorXd q = filter.apply(log.q.col(joint));
     const VectorXd dq =
         log.dq.size() > 0 ? VectorXd(filter.apply(log.dq.col(joint))) : VectorXd(differentiate(q, log.step_s));

@@ -1,5 +1,5 @@
 // How often `fxdyn check` finds a mistake in the columns or the URDF, on robots drawn at random whose URDF's masses are
-// off: docs/findings/check.md. Every robot is judged as it is, and with one mistake of each kind put in.
+// off. Every robot is judged as it is, and with one mistake of each kind put in.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
