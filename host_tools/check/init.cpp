@@ -23,6 +23,7 @@ std::string quoted(const std::string& column) {
 }
 std::string list(const std::vector<std::string>& columns) {
   std::vector<std::string> out;
+  out.reserve(columns.size());
   for (const std::string& column : columns) out.push_back(quoted(column));
   return fmt::format("[{}]", fmt::join(out, ", "));
 }
