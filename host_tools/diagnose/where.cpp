@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "host_tools/diagnose/shifted_residual.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/signals/spectrum.hpp"
@@ -97,9 +98,7 @@ VectorXd shifted(const Samples& samples, double turn) {
   for (std::size_t l = 0; l < samples.first.size(); ++l) {
     const Index first = samples.first[l];
     const Index rows = (l + 1 < samples.first.size() ? samples.first[l + 1] : out.size()) - first;
-    const auto by = static_cast<Index>(turn * static_cast<double>(rows));
-    out.segment(first, rows - by) = samples.power.segment(first + by, rows - by);
-    out.segment(first + rows - by, by) = samples.power.segment(first, by);
+    shift(static_cast<Index>(turn * static_cast<double>(rows)), samples.power, {l, first, rows}, out);
   }
   return out;
 }
