@@ -347,12 +347,18 @@ class ReportWriter {
   /// Where the gap of the model before sits, on the logs that fit and those that judge.
   GapPlace place_of_gap(std::size_t j, double noise) const {
     std::vector<const ProcessedLog*> logs;
-    std::vector<VectorXd> errors;
+    std::vector<VectorXd> loads, errors;
+    IdentifiedModel rigid = conclusion_.nominal;
+    for (JointFit& fit : rigid.joints) {
+      fit.effects.clear();
+      fit.bls.reset();
+    }
     for (const ProcessedLog& log : conclusion_.now) {
       logs.push_back(&log);
+      loads.emplace_back(predict(rigid, log).col(static_cast<Index>(j)));
       errors.push_back(error_of(log, predict(conclusion_.nominal, log), j));
     }
-    return where(conclusion_.nominal, logs, j, errors, noise, report_);
+    return where(conclusion_.nominal.robot.joints[j], j, logs, loads, errors, noise, report_);
   }
 
   /// Whether a named effect on the robot is felt at a joint.
