@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "host_tools/diagnose/deviations.hpp"
+#include "host_tools/diagnose/explore.hpp"
 #include "host_tools/diagnose/refit.hpp"
 
 namespace fxdyn::diagnosis {

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "host_tools/diagnose/gate.hpp"
+#include "host_tools/effects/joint_fit.hpp"
 
 namespace fxdyn::diagnosis {
 

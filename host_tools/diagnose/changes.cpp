@@ -5,8 +5,8 @@
 #include <cmath>
 #include <set>
 
-#include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/model_parts.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
@@ -21,8 +21,8 @@ bool is_changed(const Unknown& u, double beyond) {
 std::vector<EffectCandidate> changed_effects(const Linearised& problem) {
   std::vector<EffectCandidate> out;
   for (const Unknown& u : problem.unknowns()) {
-    if (!is_changed(u, problem.models().options.prior.changed)) continue;
-    const EffectFit& fit = problem.models().current.joints[u.joint].effects[u.effect];
+    if (!is_changed(u, problem.options().prior.changed)) continue;
+    const EffectFit& fit = problem.log_columns().joint(u.joint).effects[u.effect];
     // Of these, one that comes on top is the change: torques that add up, with shapes of their own.
     const EffectInfo& info = *find_effect(fit.effect);
     const bool memory_or_curve = info.friction && !info.nominal && !info.shape.empty() && !info.drifts();
@@ -33,13 +33,12 @@ std::vector<EffectCandidate> changed_effects(const Linearised& problem) {
 
 std::vector<std::string> changed_parameters(const Linearised& problem) {
   std::vector<std::string> out;
-  const Models& models = problem.models();
   std::set<std::size_t> joints;
   for (const Unknown& u : problem.unknowns()) {
-    if (!is_changed(u, problem.models().options.prior.changed)) continue;
+    if (!is_changed(u, problem.options().prior.changed)) continue;
     joints.insert(u.joint);
-    const EffectFit& now = models.current.joints[u.joint].effects[u.effect];
-    const Joint& joint = models.current.robot.joints[u.joint];
+    const EffectFit& now = problem.log_columns().joint(u.joint).effects[u.effect];
+    const Joint& joint = problem.log_columns().joint_of_robot(u.joint);
     const ParameterInfo& p = find_effect(now.effect)->linear[u.index];
     const double today = now.linear[u.index];
     const std::string_view unit = joint.type == JointType::revolute ? p.unit : p.unit_prismatic;
@@ -49,7 +48,7 @@ std::vector<std::string> changed_parameters(const Linearised& problem) {
         joint.name, now.effect, p.name, today, unit == "-" ? "" : " " + std::string(unit), today - u.value,
         find_effect(now.effect)->friction ? "friction" : "a healthy robot"));
   }
-  const auto& body = models.current.body;
+  const auto& body = body_of(problem.log_columns().current());
   const bool load = std::any_of(body.begin(), body.end(), [](const EffectFit& fit) { return fit.named; });
   if (load && 2 * joints.size() >= problem.joints()) {
     out.push_back(

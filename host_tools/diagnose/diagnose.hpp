@@ -4,10 +4,10 @@
 #include <optional>
 #include <vector>
 
-#include "host_tools/diagnose/diagnosis_result.hpp"
 #include "host_tools/diagnose/options.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/identify/identify.hpp"
+#include "host_tools/report/diagnosis_result.hpp"
 
 namespace fxdyn {
 

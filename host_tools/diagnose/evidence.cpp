@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "host_tools/diagnose/forward.hpp"
@@ -18,7 +17,6 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-using nlohmann::json;
 
 /// Sums of squares over the logs' samples, one a joint.
 struct Pooled {
@@ -33,11 +31,11 @@ struct Pooled {
     ++logs;
     samples += count;
   }
-  /// null where a log is missing or a figure is not finite.
-  json rms(std::size_t joint, std::size_t of_logs) const {
-    if (logs == 0 || static_cast<std::size_t>(logs) != of_logs) return nullptr;
+  /// None where a log is missing or a figure is not finite.
+  std::optional<double> rms(std::size_t joint, std::size_t of_logs) const {
+    if (logs == 0 || static_cast<std::size_t>(logs) != of_logs) return {};
     const double value = std::sqrt(squares[static_cast<Index>(joint)] / samples);
-    return std::isfinite(value) ? json(value) : json(nullptr);
+    return std::isfinite(value) ? std::optional(value) : std::nullopt;
   }
 };
 
@@ -92,15 +90,11 @@ std::vector<std::string> clamped(const IdentifiedModel& model, const std::vector
   return out;
 }
 
-json log_json(const ProcessedLog& log) {
-  return {{"file", log.name}, {"role", to_string(log.role)}, {"from_s", log.from_s}, {"to_s", log.to_s}};
-}
-
 }  // namespace
 
-json evidence_json(const IdentifiedModel& nominal, const IdentifiedModel& diagnosed,
-                   const std::vector<ProcessedLog>& held_out, const std::vector<bool>& still) {
-  json logs = json::array(), joints = json::array();
+HeldOutEvidence held_out_evidence(const IdentifiedModel& nominal, const IdentifiedModel& diagnosed,
+                                  const std::vector<ProcessedLog>& held_out, const std::vector<bool>& still) {
+  HeldOutEvidence out;
   Pooled before, after, fixed, noise;
   Firmware firmware(diagnosed);
   std::vector<const ProcessedLog*> judged;
@@ -108,7 +102,7 @@ json evidence_json(const IdentifiedModel& nominal, const IdentifiedModel& diagno
   for (const ProcessedLog& log : held_out) {
     if (log.tau.size() == 0) continue;
     judged.push_back(&log);
-    logs.push_back(log_json(log));
+    out.held_out.push_back({log.name, log.role, log.from_s, log.to_s});
     before.add(judge(log, predict(nominal, log)), &JointMetrics::rmse, log);
     const auto with_effects = judge(log, predict(diagnosed, log));
     after.add(with_effects, &JointMetrics::rmse, log);
@@ -123,31 +117,23 @@ json evidence_json(const IdentifiedModel& nominal, const IdentifiedModel& diagno
       why_not_fixed = error.what();
     }
   }
-  for (std::size_t j = 0; j < diagnosed.robot.size() && !judged.empty(); ++j) {
+  if (judged.empty()) {
+    out.note = "no log was held out: nothing that the search has not seen";
+    out.fixed_point.why_not = "no log was held out";
+    return out;
+  }
+  for (std::size_t j = 0; j < diagnosed.robot.size(); ++j) {
     // Of what stands still these logs tell nothing.
     const auto figure = [&](const Pooled& of) {
-      return j < still.size() && still[j] ? json(nullptr) : of.rms(j, judged.size());
+      return j < still.size() && still[j] ? std::nullopt : of.rms(j, judged.size());
     };
-    joints.push_back({{"joint", diagnosed.robot.joints[j].name},
-                      {"index", j + 1},
-                      {"unit", diagnosed.robot.joints[j].torque_unit()},
-                      {"rms_before", figure(before)},
-                      {"rms_after", figure(after)},
-                      {"rms_after_fixed", figure(fixed)},
-                      {"noise_floor", figure(noise)}});
+    out.joints.push_back({diagnosed.robot.joints[j].name, diagnosed.robot.joints[j].torque_unit(), figure(before),
+                          figure(after), figure(fixed), figure(noise)});
   }
-  json out = {{"held_out", logs}, {"joints", joints}, {"fixed_point", {{"computed", !why_not_fixed}}}};
-  if (why_not_fixed) out["fixed_point"]["why_not"] = *why_not_fixed;
-  out["fixed_point"]["notes"] = clamped(diagnosed, judged);
-  if (judged.empty()) {
-    out["note"] = "no log was held out: nothing that the search has not seen";
-    out["fixed_point"] = {{"computed", false}, {"why_not", "no log was held out"}};
-    out["forward"] = nullptr;
-  } else {
-    out["forward"] = forward_json(nominal, diagnosed, judged);
-    if (held_out.front().role == Role::validate)
-      out["note"] = "no test log: the validate logs fitted nothing, but decided which names stay";
-  }
+  out.fixed_point = {!why_not_fixed, why_not_fixed.value_or(""), clamped(diagnosed, judged)};
+  out.forward = play_forward(nominal, diagnosed, judged);
+  if (held_out.front().role == Role::validate)
+    out.note = "no test log: the validate logs fitted nothing, but decided which names stay";
   return out;
 }
 

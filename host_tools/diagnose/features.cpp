@@ -7,10 +7,9 @@
 #include <utility>
 
 #include "host_tools/diagnose/linearised.hpp"
-#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/support/random.hpp"
-#include "model/effects/presliding.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
@@ -120,7 +119,7 @@ class Functions {
     add(load * (dq_ * 40).tanh());
     for (const double distance : {1e-3, 5e-3}) {
       const JointSeries series{motion_.q.col(j()), motion_.dq.col(j()), motion_.ddq.col(j()), {}, motion_.step_s};
-      add(effect_columns(Presliding::name, std::array{turns ? distance : 0.1 * distance}, sign_width, series)
+      add(effect_columns(presliding_effect().name, std::array{turns ? distance : 0.1 * distance}, sign_width, series)
               .col(0)
               .array());
     }

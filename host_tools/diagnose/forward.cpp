@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <nlohmann/json.hpp>
+#include <optional>
 
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/forward/forward.hpp"
@@ -17,7 +17,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using nlohmann::json;
 
 constexpr double longest_s = 20;
 /// The plant's friction states start at rest and its motion starts beside the recorded one.
@@ -45,12 +44,14 @@ Differences play(const IdentifiedModel& model, const ProcessedLog& log, Index co
   return {rms(run.q - motion.q), rms(log.filter_columns(run.tau - feedforward))};
 }
 
-json at(const VectorXd& values, Index j) { return values.size() > 0 ? json(values[j]) : json(nullptr); }
+std::optional<double> at(const VectorXd& values, Index j) {
+  return values.size() > 0 ? std::optional(values[j]) : std::nullopt;
+}
 
 }  // namespace
 
-json forward_json(const IdentifiedModel& nominal, const IdentifiedModel& diagnosed,
-                  const std::vector<const ProcessedLog*>& logs) {
+PlayedForward play_forward(const IdentifiedModel& nominal, const IdentifiedModel& diagnosed,
+                           const std::vector<const ProcessedLog*>& logs) {
   const auto length = [](const ProcessedLog* log) { return static_cast<double>(log->last - log->first) * log->step_s; };
   const ProcessedLog& log =
       **std::max_element(logs.begin(), logs.end(), [&](auto* a, auto* b) { return length(a) < length(b); });
@@ -69,25 +70,13 @@ json forward_json(const IdentifiedModel& nominal, const IdentifiedModel& diagnos
     }
   });
   const auto& [before, after] = runs;
-  json joints = json::array();
+  PlayedForward out{log.name, log.t[log.first], static_cast<double>(count) * log.step_s, {}, why[0], why[1]};
   for (std::size_t j = 0; j < diagnosed.robot.size(); ++j) {
     const Joint& joint = diagnosed.robot.joints[j];
     const auto k = static_cast<Index>(j);
-    joints.push_back({{"joint", joint.name},
-                      {"index", j + 1},
-                      {"tracking_before", at(before.tracking, k)},
-                      {"tracking_after", at(after.tracking, k)},
-                      {"tracking_unit", joint.position_unit()},
-                      {"torque_before", at(before.torque, k)},
-                      {"torque_after", at(after.torque, k)},
-                      {"torque_unit", joint.torque_unit()}});
+    out.joints.push_back({joint.name, joint.position_unit(), joint.torque_unit(), at(before.tracking, k),
+                          at(after.tracking, k), at(before.torque, k), at(after.torque, k)});
   }
-  json out = {{"log", log.name},
-              {"from_s", log.t[log.first]},
-              {"seconds", static_cast<double>(count) * log.step_s},
-              {"joints", joints}};
-  if (!why[0].empty()) out["failed"]["before"] = why[0];
-  if (!why[1].empty()) out["failed"]["after"] = why[1];
   return out;
 }
 

@@ -1,10 +1,10 @@
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <vector>
 
 #include "host_tools/effects/forward.hpp"
 #include "host_tools/regression/dataset.hpp"
+#include "host_tools/report/evidence_result.hpp"
 
 namespace fxdyn {
 
@@ -20,10 +20,10 @@ namespace fxdyn {
 ///
 /// A plant that is the robot would follow by itself. So what the PD has to add, and what remains of the position error,
 /// is the plant's share that is still wrong: per joint the RMS of q - q_recorded [rad | m] and, filtered like the log,
-/// of tau - tau_recorded [N*m | N], without the first second, in which the loop settles. A plant that fails has null
-/// and its reason in "failed".
+/// of tau - tau_recorded [N*m | N], without the first second, in which the loop settles. A plant that fails has no
+/// figures, and `failed_before` or `failed_after` says why.
 /// @param logs with torque; at least one
-nlohmann::json forward_json(const IdentifiedModel& nominal, const IdentifiedModel& diagnosed,
-                            const std::vector<const ProcessedLog*>& logs);
+PlayedForward play_forward(const IdentifiedModel& nominal, const IdentifiedModel& diagnosed,
+                           const std::vector<const ProcessedLog*>& logs);
 
 }  // namespace fxdyn

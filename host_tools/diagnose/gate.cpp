@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "host_tools/diagnose/deviations.hpp"
+#include "host_tools/diagnose/explore.hpp"
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"

@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "host_tools/diagnose/explore.hpp"
+#include "host_tools/diagnose/finding.hpp"
 #include "host_tools/diagnose/own_evidence.hpp"
 #include "host_tools/effects/forward.hpp"
 

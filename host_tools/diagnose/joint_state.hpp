@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "host_tools/diagnose/diagnosis_result.hpp"
+#include "host_tools/report/diagnosis_result.hpp"
 
 namespace fxdyn::diagnosis {
 

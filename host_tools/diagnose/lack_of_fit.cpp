@@ -3,12 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host_tools/diagnose/models.hpp"
 #include "host_tools/diagnose/shifted_residual.hpp"
 #include "host_tools/diagnose/time_structure.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/random.hpp"
-#include "model/effects/presliding.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
@@ -168,7 +166,7 @@ VectorXd residual_with_background(const Linearised& problem, std::size_t joint, 
 /// @param with_healthy the residual with the healthy session's rows in it
 TimeStructure in_time(const Linearised& problem, const VectorXd& residual, const std::vector<std::size_t>& blocks,
                       const VectorXd& with_healthy) {
-  const LackOfFitOptions& options = problem.models().options.lack_of_fit;
+  const LackOfFitOptions& options = problem.options().lack_of_fit;
   TimeStructure out = spectral_lines(problem.logs(), problem.blocks(), residual, blocks, options);
   if (!problem.has_baseline()) return out;
   const TimeStructure slow = slow_changes(problem.logs(), problem.blocks(), with_healthy, blocks, options);
@@ -213,7 +211,7 @@ LackOfFit lack_of_fit(const Linearised& problem, std::size_t joint, const Linear
     // The columns are fitted to both sessions; today's rows bear their share of them.
     const double rest = today.rows - fitted * today.rows / fit.rows[k] - rank;
     // With hardly more rows than functions no statement is possible.
-    if (rank == 0 || rest <= problem.models().options.lack_of_fit.free_rows * rank) return 1.0;
+    if (rank == 0 || rest <= problem.options().lack_of_fit.free_rows * rank) return 1.0;
     VectorXd null(draws);
     for (Index s = 0; s < null.size(); ++s) null[s] = statistic(theirs.col(s));
     const double mean = null.mean(),

@@ -6,7 +6,6 @@
 #include "host_tools/diagnose/base_parameters.hpp"
 #include "host_tools/diagnose/design_matrix.hpp"
 #include "host_tools/diagnose/features.hpp"
-#include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/parallel.hpp"
@@ -62,8 +61,7 @@ void Linearised::whiten(std::size_t joint) {
 void Linearised::add_background(std::size_t joint) {
   MatrixXd functions = features(log_columns_, noise_, blocks(), joint, true);
   functions.conservativeResize(Eigen::NoChange, functions.cols() - time_features);
-  auto background =
-      std::make_unique<Background>(std::move(functions), blocks(), models().options.noise.background_prior);
+  auto background = std::make_unique<Background>(std::move(functions), blocks(), options().noise.background_prior);
   const JointRows& rows = solver_->rows(joint);
   const Index total = rows.x.rows();
   const MatrixXd x = background->eliminate(rows.x), y = background->eliminate(rows.y);

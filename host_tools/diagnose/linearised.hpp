@@ -24,6 +24,7 @@ class Linearised {
   Linearised(const Models& models, const std::vector<SessionLog>& logs, std::vector<Eigen::VectorXd> whitening = {});
 
   const Models& models() const { return log_columns_.models(); }
+  const Options& options() const { return log_columns_.options(); }
   bool has_baseline() const { return log_columns_.has_baseline(); }
   const std::vector<SessionLog>& logs() const { return log_columns_.logs(); }
   std::size_t joints() const { return log_columns_.joints(); }

@@ -41,6 +41,7 @@ LogColumns::LogColumns(const Models& models, const std::vector<SessionLog>& logs
   });
 }
 
+const Options& LogColumns::options() const { return models_->options; }
 std::size_t LogColumns::joints() const { return models_->current.joints.size(); }
 bool LogColumns::has_baseline() const { return models_->has_baseline; }
 const std::vector<std::size_t>& LogColumns::background() const { return models_->background; }

@@ -7,6 +7,7 @@
 #include <tuple>
 #include <vector>
 
+#include "host_tools/diagnose/options.hpp"
 #include "host_tools/diagnose/session_log.hpp"
 #include "host_tools/diagnose/unknowns.hpp"
 #include "host_tools/effects/robot_columns.hpp"
@@ -22,6 +23,7 @@ class LogColumns {
   LogColumns(const Models& models, const std::vector<SessionLog>& logs);
 
   const Models& models() const { return *models_; }
+  const Options& options() const;
   const std::vector<SessionLog>& logs() const { return *logs_; }
   std::size_t joints() const;
   bool has_baseline() const;

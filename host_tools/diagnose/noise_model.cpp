@@ -5,7 +5,6 @@
 
 #include "host_tools/diagnose/autoregression.hpp"
 #include "host_tools/diagnose/features.hpp"
-#include "host_tools/diagnose/models.hpp"
 #include "host_tools/diagnose/velocity_doubt.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/parallel.hpp"
@@ -107,7 +106,7 @@ NoiseModel estimate_noise(const LogColumns& columns, const BlockSolver& solver, 
                           std::vector<VectorXd> whitening) {
   const Blocks& blocks = solver.blocks();
   const std::size_t n = columns.joints();
-  const NoiseOptions& options = columns.models().options.noise;
+  const NoiseOptions& options = columns.options().noise;
   std::vector<VectorXd> coefficients(n), doubts(n);
   parallel_for(n, [&](std::size_t j) {
     const auto k = static_cast<Index>(j);

@@ -7,7 +7,7 @@
 #include <limits>
 #include <numeric>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/page/diagnosis_plot.hpp"
 #include "host_tools/page/plot.hpp"
 #include "host_tools/signals/spectrum.hpp"
@@ -146,15 +146,15 @@ std::vector<std::size_t> shown_joints(const DiagnosisResult& diagnosis, std::siz
 std::vector<fs::path> write_diagnosis_plots(const IdentifiedModel& nominal, const IdentifiedModel& diagnosed,
                                             const std::vector<ProcessedLog>& held_out, const DiagnosisResult& diagnosis,
                                             const fs::path& directory) {
-  for (std::size_t j = 0; j < diagnosed.robot.size(); ++j) fs::remove(diagnosis_plot(directory, j));
+  for (std::size_t j = 0; j < robot_of(diagnosed).size(); ++j) fs::remove(diagnosis_plot(directory, j));
   std::vector<Residuals> logs;
   for (const ProcessedLog& log : held_out) {
     if (log.tau.size() > 0) logs.push_back(residuals(log, nominal, diagnosed));
   }
   std::vector<fs::path> files;
   if (logs.empty()) return files;
-  for (const std::size_t j : shown_joints(diagnosis, diagnosed.robot.size())) {
-    const Joint& joint = diagnosed.robot.joints[j];
+  for (const std::size_t j : shown_joints(diagnosis, robot_of(diagnosed).size())) {
+    const Joint& joint = robot_of(diagnosed).joints[j];
     const auto k = static_cast<Index>(j);
     const auto gain = [&](const Residuals& log) {
       return log.log->step_s * (log.before.col(k).squaredNorm() - log.after.col(k).squaredNorm());

@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <vector>
 
-#include "host_tools/diagnose/diagnosis_result.hpp"
 #include "host_tools/effects/forward.hpp"
 #include "host_tools/regression/dataset.hpp"
+#include "host_tools/report/diagnosis_result.hpp"
 
 namespace fxdyn {
 

@@ -5,7 +5,6 @@
 
 #include "host_tools/diagnose/dictionary.hpp"
 #include "host_tools/diagnose/gain.hpp"
-#include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/regression/search_beside.hpp"
 #include "host_tools/regression/solver.hpp"
@@ -68,7 +67,7 @@ class ShapeSearch {
     const MatrixXd z = inverse_ * cross;
     reduced.gram -= cross.transpose() * z;
     reduced.projection -= z.transpose() * projection_;
-    return gain_of(reduced, group_.lower, is_share(group_), problem_.models().options.search.beyond_bound).square;
+    return gain_of(reduced, group_.lower, is_share(group_), problem_.options().search.beyond_bound).square;
   }
 
   /// @param cross between the fit's columns and the candidate's

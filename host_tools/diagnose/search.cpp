@@ -6,7 +6,6 @@
 #include <numbers>
 #include <set>
 
-#include "host_tools/diagnose/models.hpp"
 #include "host_tools/diagnose/refine.hpp"
 #include "host_tools/diagnose/shifted_residual.hpp"
 #include "host_tools/effects/effects.hpp"
@@ -56,7 +55,7 @@ bool of_spectrum(const Group& group) { return find_effect(group.candidate.effect
 
 }  // namespace
 
-const SearchOptions& Search::options() const { return problem_.models().options.search; }
+const SearchOptions& Search::options() const { return problem_.options().search; }
 
 double Search::samples() const {
   double rows = 0;
@@ -440,7 +439,7 @@ std::vector<Found> Search::explain(Choice& choice) {
 std::vector<Found> Search::explain(const Choice& choice, std::optional<Choice>& better) {
   // Parts of a motion that was fitted like whatever bends to that motion.
   const bool others_judge = other_logs_judge(problem_.blocks());
-  const double clear = -2 * std::numbers::ln10 * problem_.models().options.gate.likely;
+  const double clear = -2 * std::numbers::ln10 * problem_.options().gate.likely;
   double least = clear;
   std::vector<Found> out;
   const VectorXd weights = weights_of(choice.fit);

@@ -7,13 +7,18 @@
 
 namespace fxdyn::diagnosis {
 
-/// The residual of a block at other times, its end followed by its beginning: the same noise, which has nothing to do
-/// with the motion. Moved by a random part of the block, not by less than 8 % either way.
+/// Values of a block at other times, `by` rows later, its end followed by its beginning: the same noise, which has
+/// nothing to do with the motion.
+inline void shift(Eigen::Index by, const Eigen::VectorXd& values, const Block& block, Eigen::Ref<Eigen::VectorXd> out) {
+  out.segment(block.first, block.count - by) = values.segment(block.first + by, block.count - by);
+  out.segment(block.first + block.count - by, by) = values.segment(block.first, by);
+}
+
+/// The same, moved by a random part of the block, not by less than 8 % either way.
 inline void shift(Random& random, const Eigen::VectorXd& residual, const Block& block,
                   Eigen::Ref<Eigen::VectorXd> out) {
   const auto by = static_cast<Eigen::Index>(random.uniform(0.08, 0.92) * static_cast<double>(block.count));
-  out.segment(block.first, block.count - by) = residual.segment(block.first + by, block.count - by);
-  out.segment(block.first + block.count - by, by) = residual.segment(block.first, by);
+  shift(by, residual, block, out);
 }
 
 }  // namespace fxdyn::diagnosis

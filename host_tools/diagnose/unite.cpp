@@ -2,9 +2,9 @@
 #include <cmath>
 
 #include "host_tools/diagnose/dictionary.hpp"
-#include "host_tools/diagnose/models.hpp"
 #include "host_tools/diagnose/refine.hpp"
 #include "host_tools/diagnose/search.hpp"
+#include "host_tools/effects/joint_fit.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
@@ -135,7 +135,7 @@ Choice Search::unite(Choice best) {
   for (const EffectInfo& info : effect_infos()) {
     for (std::size_t j = 0; info.unites_others() && j < problem_.joints(); ++j) {
       // What the healthy session has already of that law is no finding, nor is it to be found twice.
-      const std::vector<EffectFit>& known = problem_.models().current.joints[j].effects;
+      const std::vector<EffectFit>& known = problem_.log_columns().joint(j).effects;
       if (std::any_of(known.begin(), known.end(), [&](const EffectFit& fit) {
             return !fit.named && (fit.effect == info.name || is_united(info, fit.effect));
           }))

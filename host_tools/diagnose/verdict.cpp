@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "host_tools/diagnose/explore.hpp"
 #include "host_tools/diagnose/gap_errors.hpp"
 #include "host_tools/diagnose/where.hpp"
 #include "host_tools/effects/effect_roles.hpp"
@@ -210,7 +211,7 @@ class ReportWriter {
     out.score = seen.score;
     // The score is twice the logarithm of a Bayes factor.
     out.odds_nothing = seen.score / (2 * std::numbers::ln10);
-    out.established = out.odds_nothing >= problem_.models().options.gate.established;
+    out.established = out.odds_nothing >= problem_.options().gate.established;
     if (seen.held_out) out.held_out_closure = seen.closure;
     out.signal = "q - qlink";
     out.model_share = model_share(seen.joint, static_cast<std::size_t>(place - joint.effects.begin()));
@@ -346,12 +347,18 @@ class ReportWriter {
   /// Where the gap of the model before sits, on the logs that fit and those that judge.
   GapPlace place_of_gap(std::size_t j, double noise) const {
     std::vector<const ProcessedLog*> logs;
-    std::vector<VectorXd> errors;
+    std::vector<VectorXd> loads, errors;
+    IdentifiedModel rigid = conclusion_.nominal;
+    for (JointFit& fit : rigid.joints) {
+      fit.effects.clear();
+      fit.bls.reset();
+    }
     for (const ProcessedLog& log : conclusion_.now) {
       logs.push_back(&log);
+      loads.emplace_back(predict(rigid, log).col(static_cast<Index>(j)));
       errors.push_back(error_of(log, predict(conclusion_.nominal, log), j));
     }
-    return where(conclusion_.nominal, logs, j, errors, noise, report_);
+    return where(conclusion_.nominal.robot.joints[j], j, logs, loads, errors, noise, report_);
   }
 
   /// Whether a named effect on the robot is felt at a joint.
@@ -359,7 +366,7 @@ class ReportWriter {
     for (std::size_t i = 0; i < conclusion_.gate.groups.size(); ++i) {
       const Group& group = problem_.groups()[conclusion_.gate.groups[i]];
       if (group.on_body && conclusion_.model.body[group.id.effect].named &&
-          conclusion_.gate.held.alone[i][joint] > problem_.models().options.gate.least_felt)
+          conclusion_.gate.held.alone[i][joint] > problem_.options().gate.least_felt)
         return true;
     }
     return false;
@@ -378,7 +385,7 @@ class ReportWriter {
       const std::size_t i = gate.place(problem_, id);
       one.joints.emplace();
       for (std::size_t j = 0; j < conclusion_.model.joints.size(); ++j) {
-        if (gate.held.alone[i][static_cast<Index>(j)] > problem_.models().options.gate.least_felt)
+        if (gate.held.alone[i][static_cast<Index>(j)] > problem_.options().gate.least_felt)
           one.joints->push_back(j + 1);
       }
       one.model_share = body_share(e);

@@ -6,10 +6,10 @@
 
 #include "host_tools/diagnose/certainty.hpp"
 #include "host_tools/diagnose/deflection.hpp"
-#include "host_tools/diagnose/diagnosis_result.hpp"
 #include "host_tools/diagnose/gate.hpp"
 #include "host_tools/diagnose/impacts.hpp"
 #include "host_tools/diagnose/joint_state.hpp"
+#include "host_tools/report/diagnosis_result.hpp"
 
 namespace fxdyn::diagnosis {
 

@@ -6,8 +6,7 @@
 #include <cmath>
 #include <optional>
 
-#include "host_tools/effects/evaluator.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/diagnose/shifted_residual.hpp"
 #include "host_tools/signals/spectrum.hpp"
 
 namespace fxdyn::diagnosis {
@@ -97,9 +96,7 @@ VectorXd shifted(const Samples& samples, double turn) {
   for (std::size_t l = 0; l < samples.first.size(); ++l) {
     const Index first = samples.first[l];
     const Index rows = (l + 1 < samples.first.size() ? samples.first[l + 1] : out.size()) - first;
-    const auto by = static_cast<Index>(turn * static_cast<double>(rows));
-    out.segment(first, rows - by) = samples.power.segment(first + by, rows - by);
-    out.segment(first + rows - by, by) = samples.power.segment(first, by);
+    shift(static_cast<Index>(turn * static_cast<double>(rows)), samples.power, {l, first, rows}, out);
   }
   return out;
 }
@@ -119,30 +116,24 @@ std::optional<Region> concentrated(const std::string& signal, const VectorXd& va
   return best;
 }
 
-Samples samples_of(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs, std::size_t joint,
+Samples samples_of(const std::vector<const ProcessedLog*>& logs, std::size_t joint, const std::vector<VectorXd>& load,
                    const std::vector<VectorXd>& error) {
   const auto j = static_cast<Index>(joint);
   Index total = 0;
   for (const ProcessedLog* log : logs) total += log->rows();
   Samples out;
   for (VectorXd* v : {&out.q, &out.dq, &out.ddq, &out.load, &out.t, &out.power}) v->resize(total);
-  IdentifiedModel rigid = model;
-  for (JointFit& fit : rigid.joints) {
-    fit.effects.clear();
-    fit.bls.reset();
-  }
   Index row = 0;
   for (std::size_t l = 0; l < logs.size(); ++l) {
     const ProcessedLog& log = *logs[l];
     out.first.push_back(row);
     const MotionRows m = log.joint_motion(j);
-    const VectorXd structural = predict(rigid, log).col(j);
     for (Index r = 0; r < log.rows(); ++r, ++row) {
       const Index k = log.first + r * log.decimation;
       out.q[row] = m.q(k, 0);
       out.dq[row] = m.dq(k, 0);
       out.ddq[row] = m.ddq(k, 0);
-      out.load[row] = structural[k];
+      out.load[row] = load[l][k];
       out.t[row] = log.t[k];
       out.power[row] = error[l][k] * error[l][k];
     }
@@ -214,9 +205,10 @@ std::string sentence(const GapRegion& region, const Joint& joint) {
 
 }  // namespace
 
-GapPlace where(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs, std::size_t joint,
-               const std::vector<VectorXd>& error, double noise, const ReportOptions& options) {
-  Samples samples = samples_of(model, logs, joint, error);
+GapPlace where(const Joint& joint, std::size_t index, const std::vector<const ProcessedLog*>& logs,
+               const std::vector<VectorXd>& load, const std::vector<VectorXd>& error, double noise,
+               const ReportOptions& options) {
+  Samples samples = samples_of(logs, index, load, error);
   take_noise(logs, samples, noise);
   std::vector<Region> regions;
   const auto add = [&](const std::string& signal, const VectorXd& values) {
@@ -242,8 +234,8 @@ GapPlace where(const IdentifiedModel& model, const std::vector<const ProcessedLo
     out.regions.push_back(
         {region.signal, region.from, region.to, std::min(1.0, region.share), region.of_time, region.log});
   }
-  out.sentence = out.regions.empty() ? "the gap is the same everywhere in these logs"
-                                     : sentence(out.regions.front(), model.robot.joints[joint]);
+  out.sentence =
+      out.regions.empty() ? "the gap is the same everywhere in these logs" : sentence(out.regions.front(), joint);
   return out;
 }
 

@@ -82,6 +82,34 @@ const EffectInfo& constant_effect() {
   return found;
 }
 
+const EffectInfo& presliding_effect() {
+  static const EffectInfo& found = first_that(
+      [](const EffectInfo& info) { return info.identified > 0 && info.replaces == dry_friction_effect().name; },
+      "friction that builds up over a path");
+  return found;
+}
+
+const EffectInfo& compliance_effect() {
+  static const EffectInfo& found = first_that(is_compliance, "a compliance");
+  return found;
+}
+
+const EffectInfo& play_effect() {
+  static const EffectInfo& found =
+      first_that([](const EffectInfo& info) { return info.bends() && info.linear[0].quantity == Quantity::unit; },
+                 "play of the gear");
+  return found;
+}
+
+const EffectInfo& once_a_turn_effect() {
+  static const EffectInfo& found = first_that(
+      [](const EffectInfo& info) {
+        return info.acts_on == ActsOn::position && !info.needs_structural && info.needs_revolute;
+      },
+      "an error that repeats once a turn");
+  return found;
+}
+
 bool is_compliance(const EffectInfo& info) { return info.bends() && info.linear[0].quantity == Quantity::torque; }
 
 const EffectFit* dry_friction_of(const JointFit& joint) {

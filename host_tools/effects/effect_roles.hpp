@@ -24,6 +24,14 @@ const EffectInfo& viscous_friction_effect();
 const EffectInfo& friction_of_load_effect();
 /// The nominal torque that never changes.
 const EffectInfo& constant_effect();
+/// The friction that builds up over a path after a reversal, in place of dry friction.
+const EffectInfo& presliding_effect();
+/// The gear that bends in proportion to the load.
+const EffectInfo& compliance_effect();
+/// The gear that bends by a gap, whichever the load.
+const EffectInfo& play_effect();
+/// An error of position that repeats once a turn, whatever the load.
+const EffectInfo& once_a_turn_effect();
 /// Whether it bends the gear in proportion to the load.
 bool is_compliance(const EffectInfo& info);
 

@@ -8,16 +8,13 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/gauss_newton.hpp"
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/regression/sandwich.hpp"
 #include "host_tools/support/parallel.hpp"
-#include "model/effects/backlash.hpp"
-#include "model/effects/eccentricity.hpp"
-#include "model/effects/elasticity.hpp"
 
 namespace fxdyn {
 namespace {
@@ -139,7 +136,7 @@ class JointData {
     return stack([&](std::size_t l) {
       JointSeries series = series_[l];
       series.structural = columns[l];
-      return effect_columns(Elasticity::name, std::array{relaxation}, sign_width_, series);
+      return effect_columns(compliance_effect().name, std::array{relaxation}, sign_width_, series);
     });
   }
 
@@ -212,9 +209,9 @@ GearFit without_other_causes(const JointData& data, const IdentifiedModel& model
                              bool with_rotor, bool revolute, double all, std::string& note, Eigen::MatrixXd& others,
                              const FlexibleOptions& options) {
   std::vector<Cause> list;
-  if (revolute) list.push_back({Eccentricity::name, {}, "an eccentric gear or encoder disc"});
+  if (revolute) list.push_back({once_a_turn_effect().name, {}, "an eccentric gear or encoder disc"});
   for (const double share : {0.01, 0.03, 0.1})
-    list.push_back({Backlash::name, {share * std::max(1e-3, data.largest_load())}, "play"});
+    list.push_back({play_effect().name, {share * std::max(1e-3, data.largest_load())}, "play"});
   GearFit fit = fit_gear(data, with_rotor, others);
   for (int round = 0; round < 2; ++round) {
     const Cause* best = nullptr;
@@ -365,7 +362,7 @@ EffectFit elasticity_effect(const FlexibleJoint& joint, const FlexibleOptions& o
   const bool damped = joint.damping > options.damped * joint.damping_std;
   const double k = joint.stiffness;
   EffectFit fit;
-  fit.effect = Elasticity::name;
+  fit.effect = compliance_effect().name;
   fit.shape = {damped ? std::min(1.0, joint.damping / k) : 0.0};
   fit.shape_std = {joint.damping_std / k};
   fit.linear = {1 / k};

@@ -9,6 +9,7 @@
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/effects/link_parameters.hpp"
+#include "host_tools/regression/joint_weight.hpp"
 #include "host_tools/regression/physical.hpp"
 #include "host_tools/regression/sandwich.hpp"
 #include "host_tools/regression/solver.hpp"
@@ -113,9 +114,8 @@ Fit solve(const Rows& rows, double faded) {
     fit.projection = VectorXd::Zero(p);
     for (Index j = 0; j < n; ++j) {
       const auto at = static_cast<std::size_t>(j);
-      const double square = rows.missing[at].squaredNorm();
-      weights[j] =
-          static_cast<double>(rows.missing[at].size()) / std::max(residual(j).squaredNorm(), 1e-18 * square + 1e-300);
+      weights[j] = joint_weight(static_cast<double>(rows.missing[at].size()), residual(j).squaredNorm(),
+                                rows.missing[at].squaredNorm());
       place(fit.information, j, weights[j] * rows.columns[at].transpose() * rows.columns[at]);
       const VectorXd b = weights[j] * rows.columns[at].transpose() * rows.missing[at];
       fit.projection.head(ten) += b.head(ten);

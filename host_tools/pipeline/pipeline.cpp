@@ -8,7 +8,6 @@
 
 #include "host_tools/check/check.hpp"
 #include "host_tools/diagnose/diagnose.hpp"
-#include "host_tools/diagnose/diagnosis_result.hpp"
 #include "host_tools/diagnose/evidence.hpp"
 #include "host_tools/diagnose/plots.hpp"
 #include "host_tools/effects/identified_model.hpp"
@@ -19,6 +18,7 @@
 #include "host_tools/pipeline/tables_export.hpp"
 #include "host_tools/pipeline/training.hpp"
 #include "host_tools/project/provenance.hpp"
+#include "host_tools/report/diagnosis_result.hpp"
 #include "host_tools/report/report.hpp"
 #include "host_tools/robot/write_urdf.hpp"
 #include "host_tools/simulate/recordings.hpp"
@@ -213,7 +213,7 @@ void Pipeline::diagnose() {
   std::vector<ProcessedLog> held_out = logs(Role::test);
   if (held_out.empty()) held_out = logs(Role::validate);
   DiagnosisResult report = diagnosis.report;
-  report.evidence = evidence_json(nominal, model, held_out, diagnosis.still);
+  report.evidence = held_out_evidence(nominal, model, held_out, diagnosis.still);
   progress_.step();
   const MetricsResult metrics{.logs = stages.back().logs,
                               .gate = report.gate,

@@ -11,6 +11,7 @@
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/effects/link_parameters.hpp"
 #include "host_tools/regression/bls_rows.hpp"
+#include "host_tools/regression/joint_weight.hpp"
 #include "host_tools/regression/own_columns.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/regression/tie.hpp"
@@ -370,8 +371,7 @@ void Fitter::reweight() {
         square += base_moments_[j][b].square;
         count += base_moments_[j][b].count;
       }
-      // Noise-free data: no more than 1e-9 of the signal, so that weights stay finite and of one size.
-      weights_[static_cast<Eigen::Index>(j)] = count / std::max(sum, 1e-18 * square + 1e-300);
+      weights_[static_cast<Eigen::Index>(j)] = joint_weight(count, sum, square);
     }
   }
 }

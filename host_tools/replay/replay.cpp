@@ -139,7 +139,7 @@ Replay replay(Pipeline& pipeline, const fs::path& image, Eigen::Index max_ticks)
   }
   progress.done();
   const fs::path size_file = image.parent_path() / "size.json";
-  if (fs::exists(size_file)) out.size = nlohmann::json::parse(read_file(size_file));
+  if (fs::exists(size_file)) out.size = image_size_of(nlohmann::json::parse(read_file(size_file)));
   fs::create_directories(directory);
   write_file(directory / "replay.json", to_json(out).dump(1) + "\n");
   return {out.bit_exact(), directory / "replay.json"};

@@ -4,17 +4,17 @@
 #include <utility>
 
 #include "host_tools/page/page.hpp"
+#include "host_tools/regression/metrics_result.hpp"
 #include "host_tools/report/section.hpp"
 
 namespace fxdyn {
 
 using namespace page;
-using nlohmann::json;
 
 namespace {
 
 /// What the search of each joint's BLS settled on, kept or not.
-std::string choice_table(const json& training) {
+std::string choice_table(const std::vector<TrainedJoint>& training) {
   Table table({{"joint"},
                {"by"},
                {"nodes", "n"},
@@ -29,30 +29,29 @@ std::string choice_table(const json& training) {
                {"generations", "n"},
                {"evaluations", "n"}});
   bool any = false;
-  for (const json& joint : training) {
-    const json choice = joint.value("choice", json());
-    if (choice.is_null()) continue;
+  for (const TrainedJoint& joint : training) {
+    if (!joint.choice) continue;
+    const TrainedJoint::Choice& choice = *joint.choice;
     any = true;
-    const std::string length = text(joint.at("unit")) == "N" ? "m" : "rad";
+    const std::string length = joint.unit == "N" ? "m" : "rad";
     std::string distances = "none";
-    if (choice.contains("distances")) {
-      const auto d = choice.at("distances").get<std::vector<double>>();
+    if (choice.distances) {
+      const std::vector<double>& d = *choice.distances;
       distances = fmt::format("{:.2g}, {:.2g}, {:.2g} {}", d[0], d[1], d[2], length);
     }
-    table.add({{text(joint.at("joint"))},
-               {text(choice.at("by"))},
-               {fmt::format("{}", choice.at("nodes").get<int>()), "n"},
-               {fmt::format("{}", choice.at("windows").get<int>()), "n"},
-               {text(choice.at("activation"))},
-               {text(choice.at("inputs"))},
-               number(choice.at("ridge"), 2),
-               number(choice.at("scale"), 2),
+    table.add({{joint.joint},
+               {choice.by},
+               {fmt::format("{}", choice.nodes), "n"},
+               {fmt::format("{}", choice.windows), "n"},
+               {choice.activation},
+               {choice.inputs},
+               number(choice.ridge, 2),
+               number(choice.scale, 2),
                {distances},
-               {fmt::format("{:.2g} {}/s", choice.at("reference_velocity").get<double>(), length), "n"},
-               {fmt::format("{:.4g} %", 100 * choice.at("J").get<double>()), "n"},
-               choice.contains("generations") ? Cell{fmt::format("{}", choice.at("generations").get<int>()), "n"}
-                                              : Cell{"-", "n"},
-               {fmt::format("{}", joint.at("evaluations").get<int>()), "n"}});
+               {fmt::format("{:.2g} {}/s", choice.reference_velocity, length), "n"},
+               {fmt::format("{:.4g} %", 100 * choice.value), "n"},
+               {choice.generations ? fmt::format("{}", *choice.generations) : "-", "n"},
+               {fmt::format("{}", joint.evaluations), "n"}});
   }
   if (!any) return {};
   return subsection("What the search settled on") + table.html() +
@@ -80,10 +79,11 @@ std::optional<std::pair<double, double>> shown_errors(const std::vector<StageErr
 
 }  // namespace
 
-std::string bls_section(const ReportInput& input, const json& result) {
+std::string bls_section(const ReportInput& input, const nlohmann::json& file) {
+  const MetricsResult result = metrics_of(file);
   std::string out = section("Broad Learning System");
-  if (!result.contains("training")) return out + paragraph("Not trained.");
-  const json& training = result.at("training");
+  if (!result.training) return out + paragraph("Not trained.");
+  const std::vector<TrainedJoint>& training = *result.training;
   if (training.empty()) return out + paragraph("Switched off in the project file.");
   const std::string& role = input.results.role;
   Table table({{"joint"},
@@ -94,15 +94,14 @@ std::string bls_section(const ReportInput& input, const json& result) {
                {"decision"},
                {role + " logs diagnosed", "n"},
                {role + " logs as exported", "n"}});
-  const std::vector<StageErrors> stages = stages_of(result);
   for (std::size_t j = 0; j < training.size(); ++j) {
-    const json& joint = training.at(j);
-    const auto shown = shown_errors(stages, role_of(role), j);
+    const TrainedJoint& joint = training[j];
+    const auto shown = shown_errors(result.stages, role_of(role), j);
     const bool disagree = shown && shown->second > shown->first;
-    const double without = joint.at("held_out_without"), with = joint.at("held_out_with");
-    const bool kept = joint.at("kept"), found = !joint.contains("choice") || !joint.at("choice").is_null();
-    table.add({{text(joint.at("joint"))},
-               {text(joint.at("unit"))},
+    const double without = joint.held_out_without, with = joint.held_out_with;
+    const bool kept = joint.kept, found = joint.choice.has_value();
+    table.add({{joint.joint},
+               {joint.unit},
                number(without),
                found ? number(with) : Cell{"-", "n"},
                found ? Cell{fmt::format("{:+.1f} %", 100 * (with / without - 1)), "n"} : Cell{"-", "n"},

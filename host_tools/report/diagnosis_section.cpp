@@ -13,48 +13,51 @@ namespace fxdyn {
 namespace {
 
 using namespace page;
-using nlohmann::json;
 namespace fs = std::filesystem;
 namespace words = diagnosis_words;
 
 constexpr const char* plus_minus = " ± ";
 
-std::string what_it_means(const json& diagnosis) {
-  const std::string verdict = diagnosis.value("verdict", "");
-  if (verdict == "explained" && !words::not_borne_out(diagnosis).empty())
-    return "Explained on the data that judged: it confirms the effects below. The test logs do not bear them all out.";
-  if (verdict == "explained")
-    return "Explained: the model lacked physics; held-out data confirms the effects below, and what is left is noise.";
-  if (verdict == "partly_explained")
-    return "Partly explained: held-out data confirms the effects below, and on some joint structure is left.";
-  if (verdict == "nothing_missing") return "Nothing missing: what remains between model and log looks like noise.";
-  if (verdict == "unexplained")
-    return "Unexplained: on some joint the model misses structure, and no effect of the catalogue is established "
-           "there.";
-  if (verdict == "not_excited") return "Not excited: the motion in the logs can't tell.";
-  return verdict;
+std::string what_it_means(const DiagnosisResult& diagnosis) {
+  switch (diagnosis.verdict) {
+    case Verdict::explained:
+      return words::not_borne_out(diagnosis).empty()
+                 ? "Explained: the model lacked physics; held-out data confirms the effects below, and what is left is "
+                   "noise."
+                 : "Explained on the data that judged: it confirms the effects below. The test logs do not bear them "
+                   "all out.";
+    case Verdict::partly_explained:
+      return "Partly explained: held-out data confirms the effects below, and on some joint structure is left.";
+    case Verdict::nothing_missing:
+      return "Nothing missing: what remains between model and log looks like noise.";
+    case Verdict::unexplained:
+      return "Unexplained: on some joint the model misses structure, and no effect of the catalogue is established "
+             "there.";
+    case Verdict::not_excited:
+      break;
+  }
+  return "Not excited: the motion in the logs can't tell.";
 }
 
-std::string figures(const json& diagnosis) {
+std::string figures(const DiagnosisResult& diagnosis) {
   std::string out;
   if (const std::string those = words::not_borne_out(diagnosis); !those.empty())
     out += paragraph("The test logs disagree (amber): with what was found the error rises at " + those + ".");
   if (const std::string on = words::figures_on(diagnosis); !on.empty()) out += paragraph("Gaps on " + on + ".");
-  const std::string hidden = words::list(diagnosis.value("not_identifiable", json::array()));
+  const std::string hidden = words::list(diagnosis.not_identifiable);
   if (!hidden.empty()) out += paragraph("Not identifiable on the robot as a whole: " + hidden + ".");
   return out;
 }
 
 Cell n(const std::string& text) { return {text, "n"}; }
 
-const char* colour_of(const json& joint) {
-  const std::string verdict = joint.value("verdict", "");
-  if (joint.value("carries_over", json()) == false) return verdict == "unexplained" ? "bad" : "amber";
-  if (verdict == "nothing_missing" || verdict == "explained") return "good";
-  return verdict == "unexplained" ? "bad" : "";
+const char* colour_of(const JointDiagnosis& joint) {
+  if (joint.verdict == Verdict::unexplained) return "bad";
+  if (!joint.carries_over.value_or(true)) return "amber";
+  return joint.verdict == Verdict::nothing_missing || joint.verdict == Verdict::explained ? "good" : "";
 }
 
-std::string joint_table(const json& joints) {
+std::string joint_table(const std::vector<JointDiagnosis>& joints) {
   Table table({{"joint"},
                {"unit"},
                {"verdict"},
@@ -66,22 +69,21 @@ std::string joint_table(const json& joints) {
                {"left unexplained", "n"},
                {"where the gap sits"},
                {"not identifiable"}});
-  for (std::size_t j = 0; j < joints.size(); ++j) {
-    const json& joint = joints[j];
-    std::string found_where = words::where(joint);
-    for (const json& set : joint.value("undecided", json::array()))
+  for (const JointDiagnosis& joint : joints) {
+    std::string found_where = joint.where.sentence;
+    for (const auto& set : joint.undecided)
       found_where += (found_where.empty() ? "" : "; ") + words::either(set) + " is there";
-    table.add({{words::joint(joint, j)},
-               {joint.value("unit", "")},
-               {words::verdict(joint), colour_of(joint)},
-               n(words::figure(joint, "gap_before")),
-               n(words::figure(joint, "gap_after")),
-               n(words::figure(joint, "gate_before")),
-               n(words::figure(joint, "gate_after")),
-               n(words::figure(joint, "noise_floor")),
-               n(words::left(joint)),
+    table.add({{joint.joint},
+               {joint.unit},
+               {words::verdict(joint.verdict), colour_of(joint)},
+               n(words::figure(joint.gap_before)),
+               n(words::figure(joint.gap_after)),
+               n(words::figure(joint.gate_before)),
+               n(words::figure(joint.gate_after)),
+               n(words::figure(joint.noise_floor)),
+               n(words::left(joint.left)),
                {found_where},
-               {words::list(joint.value("not_identifiable", json::array()))}});
+               {words::list(joint.not_identifiable)}});
   }
   return table.html() +
          paragraph(
@@ -93,7 +95,7 @@ std::string joint_table(const json& joints) {
              "explains, with its 95 % interval. Not identifiable: effects that this motion could not show.");
 }
 
-std::string effect_table(const json& diagnosis) {
+std::string effect_table(const DiagnosisResult& diagnosis) {
   Table table({{"joint"},
                {"effect"},
                {"certainty"},
@@ -102,22 +104,21 @@ std::string effect_table(const json& diagnosis) {
                {"of the model's torque", "n"},
                {"could as well be"}});
   bool any = false;
-  const auto add = [&](const std::string& joint, const json& effect) {
+  const auto add = [&](const std::string& joint, const NamedEffect& effect) {
     any = true;
     table.add({{joint},
-               {effect.value("effect", "")},
+               {effect.effect},
                {words::certainty(effect)},
                {words::parameters(effect, plus_minus)},
-               n(words::share(effect, "held_out_closure")),
-               n(words::share(effect, "model_share")),
-               {words::list(effect.value("alternatives", json::array()))}});
+               n(words::share(effect.held_out_closure)),
+               n(words::share(effect.model_share)),
+               {words::list(effect.alternatives)}});
   };
-  const json joints = diagnosis.value("joints", json::array());
-  for (std::size_t j = 0; j < joints.size(); ++j) {
-    for (const json& effect : joints[j].value("effects", json::array())) add(words::joint(joints[j], j), effect);
+  for (const JointDiagnosis& joint : diagnosis.joints) {
+    for (const NamedEffect& effect : joint.effects) add(joint.joint, effect);
   }
-  for (const json& effect : diagnosis.value("robot_effects", json::array())) {
-    const std::string seen = words::list(effect.value("joints", json::array()));
+  for (const NamedEffect& effect : diagnosis.robot_effects) {
+    const std::string seen = words::list(effect.joints);
     add(seen.empty() ? "robot" : "robot, seen on " + seen, effect);
   }
   if (!any) return "";
@@ -129,43 +130,37 @@ std::string effect_table(const json& diagnosis) {
              "back when this effect alone is taken out. Could as well be: what these logs don't tell apart from it.");
 }
 
-std::string evidence_section(const json& evidence) {
-  const json joints = evidence.value("joints", json::array());
+std::string evidence_section(const HeldOutEvidence& evidence) {
   std::string out = subsection("On held-out logs");
-  if (joints.empty()) return out + paragraph("No log was held out.");
+  if (evidence.joints.empty()) return out + paragraph("No log was held out.");
   Table table(
       {{"joint"}, {"unit"}, {"RMS before", "n"}, {"after", "n"}, {"after, fixed point", "n"}, {"white noise", "n"}});
-  for (std::size_t j = 0; j < joints.size(); ++j) {
-    table.add({{words::joint(joints[j], j)},
-               {joints[j].value("unit", "")},
-               n(words::figure(joints[j], "rms_before")),
-               n(words::figure(joints[j], "rms_after")),
-               n(words::figure(joints[j], "rms_after_fixed")),
-               n(words::figure(joints[j], "noise_floor"))});
+  for (const HeldOutEvidence::Joint& joint : evidence.joints) {
+    table.add({{joint.joint},
+               {joint.unit},
+               n(words::figure(joint.before)),
+               n(words::figure(joint.after)),
+               n(words::figure(joint.after_fixed)),
+               n(words::figure(joint.noise_floor))});
   }
   std::string files;
-  for (const json& log : evidence.value("held_out", json::array())) {
-    files += (files.empty() ? "" : ", ") +
-             (log.is_string() ? log.get<std::string>()
-                              : fmt::format("{} ({}, {} .. {} s)", log.value("file", ""), log.value("role", ""),
-                                            words::figure(log, "from_s"), words::figure(log, "to_s")));
+  for (const HeldOutEvidence::Log& log : evidence.held_out) {
+    files += fmt::format("{}{} ({}, {} .. {} s)", files.empty() ? "" : ", ", log.file, to_string(log.role),
+                         words::figure(log.from_s), words::figure(log.to_s));
   }
   out += table.html();
   out += paragraph(
       "RMS of measured minus model torque over these logs, before and after what diagnosis found, and after as the "
       "firmware computes it. White noise: as under Error.");
   if (!files.empty()) out += paragraph("Logs: " + files + ".");
-  if (evidence.contains("note")) out += paragraph("Note: " + evidence.value("note", "") + ".");
-  const json fixed = evidence.value("fixed_point", json::object());
-  for (const json& note : fixed.value("notes", json::array()))
-    out += paragraph("Fixed point: " + note.get<std::string>() + ".");
-  if (fixed.contains("why_not")) out += paragraph("No fixed point: " + fixed.value("why_not", "") + ".");
+  if (!evidence.note.empty()) out += paragraph("Note: " + evidence.note + ".");
+  for (const std::string& note : evidence.fixed_point.notes) out += paragraph("Fixed point: " + note + ".");
+  if (const std::string& why = evidence.fixed_point.why_not; !why.empty())
+    out += paragraph("No fixed point: " + why + ".");
   return out;
 }
 
-std::string forward_section(const json& forward) {
-  if (!forward.is_object()) return "";
-  const json joints = forward.value("joints", json::array());
+std::string forward_section(const PlayedForward& forward) {
   Table table({{"joint"},
                {"tracking before", "n"},
                {"after", "n"},
@@ -173,15 +168,14 @@ std::string forward_section(const json& forward) {
                {"torque added before", "n"},
                {"after", "n"},
                {"unit"}});
-  for (std::size_t j = 0; j < joints.size(); ++j) {
-    const std::string position = joints[j].value("tracking_unit", "");
-    table.add({{words::joint(joints[j], j)},
-               n(words::figure(joints[j], "tracking_before")),
-               n(words::figure(joints[j], "tracking_after")),
-               {position},
-               n(words::figure(joints[j], "torque_before")),
-               n(words::figure(joints[j], "torque_after")),
-               {joints[j].value("torque_unit", position == "m" ? "N" : "N*m")}});
+  for (const PlayedJoint& joint : forward.joints) {
+    table.add({{joint.joint},
+               n(words::figure(joint.tracking_before)),
+               n(words::figure(joint.tracking_after)),
+               {joint.position_unit},
+               n(words::figure(joint.torque_before)),
+               n(words::figure(joint.torque_after)),
+               {joint.torque_unit}});
   }
   std::string out = subsection("Forward: the recorded motion in closed loop") + table.html();
   out += paragraph(fmt::format(
@@ -189,21 +183,21 @@ std::string forward_section(const json& forward) {
       "fed "
       "forward, a PD controller holds the simulated robot at the recorded motion. Tracking: RMS of simulated minus "
       "recorded position. Torque added: RMS of what the controller had to add to the recorded torque. Less is better.",
-      words::figure(forward, "seconds"), forward.value("log", "")));
-  const json failed = forward.value("failed", json::object());
-  for (const auto& [which, why] : failed.items()) {
-    if (why.is_string())
-      out += paragraph(fmt::format("The model {} can't be simulated: {}.", which, why.get<std::string>()));
-  }
+      words::figure(forward.seconds), forward.log));
+  const auto say = [&](const char* which, const std::string& why) {
+    if (!why.empty()) out += paragraph(fmt::format("The model {} can't be simulated: {}.", which, why));
+  };
+  say("after", forward.failed_after);
+  say("before", forward.failed_before);
   return out;
 }
 
-std::string pictures(const json& joints, const fs::path& directory) {
+std::string pictures(const std::vector<JointDiagnosis>& joints, const fs::path& directory) {
   std::string out;
-  for (std::size_t j = 0; j < joints.size(); ++j) {
-    const fs::path file = diagnosis_plot(directory, joints[j].value("index", j + 1) - 1);
+  for (const JointDiagnosis& joint : joints) {
+    const fs::path file = diagnosis_plot(directory, joint.index - 1);
     if (!fs::exists(file)) continue;
-    out += subsection(words::joint(joints[j], j) + ": residual before and after") + read_file(file);
+    out += subsection(joint.joint + ": residual before and after") + read_file(file);
   }
   if (out.empty()) return out;
   return out + paragraph(
@@ -213,20 +207,17 @@ std::string pictures(const json& joints, const fs::path& directory) {
 
 }  // namespace
 
-std::string diagnosis_section(const ReportInput& input, const json& diagnosis) {
-  const json joints = diagnosis.value("joints", json::array());
+std::string diagnosis_section(const ReportInput& input, const nlohmann::json& file) {
+  const DiagnosisResult diagnosis = diagnosis_of(file);
   std::string out = section("Diagnosis") + paragraph(what_it_means(diagnosis)) + figures(diagnosis) +
-                    joint_table(joints) + effect_table(diagnosis);
-  if (diagnosis.contains("evidence")) {
-    const json& evidence = diagnosis.at("evidence");
-    out += evidence_section(evidence) + forward_section(evidence.value("forward", json()));
+                    joint_table(diagnosis.joints) + effect_table(diagnosis);
+  if (diagnosis.evidence) {
+    out += evidence_section(*diagnosis.evidence);
+    if (diagnosis.evidence->forward) out += forward_section(*diagnosis.evidence->forward);
   }
-  if (const std::string next = words::next_experiment(diagnosis); !next.empty())
-    out += subsection("Next experiment") + paragraph(next);
-  for (const json& note : diagnosis.value("notes", json::array())) {
-    if (note.is_string()) out += paragraph("Note: " + note.get<std::string>() + ".");
-  }
-  return out + pictures(joints, input.directory);
+  if (!diagnosis.next_experiment.empty()) out += subsection("Next experiment") + paragraph(diagnosis.next_experiment);
+  for (const std::string& note : diagnosis.notes) out += paragraph("Note: " + note + ".");
+  return out + pictures(diagnosis.joints, input.directory);
 }
 
 }  // namespace fxdyn

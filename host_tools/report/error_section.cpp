@@ -1,14 +1,16 @@
 #include <fmt/format.h>
 
+#include <cmath>
 #include <optional>
 
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/page/page.hpp"
+#include "host_tools/regression/metrics_result.hpp"
 #include "host_tools/report/section.hpp"
 
 namespace fxdyn {
 
 using namespace page;
-using nlohmann::json;
 
 namespace {
 
@@ -23,16 +25,23 @@ struct StageFigures {
   std::size_t exported = 0;                   ///< the stage that the joint has in model.json
 };
 
-StageFigures figures_of(const std::vector<StageErrors>& stages, const json& gate_errors, Role role, std::size_t joint) {
+/// Error of a stage on what judges; none: not known.
+std::optional<double> judged_error(const GateErrors& errors, const std::string& stage) {
+  if (stage == "friction") return errors.friction;
+  const double error = stage == "diagnosed" ? errors.diagnosed : stage == "bls" ? errors.bls : NAN;
+  return std::isfinite(error) ? std::optional(error) : std::nullopt;
+}
+
+StageFigures figures_of(const MetricsResult& result, Role role, std::size_t joint) {
   StageFigures out;
-  const json judged = joint < gate_errors.size() ? gate_errors.at(joint) : json::object();
+  const std::vector<StageErrors>& stages = result.stages;
+  const GateErrors* judged = joint < result.gate_errors.size() ? &result.gate_errors[joint] : nullptr;
   out.exported = stages.size() - 1;
   for (std::size_t s = 0; s < stages.size(); ++s) {
     const std::string& name = stages[s].stage;
     out.shown.push_back(pooled_error(stages[s].logs, role, joint));
-    const json error = judged.value(name, json());
-    out.judged.push_back(error.is_number() ? std::optional(error.get<double>()) : std::nullopt);
-    if (judged.value("exported", "") == name) out.exported = s;
+    out.judged.push_back(judged != nullptr ? judged_error(*judged, name) : std::nullopt);
+    if (judged != nullptr && judged->exported == name) out.exported = s;
   }
   return out;
 }
@@ -50,23 +59,23 @@ const char* colour_of(const StageFigures& figures) {
 
 }  // namespace
 
-std::string error_section(const ReportInput& input, const json& result) {
-  const std::vector<StageErrors> stages = stages_of(result);
+std::string error_section(const ReportInput& input, const nlohmann::json& file) {
+  const MetricsResult result = metrics_of(file);
+  const std::vector<StageErrors>& stages = result.stages;
   const Role role = role_of(input.results.role);
   std::vector<Cell> head{{"joint"},           {"unit"},      {"rated", "n"},         {"model"},
                          {"gate", "n"},       {"RMSE", "n"}, {"of RMS torque", "n"}, {"of rated", "n"},
                          {"white noise", "n"}};
   Table table(head);
-  const json gate_errors = result.value("gate_errors", json::array());
-  const json& joints = input.model.at("joints");
+  const std::vector<Joint>& joints = robot_of(input.fitted).joints;
   for (std::size_t j = 0; j < joints.size(); ++j) {
-    const double rated = joints.at(j).at("rated_torque");
-    const StageFigures figures = figures_of(stages, gate_errors, role, j);
+    const double rated = joints_of(input.fitted)[j].rated_torque;
+    const StageFigures figures = figures_of(result, role, j);
     for (std::size_t s = 0; s < stages.size(); ++s) {
       const bool first = s == 0, last = s + 1 == stages.size();
       const PooledError& error = figures.shown[s];
-      table.add({{first ? text(joints.at(j).at("joint")) : ""},
-                 {first ? text(joints.at(j).at("unit")) : ""},
+      table.add({{first ? joints[j].name : ""},
+                 {first ? joints[j].torque_unit() : ""},
                  first ? number(rated) : Cell{},
                  {stage_title(stages[s]) + (s == figures.exported ? ": exported" : "")},
                  figures.judged[s] ? number(*figures.judged[s]) : Cell{"-", "n"},
@@ -90,16 +99,17 @@ std::string error_section(const ReportInput& input, const json& result) {
       "the diagnosed one.");
   Table per_log(
       {{"log"}, {"joint"}, {"unit"}, {"RMSE", "n"}, {"of RMS torque", "n"}, {"unfiltered RMSE", "n"}, {"bias", "n"}});
-  for (const json& log : result.at("logs")) {
-    if (log.at("role") != input.results.role) continue;
-    for (const json& joint : log.at("joints")) {
-      per_log.add({{text(log.at("file"))},
-                   {text(joint.at("joint"))},
-                   {text(joint.at("unit"))},
-                   number(joint.at("rmse")),
-                   percent(joint.at("relative")),
-                   number(joint.at("rmse_raw")),
-                   number(joint.at("bias"), 2)});
+  for (const LogErrors& log : result.logs) {
+    if (log.role != role) continue;
+    for (const LogErrors::Joint& joint : log.joints) {
+      const JointMetrics& errors = joint.metrics;
+      per_log.add({{log.file},
+                   {joint.name},
+                   {joint.torque_unit},
+                   number(errors.rmse),
+                   percent(errors.relative),
+                   number(errors.rmse_raw),
+                   number(errors.bias, 2)});
     }
   }
   return out + "<h3>The final model, log by log</h3>\n" + per_log.html() +

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "host_tools/effects/formats_json.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/page/page.hpp"
 #include "host_tools/report/export_result.hpp"
 #include "host_tools/report/section.hpp"
@@ -14,20 +15,20 @@ using nlohmann::json;
 
 namespace {
 
-std::string limits(const json& model) {
+std::string limits(const IdentifiedModel& model) {
   Table table({{"joint"}, {"position"}, {"velocity", "n"}, {"acceleration", "n"}, {"torque", "n"}});
-  for (const json& joint : model.at("joints")) {
-    const std::string unit = text(joint.at("unit")), length = unit == "N" ? "m" : "rad";
-    const json& limits = joint.at("limits");
-    const auto with_unit = [&](const char* key, const std::string& of) {
-      return Cell{fmt::format("{:.4g} {}", limits.at(key).get<double>(), of), "n"};
+  for (std::size_t j = 0; j < robot_of(model).size(); ++j) {
+    const Joint& joint = robot_of(model).joints[j];
+    const JointFit& fit = joints_of(model)[j];
+    const std::string length = joint.position_unit();
+    const auto with_unit = [](double limit, const std::string& unit) {
+      return Cell{fmt::format("{:.4g} {}", limit, unit), "n"};
     };
-    table.add({{text(joint.at("joint"))},
-               {fmt::format("{:.4g} .. {:.4g} {}", limits.at("position").at(0).get<double>(),
-                            limits.at("position").at(1).get<double>(), length)},
-               with_unit("velocity", length + "/s"),
-               with_unit("acceleration", length + "/s^2"),
-               with_unit("torque", unit)});
+    table.add({{joint.name},
+               {fmt::format("{:.4g} .. {:.4g} {}", fit.q_lower, fit.q_upper, length)},
+               with_unit(fit.dq_limit, length + "/s"),
+               with_unit(fit.ddq_limit, length + "/s^2"),
+               with_unit(fit.tau_limit, joint.torque_unit())});
   }
   return "<h3>Limits</h3>\n" + table.html() +
          paragraph(
@@ -80,7 +81,7 @@ std::string fixed_point_section(const ReportInput& input, const json& file) {
                  number(std::ldexp(1.0, -bits), 3),
                  {fmt::format("±{:.4g}", std::ldexp(1.0, width - 1 - bits)), "n"}});
   }
-  return out + limits(input.model) + "<h3>Formats</h3>\n" + formats.html() +
+  return out + limits(input.fitted) + "<h3>Formats</h3>\n" + formats.html() +
          paragraph(
              "How each kind of number is stored: an integer of so many bits, of which the fractional ones come after "
              "the "

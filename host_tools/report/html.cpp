@@ -2,6 +2,7 @@
 
 #include "host_tools/effects/model_parts.hpp"
 #include "host_tools/page/page.hpp"
+#include "host_tools/regression/metrics_result.hpp"
 #include "host_tools/report/report.hpp"
 #include "host_tools/report/results.hpp"
 #include "host_tools/report/section.hpp"
@@ -26,7 +27,7 @@ td.amber { background: #fdf0d0; } .split { columns: 2; column-gap: 3em; }
 .split tr { break-inside: avoid; } svg { width: 100%; height: auto; } .scroll { overflow-x: auto; }
 )";
 
-std::string header(const json& model, const json& metrics) {
+std::string header(const json& model, const MetricsResult& metrics) {
   const json& robot = model.at("robot");
   std::string out = fmt::format("<h1>{}</h1>\n", escape(text(robot.at("name"))));
   const auto gravity = robot.at("gravity").get<std::vector<double>>();
@@ -37,7 +38,7 @@ std::string header(const json& model, const json& metrics) {
       1000 * model.at("tick_s").get<double>(), escape(text(model.at("tool_version"))));
   out += paragraph(fmt::format(
       "{} base parameters. Torque is on the joint side of the gearbox, positive along the axis of the joint.",
-      metrics.at("base_parameters").get<int>()));
+      metrics.base_parameters));
   return out;
 }
 
@@ -50,7 +51,7 @@ void write_report(const IdentifiedModel& fitted, const std::vector<ProcessedLog>
       "fxdyn</title>\n<style>{}</style></head><body>\n",
       escape(robot_of(fitted).name), style);
   const ReportInput input{fitted, to_json(fitted), logs, results, directory};
-  page += header(input.model, results["metrics"]);
+  page += header(input.model, metrics_of(results["metrics"]));
   page += draw_sections(input, report_sections());
   page += "</body></html>\n";
   write_file(directory / "report.html", page);

@@ -1,6 +1,7 @@
 #include "host_tools/report/replay_result.hpp"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 namespace fxdyn {
 namespace {
@@ -41,6 +42,14 @@ ReplayedLog log_of(const json& file) {
 
 }  // namespace
 
+json to_json(const ImageSize& size) {
+  return {{"flash_bytes", size.flash}, {"ram_bytes", size.ram}, {"stack_bytes", size.stack}};
+}
+
+ImageSize image_size_of(const json& file) {
+  return {file.at("flash_bytes"), file.at("ram_bytes"), file.at("stack_bytes")};
+}
+
 bool ReplayResult::bit_exact() const {
   return std::all_of(logs.begin(), logs.end(), [](const ReplayedLog& log) { return log.different_ticks == 0; });
 }
@@ -55,7 +64,7 @@ json to_json(const ReplayResult& result) {
            {"tables_in", result.tables_in},
            {"bit_exact", result.bit_exact()},
            {"logs", logs}};
-  if (!result.size.is_null()) out["size"] = result.size;
+  if (result.size) out["size"] = to_json(*result.size);
   return out;
 }
 
@@ -66,7 +75,7 @@ ReplayResult replay_of(const json& file) {
   out.output_joints = file.at("output_joints").get<std::vector<std::size_t>>();
   out.tables_in = file.at("tables_in");
   for (const json& log : file.at("logs")) out.logs.push_back(log_of(log));
-  out.size = file.value("size", json());
+  if (file.contains("size")) out.size = image_size_of(file.at("size"));
   return out;
 }
 

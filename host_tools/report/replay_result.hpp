@@ -1,7 +1,8 @@
 #pragma once
 
 #include <cstdint>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,15 @@ struct ReplayedLog {
   std::vector<Joint> joints;
 };
 
+/// Of an image, as its build says it in size.json [byte].
+struct ImageSize {
+  std::int64_t flash = 0;
+  std::int64_t ram = 0;  ///< stack included
+  std::int64_t stack = 0;
+};
+nlohmann::json to_json(const ImageSize& size);
+ImageSize image_size_of(const nlohmann::json& file);
+
 /// Content of replay.json.
 struct ReplayResult {
   std::string image;
@@ -29,7 +39,7 @@ struct ReplayResult {
   std::vector<std::size_t> output_joints;  ///< from 1
   std::string tables_in;                   ///< "image" or "update slot"
   std::vector<ReplayedLog> logs;
-  nlohmann::json size;  ///< of the image, as its build says it; null: not known
+  std::optional<ImageSize> size;  ///< of the image; none: not known
 
   /// Every torque and every saturation is the host's.
   bool bit_exact() const;

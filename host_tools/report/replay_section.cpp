@@ -15,15 +15,15 @@ std::string replay_section(const ReportInput&, const nlohmann::json& file) {
                      "Not replayed with these tables: build the image with toolchains/build_image.sh, then run fxdyn "
                      "replay.");
   const ReplayResult result = replay_of(file);
-  const ReplaySummary sum = summarise_replay(file);
+  const ReplaySummary sum = summarise_replay(result);
   out += paragraph(fmt::format(
       "{} ticks on {} in QEMU (image {}): {}. {} to {} instructions a tick.", sum.ticks, sum.processor, result.image,
       sum.different_ticks == 0 ? "every torque is the host's bit for bit"
                                : fmt::format("{} ticks differ from the host", sum.different_ticks),
       sum.fewest, sum.most));
-  if (!result.size.is_null()) {
-    out += paragraph(fmt::format("Image: {} bytes flash, {} bytes RAM (stack included).",
-                                 result.size.at("flash_bytes").get<int>(), result.size.at("ram_bytes").get<int>()));
+  if (result.size) {
+    out += paragraph(
+        fmt::format("Image: {} bytes flash, {} bytes RAM (stack included).", result.size->flash, result.size->ram));
   }
   Table table({{"stream"},
                {"ticks", "n"},

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "host_tools/project/provenance.hpp"
+#include "host_tools/regression/metrics_result.hpp"
 #include "host_tools/report/replay_result.hpp"
 #include "host_tools/report/section.hpp"
 #include "host_tools/support/files.hpp"
@@ -65,13 +66,13 @@ json read_result(const ResultFile& result, const fs::path& directory, const json
   return read_json(directory / (name + ".json"));
 }
 
-std::string shown_role(const json& logs) {
-  for (const char* role : {"test", "validate"}) {
-    for (const json& log : logs) {
-      if (log.at("role") == role) return role;
+std::string shown_role(const std::vector<LogErrors>& logs) {
+  for (const Role role : {Role::test, Role::validate}) {
+    for (const LogErrors& log : logs) {
+      if (log.role == role) return to_string(role);
     }
   }
-  return "train";
+  return to_string(Role::train);
 }
 
 std::string processor_of(const std::string& image) {
@@ -99,7 +100,7 @@ Results read_results(const fs::path& directory) {
     if (name.empty() || results.files.contains(name)) continue;
     results.files[name] = read_result(section.needs, directory, model, results.stale);
   }
-  if (const json& metrics = results["metrics"]; !metrics.is_null()) results.role = shown_role(metrics.at("logs"));
+  if (const json& metrics = results["metrics"]; !metrics.is_null()) results.role = shown_role(metrics_of(metrics).logs);
   return results;
 }
 
@@ -108,10 +109,9 @@ std::string stage_title(const StageErrors& stage) {
   return stage.stage == "bls" ? "+ BLS" : "+ " + stage.stage;
 }
 
-ReplaySummary summarise_replay(const json& replayed) {
+ReplaySummary summarise_replay(const ReplayResult& result) {
   ReplaySummary sum;
   sum.fewest = std::numeric_limits<std::uint32_t>::max();
-  const ReplayResult result = replay_of(replayed);
   for (const ReplayedLog& log : result.logs) {
     sum.ticks += log.ticks;
     sum.different_ticks += log.different_ticks;

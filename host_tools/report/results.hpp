@@ -12,6 +12,8 @@
 
 namespace fxdyn {
 
+struct ReplayResult;
+
 /// What a result in DIR has to belong to; else it counts as missing.
 enum class Belongs {
   to_anything,
@@ -45,6 +47,6 @@ struct ReplaySummary {
   std::uint32_t fewest = 0, most = 0;  ///< instructions a tick
   std::string processor;               ///< as in "Cortex-M4"
 };
-ReplaySummary summarise_replay(const nlohmann::json& replayed);
+ReplaySummary summarise_replay(const ReplayResult& result);
 
 }  // namespace fxdyn

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/simulate/mujoco_forces.hpp"
 #include "host_tools/simulate/mujoco_model.hpp"
 #include "host_tools/support/error.hpp"
@@ -36,7 +36,7 @@ MatrixXd rigid_body(const IdentifiedModel& plant, const Reference& motion) {
 /// Encoders of motors at dq, ddq; the link is at q_encoder - delta with delta by what the encoder shows.
 void show_eccentricity(const IdentifiedModel& plant, PlantRun& run) {
   for (Index j = 0; j < run.q.cols(); ++j) {
-    const JointFit& joint = plant.joints[static_cast<std::size_t>(j)];
+    const JointFit& joint = joints_of(plant)[static_cast<std::size_t>(j)];
     if (joint.find("eccentricity") == nullptr) continue;
     for (Index k = 0; k < run.q.rows(); ++k) {
       const double motor = run.q(k, j);
@@ -52,7 +52,7 @@ void show_eccentricity(const IdentifiedModel& plant, PlantRun& run) {
 }
 
 bool depends_on_load(const IdentifiedModel& plant) {
-  for (const JointFit& joint : plant.joints) {
+  for (const JointFit& joint : joints_of(plant)) {
     for (const char* name : {"load_friction", "elasticity", "backlash"}) {
       if (joint.find(name) != nullptr) return true;
     }
@@ -209,7 +209,7 @@ PlantRun closed_loop_on_mujoco(const IdentifiedModel& plant, const Reference& re
       VectorXd shown = robot.now().q;
       for (Index j = 0; j < n; ++j) {
         for (int i = 0; i < 30; ++i)
-          shown[j] = robot.now().q[j] + eccentric(plant.joints[static_cast<std::size_t>(j)], shown[j]).delta;
+          shown[j] = robot.now().q[j] + eccentric(joints_of(plant)[static_cast<std::size_t>(j)], shown[j]).delta;
       }
       seen.look(shown, robot.now().dq);
       tau = kp.cwiseProduct(reference.q.row(k).transpose() - seen.q()) +

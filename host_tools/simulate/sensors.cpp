@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "host_tools/simulate/scenario.hpp"
 #include "host_tools/support/random.hpp"
 
 namespace fxdyn {

@@ -2,9 +2,11 @@
 
 #include "host_tools/signals/log.hpp"
 #include "host_tools/signals/motion.hpp"
-#include "host_tools/simulate/scenario.hpp"
 
 namespace fxdyn {
+
+struct Scenario;
+struct ScenarioLog;
 
 /// The exact run of a plant on a uniform grid that starts with the log, samples x joints: what there is to measure.
 struct PlantRun : MotionRows {  ///< of the motors

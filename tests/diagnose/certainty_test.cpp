@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "host_tools/diagnose/explore.hpp"
 #include "host_tools/diagnose/verdict.hpp"
 
 namespace fxdyn::diagnosis {

@@ -1,6 +1,7 @@
 // Names on data that fitted no coefficient, and what diagnosis.json says of them.
 
 #include "host_tools/diagnose/gate.hpp"
+#include "host_tools/diagnose/explore.hpp"
 
 #include <gtest/gtest.h>
 

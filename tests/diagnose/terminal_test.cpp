@@ -34,7 +34,7 @@ std::string flat(const std::string& text) {
 }
 
 TEST(DiagnosisTable, SaysEveryVerdictAndWhatWasFound) {
-  const std::string table = diagnosis_table(test::diagnosis());
+  const std::string table = diagnosis_table(diagnosis_of(test::diagnosis()));
   expect_parts(flat(table), {"diagnosis: unexplained",
                              "gaps on test logs; change since the baseline",
                              "elbow: presliding or lugre is there",
@@ -60,25 +60,26 @@ TEST(DiagnosisTable, SaysEveryVerdictAndWhatWasFound) {
 }
 
 TEST(DiagnosisTable, ShowsFixedPointAndClosedLoop) {
-  const std::string table = diagnosis_table(test::diagnosis());
+  const std::string table = diagnosis_table(diagnosis_of(test::diagnosis()));
   expect_parts(flat(table), {"1.88 -> 0.41 0.42 N*m", "0.002 -> 0.0003 rad", "1.5 -> 0.2"});
 }
 
 TEST(DiagnosisTable, IsAtMostAHundredColumnsWideWhateverTheNames) {
   json diagnosis = test::diagnosis();
-  EXPECT_LE(widest(diagnosis_table(diagnosis)), 100U);
+  EXPECT_LE(widest(diagnosis_table(diagnosis_of(diagnosis))), 100U);
   diagnosis["joints"][0]["joint"] = std::string(60, 'j');
   diagnosis["joints"][0]["gap_before"] = -1.2345e-100;
   diagnosis["joints"][0]["effects"][0]["effect"] = std::string(150, 'e');
   diagnosis["joints"][0]["effects"].push_back(diagnosis["joints"][0]["effects"][0]);
   diagnosis["next_experiment"] = std::string(250, 'n');
-  EXPECT_LE(widest(diagnosis_table(diagnosis)), 100U) << diagnosis_table(diagnosis);
+  EXPECT_LE(widest(diagnosis_table(diagnosis_of(diagnosis))), 100U) << diagnosis_table(diagnosis_of(diagnosis));
 }
 
 TEST(DiagnosisTable, ManagesWithWhatIsThere) {
-  const std::string table = diagnosis_table(
-      json::parse(R"({"verdict":"nothing_missing","joints":[{"joint":"a","index":1,"verdict":"nothing_missing",
-                     "gap_before":null,"where":{"sentence":"","regions":[]},"effects":[]}],"robot_effects":[],"evidence":{"forward":null}})"));
+  DiagnosisResult diagnosis;
+  diagnosis.joints = {{"a", "N*m", 1, Verdict::nothing_missing}};
+  diagnosis.evidence = HeldOutEvidence{};
+  const std::string table = diagnosis_table(diagnosis);
   expect_parts(table, {"nothing missing", "- -> -"});
   EXPECT_EQ(table.find("where the gap"), std::string::npos);
   EXPECT_EQ(table.find("next"), std::string::npos);

@@ -32,7 +32,8 @@ class Where : public testing::Test {
     const MotionRows motion = log_.joint_motion(static_cast<Index>(joint));
     VectorXd error(log_.samples());
     for (Index k = 0; k < error.size(); ++k) error[k] = inside(motion.q(k, 0), motion.dq(k, 0), log_.t[k]) ? 1 : 0.1;
-    return where(model_, {&log_}, joint, {error}, 0.1, {});
+    const VectorXd load = predict(model_, log_).col(static_cast<Index>(joint));
+    return where(model_.robot.joints[joint], joint, {&log_}, {load}, {error}, 0.1, {});
   }
   static GapRegion region(const std::vector<GapRegion>& all, const std::string& signal) {
     const auto found = std::find_if(all.begin(), all.end(), [&](const GapRegion& r) { return r.signal == signal; });

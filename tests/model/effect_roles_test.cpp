@@ -14,6 +14,10 @@ TEST(EffectRoles, TheCatalogueHasOneForEach) {
   EXPECT_EQ(viscous_friction_effect().name, "viscous");
   EXPECT_EQ(friction_of_load_effect().name, "load_friction");
   EXPECT_EQ(constant_effect().name, "offset");
+  EXPECT_EQ(presliding_effect().name, "presliding");
+  EXPECT_EQ(compliance_effect().name, "elasticity");
+  EXPECT_EQ(play_effect().name, "backlash");
+  EXPECT_EQ(once_a_turn_effect().name, "eccentricity");
   for (const EffectInfo& info : effect_infos()) {
     EXPECT_EQ(is_load(info.name), info.name == "payload") << info.name;
     EXPECT_EQ(is_compliance(info), info.name == "elasticity") << info.name;

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
 #include "host_tools/report/results.hpp"
 
 namespace fxdyn {
@@ -24,11 +26,12 @@ ReplayResult example() {
 
 TEST(ReplayResult, ComesBackFromItsFile) {
   ReplayResult result = example();
-  result.size = {{"flash_bytes", 12345}, {"ram_bytes", 678}};
+  result.size = {12345, 678, 90};
   const json file = to_json(result);
   EXPECT_EQ(to_json(replay_of(json::parse(file.dump()))), file);
   EXPECT_EQ(replay_of(file).logs[0].joints[0].unit, "N*m");
   EXPECT_EQ(file.at("logs").at(0).at("instructions_per_tick").at("mean"), 905.25);
+  EXPECT_EQ(file.at("size"), (json{{"flash_bytes", 12345}, {"ram_bytes", 678}, {"stack_bytes", 90}}));
   EXPECT_FALSE(to_json(example()).contains("size"));
 }
 
@@ -40,7 +43,7 @@ TEST(ReplayResult, OneDifferentTickIsEnough) {
 }
 
 TEST(ReplayResult, ItsSummaryIsOverAllLogs) {
-  const ReplaySummary sum = summarise_replay(to_json(example()));
+  const ReplaySummary sum = summarise_replay(example());
   EXPECT_EQ(sum.ticks, 9000);
   EXPECT_EQ(sum.different_ticks, 0);
   EXPECT_EQ(sum.saturations, 7);

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "host_tools/page/comparison_plots.hpp"
+#include "host_tools/regression/metrics_result.hpp"
 #include "host_tools/support/files.hpp"
 #include "tests/diagnose/example.hpp"
 #include "tests/diagnose/small_log.hpp"
@@ -81,47 +82,34 @@ TEST(ModelSections, ShowBaseParametersAndEffects) {
              {"<h2>Effects</h2>", "viscous", "coefficient = 2.25 N*m*s/rad"});
 }
 
-/// metrics.json of two joints: their errors in three stages, on the validate log and on the test log.
-json metrics(const std::vector<std::array<double, 2>>& validate, const std::vector<std::array<double, 2>>& shown) {
-  json out{{"logs", json::array()}, {"stages", json::array()}};
+/// Metrics of two joints: their errors in three stages, on the validate log and on the test log.
+MetricsResult metrics(const std::vector<std::array<double, 2>>& validate,
+                      const std::vector<std::array<double, 2>>& shown) {
+  MetricsResult out;
   const std::vector<std::string> names{"friction", "diagnosed", "bls"};
   for (std::size_t s = 0; s < names.size(); ++s) {
-    json logs = json::array();
-    for (const auto& [role, errors] : {std::pair{"validate", validate[s]}, std::pair{"test", shown[s]}}) {
-      json joints = json::array();
-      for (const double rmse : errors) {
-        joints.push_back({{"joint", "j"},
-                          {"unit", "N*m"},
-                          {"rmse", rmse},
-                          {"relative", 0.1},
-                          {"rmse_raw", rmse},
-                          {"noise_floor", 0.1},
-                          {"bias", 0}});
-      }
-      logs.push_back({{"file", "a.csv"}, {"role", role}, {"from_s", 0}, {"to_s", 1}, {"joints", joints}});
+    out.logs.clear();
+    for (const auto& [role, errors] : {std::pair{Role::validate, validate[s]}, std::pair{Role::test, shown[s]}}) {
+      LogErrors log{"a.csv", role, 0, 1, {}};
+      for (const double rmse : errors) log.joints.push_back({"j", "N*m", {rmse, 0.1, rmse, 0.1, 0}});
+      out.logs.push_back(log);
     }
-    out["stages"].push_back({{"stage", names[s]}, {"logs", logs}});
-    out["logs"] = logs;
+    out.stages.push_back({names[s], out.logs});
   }
   const std::vector<std::string> exported{"bls", "diagnosed"};
-  for (std::size_t j = 0; j < 2; ++j) {
-    out["gate_errors"].push_back({{"joint", "j"},
-                                  {"friction", validate[0][j]},
-                                  {"diagnosed", validate[1][j]},
-                                  {"bls", validate[2][j]},
-                                  {"exported", exported[j]}});
-  }
+  for (std::size_t j = 0; j < 2; ++j)
+    out.gate_errors.push_back({"j", "N*m", validate[0][j], validate[1][j], validate[2][j], exported[j]});
   return out;
 }
 
 /// A section of two joints, its results on test logs.
-std::string section_page(std::string_view name, const json& metrics) {
+std::string section_page(std::string_view name, const MetricsResult& metrics) {
   IdentifiedModel model = test::plant_of(read_urdf(test::puma560));
   model.joints.resize(2);
   model.robot.joints.resize(2);
   model.inertia.resize(2);
   Results results;
-  results.files["metrics"] = metrics;
+  results.files["metrics"] = to_json(metrics);
   results.role = "test";
   const auto sections = report_sections();
   const auto section = std::find_if(sections.begin(), sections.end(), [&](const auto& s) { return s.name == name; });
@@ -150,14 +138,21 @@ TEST(ErrorSection, ItIsAmberWhereTheTestLogsOrTheGateSayOtherwise) {
 }
 
 TEST(BlsSection, ABlsThatTheTestLogsDoNotLikeIsKeptInAmber) {
-  json result = metrics({{{2.5, 3.5}, {0.75, 1.25}, {0.5, 1.05}}}, {{{2.6, 3.6}, {0.85, 1.35}, {0.95, 1.15}}});
+  MetricsResult result = metrics({{{2.5, 3.5}, {0.75, 1.25}, {0.5, 1.05}}}, {{{2.6, 3.6}, {0.85, 1.35}, {0.95, 1.15}}});
+  result.training.emplace();
   for (const double with : {0.5, 1.05}) {
-    result["training"].push_back(
-        {{"joint", "j"}, {"unit", "N*m"}, {"held_out_without", 1.5 * with}, {"held_out_with", with}, {"kept", true}});
+    TrainedJoint joint{"j", "N*m", 1.5 * with, with, true, 7, {}};
+    joint.choice.emplace().nodes = 12;
+    result.training->push_back(joint);
   }
   const std::string page = section_page("bls", result);
   expect_all(page, {"<td class=\"amber\">kept</td><td class=\"n\">0.85</td><td class=\"n\">0.95</td>",
-                    "<td class=\"good\">kept</td><td class=\"n\">1.35</td><td class=\"n\">1.15</td>"});
+                    "<td class=\"good\">kept</td><td class=\"n\">1.35</td><td class=\"n\">1.15</td>",
+                    "What the search settled on", "<td class=\"n\">12</td>"});
+  result.training->at(0).choice.reset();
+  result.training->at(0).kept = false;
+  expect_all(section_page("bls", result),
+             {"<td class=\"n\">-</td><td class=\"\">none that fixed point could hold</td>"});
 }
 
 TEST(DiagnosisSection, AJointThatTheTestLogsDoNotBearOutIsAmberWithBothFigures) {

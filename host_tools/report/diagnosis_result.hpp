@@ -1,10 +1,12 @@
 #pragma once
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "host_tools/report/evidence_result.hpp"
 
 namespace fxdyn {
 
@@ -81,8 +83,6 @@ struct JointDiagnosis {
 };
 
 /// Content of diagnosis.json.
-// A null of JSON is made without memory, though its constructor does not say so.
-// NOLINTNEXTLINE(bugprone-exception-escape)
 struct DiagnosisResult {
   Verdict verdict = Verdict::nothing_missing;
   std::vector<JointDiagnosis> joints;
@@ -92,7 +92,7 @@ struct DiagnosisResult {
   std::string next_experiment, gate, figures_on;
   bool baseline = false;
   std::vector<std::string> notes;
-  nlohmann::json evidence;  ///< see evidence_json(); null: none yet
+  std::optional<HeldOutEvidence> evidence;  ///< none yet
 };
 nlohmann::json to_json(const DiagnosisResult& result);
 DiagnosisResult diagnosis_of(const nlohmann::json& file);

@@ -1,11 +1,12 @@
 // diagnosis.json, written and read by one codec.
 
-#include "host_tools/diagnose/diagnosis_result.hpp"
+#include "host_tools/report/diagnosis_result.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 
 #include "host_tools/support/error.hpp"
 
@@ -13,6 +14,17 @@ namespace fxdyn {
 namespace {
 
 using nlohmann::json;
+
+/// A joint whose plant fails before, and one that fixed point can't hold.
+HeldOutEvidence evidence() {
+  HeldOutEvidence out;
+  out.held_out = {{"b.csv", Role::validate, 1, 9.5}};
+  out.joints = {{"shoulder", "N*m", 1.9, 0.4, 0.41, 0.35}, {"elbow", "N", 3.0, 2.9}};
+  out.fixed_point = {false, "no format holds it", {"elbow: beyond its limit"}};
+  out.forward = PlayedForward{"b.csv", 1.3, 8, {{"shoulder", "rad", "N*m", {}, 0.002, {}, 1.5}}, "grows", ""};
+  out.note = "no test log";
+  return out;
+}
 
 /// One joint of each kind, and a load.
 DiagnosisResult example() {
@@ -65,7 +77,7 @@ DiagnosisResult example() {
   out.figures_on = "test logs";
   out.baseline = true;
   out.notes = {"a note"};
-  out.evidence = {{"note", "none"}};
+  out.evidence = evidence();
   return out;
 }
 
@@ -106,8 +118,33 @@ TEST(DiagnosisResult, WhatIsNotKnownIsNullOrNotThere) {
   EXPECT_TRUE(still.at("lack_of_fit").at("state_p").is_null());
   EXPECT_EQ(still.at("effects"), json::array());
   DiagnosisResult alone = example();
-  alone.evidence = nullptr;
+  alone.evidence.reset();
   EXPECT_FALSE(to_json(alone).contains("evidence"));
+}
+
+TEST(DiagnosisResult, ItsEvidenceComesBackFromItsFile) {
+  const json file = to_json(example()).at("evidence");
+  EXPECT_EQ(file.at("held_out").at(0), (json{{"file", "b.csv"}, {"role", "validate"}, {"from_s", 1.0}, {"to_s", 9.5}}));
+  EXPECT_EQ(file.at("joints").at(1), json::parse(R"({"joint": "elbow", "index": 2, "unit": "N", "rms_before": 3.0,
+      "rms_after": 2.9, "rms_after_fixed": null, "noise_floor": null})"));
+  EXPECT_EQ(file.at("fixed_point"), json::parse(R"({"computed": false, "why_not": "no format holds it",
+      "notes": ["elbow: beyond its limit"]})"));
+  EXPECT_EQ(file.at("forward").at("failed"), (json{{"before", "grows"}}));
+  EXPECT_EQ(file.at("forward").at("joints").at(0), json::parse(R"({"joint": "shoulder", "index": 1,
+      "tracking_before": null, "tracking_after": 0.002, "tracking_unit": "rad", "torque_before": null,
+      "torque_after": 1.5, "torque_unit": "N*m"})"));
+  EXPECT_EQ(file.at("note"), "no test log");
+  EXPECT_EQ(to_json(evidence_of(json::parse(file.dump()))), file);
+}
+
+TEST(DiagnosisResult, EvidenceWithoutAHeldOutLogHasNoNotesOfFixedPoint) {
+  HeldOutEvidence none;
+  none.fixed_point.why_not = "no log was held out";
+  const json file = to_json(none);
+  EXPECT_EQ(file.at("fixed_point"), (json{{"computed", false}, {"why_not", "no log was held out"}}));
+  EXPECT_TRUE(file.at("forward").is_null());
+  EXPECT_FALSE(file.contains("note"));
+  EXPECT_FALSE(evidence_of(file).forward);
 }
 
 TEST(DiagnosisResult, AFigureThatIsNoNumberIsReadAsNone) {

@@ -1,9 +1,10 @@
-#include "host_tools/diagnose/diagnosis_result.hpp"
+#include "host_tools/report/diagnosis_result.hpp"
 
 #include <fmt/format.h>
 
 #include <array>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "host_tools/support/error.hpp"
@@ -197,7 +198,7 @@ json to_json(const DiagnosisResult& result) {
            {"figures_on", result.figures_on},
            {"baseline", result.baseline},
            {"notes", result.notes}};
-  if (!result.evidence.is_null()) out["evidence"] = result.evidence;
+  if (result.evidence) out["evidence"] = to_json(*result.evidence);
   return out;
 }
 
@@ -216,7 +217,7 @@ DiagnosisResult diagnosis_of(const json& file) {
   out.figures_on = file.at("figures_on");
   out.baseline = file.at("baseline");
   out.notes = strings_of(file.at("notes"));
-  out.evidence = file.value("evidence", json());
+  if (file.contains("evidence")) out.evidence = evidence_of(file.at("evidence"));
   return out;
 }
 

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "host_tools/diagnose/search.hpp"
+
+namespace fxdyn::diagnosis {
+
+struct Outcome;
+
+/// How sure the name of an effect is, on data that did not fit it.
+enum class Certainty {
+  unlisted,
+  likely,      ///< it may stand in for something else, or be nothing
+  established  ///< it is there, and no other effect of the catalogue explains what it does
+};
+
+/// What speaks for an effect. Odds are log10 of likelihood ratios on the logs that judge.
+struct Evidence {
+  double against_nothing = 0;
+  std::optional<double> against_rival{};  ///< none: nothing else comes near
+  double deviations = 0;                  ///< standard deviations by which its coefficients are off nothing
+  double closure = 0;                     ///< share of the gap that comes back without it
+  bool there = false;      ///< something like it is there for sure: the model keeps it, whatever its name
+  bool undecided = false;  ///< .. its form holds, and that of its rival as well
+  Certainty certainty = Certainty::unlisted;
+};
+
+/// An effect that the search added to the model, and what speaks for it.
+struct Finding {
+  EffectId id;
+  double score = 0;
+  std::vector<Alternative> alternatives;
+  std::optional<Rival> rival{};
+  Evidence evidence{};
+};
+
+}  // namespace fxdyn::diagnosis
