@@ -9,6 +9,7 @@
 #include "host_tools/diagnose/explore.hpp"
 #include "host_tools/diagnose/gap_errors.hpp"
 #include "host_tools/diagnose/where.hpp"
+#include "host_tools/diagnose/where_words.hpp"
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
@@ -263,16 +264,18 @@ class ReportWriter {
   }
 
   void advise_on_gap(std::size_t j, const std::vector<GapRegion>& regions) {
+    std::vector<const ProcessedLog*> logs;
+    for (const ProcessedLog& log : conclusion_.now) logs.push_back(&log);
     std::string which;
-    if (!regions.empty())
-      which = fmt::format(" where the gap sits ({} from {:.3g} to {:.3g})", regions[0].signal, regions[0].from,
-                          regions[0].to);
+    // Nobody can record more of a time, or of a frequency.
+    if (!regions.empty() && regions[0].signal != "t" && regions[0].signal != "frequency")
+      which = ", " + words_of(regions[0], conclusion_.nominal.robot, j, logs);
     advise(fmt::format("record more of joint {}{}", j + 1, which));
   }
 
   static GapPlace place(const Impacts& impacts) {
     return {fmt::format("impacts, the largest at {:.2f} s of {}", impacts.t, impacts.log),
-            {{"t", impacts.t - 0.05, impacts.t + 0.05, {}, {}, impacts.log}}};
+            {{"t", 0, impacts.t - 0.05, impacts.t + 0.05, {}, {}, impacts.log}}};
   }
 
   /// Whether the model has an effect at a joint whose name is not established.
@@ -358,7 +361,7 @@ class ReportWriter {
       loads.emplace_back(predict(rigid, log).col(static_cast<Index>(j)));
       errors.push_back(error_of(log, predict(conclusion_.nominal, log), j));
     }
-    return where(conclusion_.nominal.robot.joints[j], j, logs, loads, errors, noise, report_);
+    return where(conclusion_.nominal.robot, j, logs, loads, errors, noise, report_);
   }
 
   /// Whether a named effect on the robot is felt at a joint.

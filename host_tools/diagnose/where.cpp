@@ -1,12 +1,13 @@
 #include "host_tools/diagnose/where.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <optional>
+#include <complex>
+#include <numbers>
+#include <unsupported/Eigen/FFT>
 
 #include "host_tools/diagnose/shifted_residual.hpp"
+#include "host_tools/diagnose/where_words.hpp"
 #include "host_tools/signals/spectrum.hpp"
 
 namespace fxdyn::diagnosis {
@@ -23,6 +24,7 @@ constexpr double stretch_s = 0.5;
 /// A region, as it is compared with others.
 struct Region {
   std::string signal;
+  std::size_t joint = 0;  ///< whose position it is, from 1; 0: of the joint itself
   double from = 0, to = 0;
   double share = 0, of_time = 0;  ///< of the gap's power, of the samples
   std::string log{};              ///< empty: of all logs
@@ -46,8 +48,8 @@ class Classes {
   }
 
   /// The interval with the largest share of the power beyond its share of the samples.
-  Region clearest(const std::string& signal, const VectorXd& power, double whole, double samples) const {
-    Region best{signal};
+  Region clearest(const VectorXd& power, double whole, double samples) const {
+    Region best;
     if (!(to_ > from_) || !(whole > 0)) return best;
     VectorXd of_class = VectorXd::Zero(bins);
     for (Index k = 0; k < power.size(); ++k) of_class[of_[static_cast<std::size_t>(k)]] += power[k];
@@ -72,14 +74,25 @@ class Classes {
   VectorXd count_;
 };
 
-/// One joint's motion and power above the noise at the rows of all logs.
+/// A signal of the motion, in which a region may lie.
+struct Signal {
+  std::string name;
+  std::size_t joint = 0;  ///< as in Region
+  VectorXd values;
+};
+
+/// Motion and one joint's power above the noise at the rows of all logs.
 struct Samples {
-  VectorXd q, dq, ddq, load, t, power;
+  std::vector<Signal> signals;
+  VectorXd t, error, power;
   std::vector<Index> first;  ///< row of each log
+  double noise_square = 0;   ///< taken off the power
+  Index rows(std::size_t log) const { return (log + 1 < first.size() ? first[log + 1] : power.size()) - first[log]; }
 };
 
 /// Takes the noise off: as much as the quietest half second has, at most.
 void take_noise(const std::vector<const ProcessedLog*>& logs, Samples& samples, double noise) {
+  samples.power = samples.error.cwiseAbs2();
   double square = noise * noise;
   for (std::size_t l = 0; l < logs.size(); ++l) {
     const double row_s = logs[l]->step_s * static_cast<double>(logs[l]->decimation);
@@ -88,71 +101,132 @@ void take_noise(const std::vector<const ProcessedLog*>& logs, Samples& samples, 
       square = std::min(square, samples.power.segment(samples.first[l] + k, stretch).mean());
   }
   samples.power.array() -= square;
+  samples.noise_square = square;
 }
 
 /// The power at other times of each log: what has nothing to do with the motion. @param turn share of a log
 VectorXd shifted(const Samples& samples, double turn) {
   VectorXd out(samples.power.size());
   for (std::size_t l = 0; l < samples.first.size(); ++l) {
-    const Index first = samples.first[l];
-    const Index rows = (l + 1 < samples.first.size() ? samples.first[l + 1] : out.size()) - first;
-    shift(static_cast<Index>(turn * static_cast<double>(rows)), samples.power, {l, first, rows}, out);
+    const Index rows = samples.rows(l);
+    shift(static_cast<Index>(turn * static_cast<double>(rows)), samples.power, {l, samples.first[l], rows}, out);
   }
   return out;
 }
 
-/// The clearest interval of a signal, if the error at other times has none that is as clear.
-std::optional<Region> concentrated(const std::string& signal, const VectorXd& values, const Samples& samples,
-                                   double chance) {
-  const Classes classes(values);
+int draws_for(double chance) { return static_cast<int>(std::ceil(1 / chance)) - 1; }
+
+/// The clearest interval of each signal, of those that are clearer than any interval of any signal that the error has
+/// at other times: all intervals tried are paid for at once.
+std::vector<Region> in_motion(const Samples& samples, double chance) {
   const double whole = samples.power.sum();
-  const auto count = static_cast<double>(values.size());
-  const Region best = classes.clearest(signal, samples.power, whole, count);
-  const int shifts = static_cast<int>(std::ceil(1 / chance)) - 1;
-  for (int s = 1; s <= shifts; ++s) {
-    const VectorXd other = shifted(samples, static_cast<double>(s) / (shifts + 1));
-    if (classes.clearest(signal, other, whole, count).contrast() >= best.contrast()) return {};
+  const auto count = static_cast<double>(samples.power.size());
+  std::vector<Classes> classes;
+  std::vector<Region> regions;
+  for (const Signal& signal : samples.signals) {
+    classes.emplace_back(signal.values);
+    Region region = classes.back().clearest(samples.power, whole, count);
+    region.signal = signal.name;
+    region.joint = signal.joint;
+    regions.push_back(region);
   }
-  return best;
+  double by_chance = 0;
+  const int draws = draws_for(chance);
+  for (int s = 1; s <= draws; ++s) {
+    const VectorXd other = shifted(samples, static_cast<double>(s) / (draws + 1));
+    for (const Classes& of : classes) by_chance = std::max(by_chance, of.clearest(other, whole, count).contrast());
+  }
+  std::erase_if(regions, [&](const Region& r) { return r.contrast() <= by_chance; });
+  return regions;
+}
+
+/// A signal's values at the rows of all logs. @param of one log and its index to the signal at full rate
+template <class Of>
+VectorXd at_rows(const std::vector<const ProcessedLog*>& logs, Of of) {
+  std::vector<double> out;
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    const ProcessedLog& log = *logs[l];
+    const VectorXd values = of(log, l);
+    for (Index r = 0; r < log.rows(); ++r) out.push_back(values[log.first + r * log.decimation]);
+  }
+  return Eigen::Map<const VectorXd>(out.data(), static_cast<Index>(out.size()));
 }
 
 Samples samples_of(const std::vector<const ProcessedLog*>& logs, std::size_t joint, const std::vector<VectorXd>& load,
                    const std::vector<VectorXd>& error) {
-  const auto j = static_cast<Index>(joint);
-  Index total = 0;
-  for (const ProcessedLog* log : logs) total += log->rows();
+  const auto own = static_cast<Index>(joint);
   Samples out;
-  for (VectorXd* v : {&out.q, &out.dq, &out.ddq, &out.load, &out.t, &out.power}) v->resize(total);
   Index row = 0;
-  for (std::size_t l = 0; l < logs.size(); ++l) {
-    const ProcessedLog& log = *logs[l];
+  for (const ProcessedLog* log : logs) {
     out.first.push_back(row);
-    const MotionRows m = log.joint_motion(j);
-    for (Index r = 0; r < log.rows(); ++r, ++row) {
-      const Index k = log.first + r * log.decimation;
-      out.q[row] = m.q(k, 0);
-      out.dq[row] = m.dq(k, 0);
-      out.ddq[row] = m.ddq(k, 0);
-      out.load[row] = load[l][k];
-      out.t[row] = log.t[k];
-      out.power[row] = error[l][k] * error[l][k];
+    row += log->rows();
+  }
+  out.t = at_rows(logs, [](const ProcessedLog& log, std::size_t) { return log.t; });
+  out.error = at_rows(logs, [&](const ProcessedLog&, std::size_t l) { return error[l]; });
+  const auto position = [&](Index j) {
+    return at_rows(logs,
+                   [j](const ProcessedLog& log, std::size_t) -> VectorXd { return log.joint_motion(j).q.col(0); });
+  };
+  const VectorXd dq = at_rows(
+      logs, [own](const ProcessedLog& log, std::size_t) -> VectorXd { return log.joint_motion(own).dq.col(0); });
+  const VectorXd ddq = at_rows(
+      logs, [own](const ProcessedLog& log, std::size_t) -> VectorXd { return log.joint_motion(own).ddq.col(0); });
+  out.signals = {{"dq", 0, dq},
+                 {"speed", 0, dq.cwiseAbs()},
+                 {"q", 0, position(own)},
+                 {"ddq", 0, ddq},
+                 {"load", 0, at_rows(logs, [&](const ProcessedLog&, std::size_t l) { return load[l]; })},
+                 {"direction", 0, dq.cwiseSign()}};
+  for (Index j = 0; j < logs.front()->q.cols(); ++j)
+    if (j != own) out.signals.push_back({"q", static_cast<std::size_t>(j + 1), position(j)});
+  return out;
+}
+
+/// An error of the same spectrum in each log, and the same everywhere: its lines with phases drawn at random.
+VectorXd stationary(const Samples& samples, Random& random) {
+  VectorXd out(samples.error.size());
+  Eigen::FFT<double> fft;
+  for (std::size_t l = 0; l < samples.first.size(); ++l) {
+    const Index first = samples.first[l], rows = samples.rows(l);
+    // The transform is slow where a length has large prime factors.
+    Index length = 1;
+    while (2 * length <= rows) length *= 2;
+    std::vector<double> x(samples.error.data() + first, samples.error.data() + first + length);
+    std::vector<std::complex<double>> lines;
+    fft.fwd(lines, x);
+    for (std::size_t k = 1; k < lines.size() / 2; ++k) {
+      lines[k] = std::polar(std::abs(lines[k]), random.uniform(0, 2 * std::numbers::pi));
+      lines[lines.size() - k] = std::conj(lines[k]);
     }
+    fft.inv(x, lines);
+    for (Index r = 0; r < rows; ++r) out[first + r] = x[static_cast<std::size_t>(r % length)];
   }
   return out;
 }
 
 /// Clocks start anywhere: time is a log's own.
-Region in_time(const std::vector<const ProcessedLog*>& logs, const Samples& samples) {
-  Region best{"t"};
+Region clearest_in_time(const std::vector<const ProcessedLog*>& logs, const Samples& samples, const VectorXd& power) {
+  Region best;
   for (std::size_t l = 0; l < logs.size(); ++l) {
-    const Index first = samples.first[l], rows = logs[l]->rows();
+    const Index first = samples.first[l], rows = samples.rows(l);
     Region region = Classes(samples.t.segment(first, rows))
-                        .clearest("t", samples.power.segment(first, rows), samples.power.sum(),
-                                  static_cast<double>(samples.power.size()));
+                        .clearest(power.segment(first, rows), power.sum(), static_cast<double>(power.size()));
+    region.signal = "t";
     if (logs.size() > 1) region.log = logs[l]->name;
     if (region.contrast() > best.contrast()) best = region;
   }
   return best;
+}
+
+/// The clearest interval of time, if an error that is the same everywhere has none that is as clear.
+std::vector<Region> in_time(const std::vector<const ProcessedLog*>& logs, const Samples& samples, double chance) {
+  const Region best = clearest_in_time(logs, samples, samples.power);
+  Random random(1);
+  for (int draw = 0; draw < draws_for(chance); ++draw) {
+    const VectorXd power = stationary(samples, random).cwiseAbs2().array() - samples.noise_square;
+    if (clearest_in_time(logs, samples, power).contrast() >= best.contrast()) return {};
+  }
+  return {best};
 }
 
 /// Octaves of frequency, without a white noise of that size; their share of the band instead of that of time.
@@ -171,71 +245,46 @@ Region in_frequency(const std::vector<const ProcessedLog*>& logs, const std::vec
     power.head(inside).array() -= noise * noise / cutoff * static_cast<double>(log.rows());
   }
   const double whole = power.sum();
-  Region best{"frequency"};
+  Region best;
+  best.signal = "frequency";
   for (double from = 0; from < cutoff && whole > 0 && step > 0; from = std::max(2 * from, 0.5)) {
     const double to = std::max(2 * from, 0.5);
     const auto a = static_cast<Index>(from / step), b = std::min<Index>(power.size(), static_cast<Index>(to / step));
     if (b <= a) continue;
     const double share = std::min(1.0, power.segment(a, b - a).sum() / whole), of_band = (to - from) / cutoff;
-    if (share - of_band > best.contrast()) best = {"frequency", from, to, share, of_band};
+    if (share - of_band > best.contrast()) best = {"frequency", 0, from, to, share, of_band};
   }
   return best;
 }
 
-/// "at velocity -0.05 .. 0.05 rad/s"
-std::string place_of(const GapRegion& region, const Joint& joint) {
-  const std::string position = joint.position_unit();
-  if (region.signal == "direction") return region.to > 0 ? "in positive direction" : "in negative direction";
-  const auto range = [&](const std::string& name, const std::string& unit) {
-    return fmt::format("at {} {:.3g} .. {:.3g} {}", name, region.from, region.to, unit);
-  };
-  if (region.signal == "q") return range("position", position);
-  if (region.signal == "dq") return range("velocity", position + "/s");
-  if (region.signal == "ddq") return range("acceleration", position + "/s^2");
-  if (region.signal == "load") return range("load", joint.torque_unit());
-  if (region.signal == "frequency") return range("frequency", "Hz");
-  return range("time", "s") + (region.log.empty() ? "" : " of " + region.log);
-}
-
-std::string sentence(const GapRegion& region, const Joint& joint) {
-  std::string out = fmt::format("{:.0f} % of the gap is {}", 100 * *region.share_of_gap, place_of(region, joint));
-  if (region.signal != "frequency") out += fmt::format(", {:.0f} % of the time", 100 * *region.share_of_time);
-  return out;
-}
-
 }  // namespace
 
-GapPlace where(const Joint& joint, std::size_t index, const std::vector<const ProcessedLog*>& logs,
+GapPlace where(const Robot& robot, std::size_t index, const std::vector<const ProcessedLog*>& logs,
                const std::vector<VectorXd>& load, const std::vector<VectorXd>& error, double noise,
                const ReportOptions& options) {
   Samples samples = samples_of(logs, index, load, error);
   take_noise(logs, samples, noise);
-  std::vector<Region> regions;
-  const auto add = [&](const std::string& signal, const VectorXd& values) {
-    if (const auto region = concentrated(signal, values, samples, options.region_chance)) regions.push_back(*region);
-  };
-  add("dq", samples.dq);
-  add("q", samples.q);
-  add("ddq", samples.ddq);
-  add("load", samples.load);
-  add("direction", samples.dq.cwiseSign());
-  if (!regions.empty() && regions.back().signal == "direction") {
+  std::vector<Region> regions = in_motion(samples, options.region_chance);
+  for (Region& region : regions) {
     // All of one sign, not the edge of an interval.
-    regions.back().to > 0 ? regions.back().from = 0 : regions.back().to = 0;
+    if (region.signal == "direction") (region.to > 0 ? region.from : region.to) = 0;
   }
-  std::sort(regions.begin(), regions.end(),
-            [](const Region& a, const Region& b) { return a.contrast() > b.contrast(); });
+  // What another joint's position explains, its own motion may explain as well: the joint's own is told first.
+  std::sort(regions.begin(), regions.end(), [&](const Region& a, const Region& b) {
+    const auto rank = [&](const Region& r) { return r.contrast() - (r.joint > 0 ? options.other_joint : 0); };
+    return rank(a) > rank(b);
+  });
   // What has no place in the motion may have one in time, or in the spectrum.
-  if (regions.empty()) regions.push_back(in_time(logs, samples));
-  if (regions.front().contrast() < options.least_contrast) regions = {in_frequency(logs, error, noise)};
+  if (regions.empty()) regions = in_time(logs, samples, options.region_chance);
+  if (regions.empty() || regions.front().contrast() < options.least_contrast)
+    regions = {in_frequency(logs, error, noise)};
   GapPlace out;
   for (const Region& region : regions) {
     if (out.regions.size() >= most_regions || region.contrast() < options.least_contrast) break;
     out.regions.push_back(
-        {region.signal, region.from, region.to, std::min(1.0, region.share), region.of_time, region.log});
+        {region.signal, region.joint, region.from, region.to, std::min(1.0, region.share), region.of_time, region.log});
   }
-  out.sentence =
-      out.regions.empty() ? "the gap is the same everywhere in these logs" : sentence(out.regions.front(), joint);
+  out.sentence = sentence_of(out.regions, robot, index, logs);
   return out;
 }
 

@@ -9,12 +9,14 @@
 
 namespace fxdyn::diagnosis {
 
-/// Where a gap sits: the intervals of velocity, position, acceleration, load and the direction that hold more of its
-/// power than of the samples, and more than the same error shifted in time against the motion ever does
-/// (ReportOptions::region_chance). Else an interval of time, or of frequency. The clearest first.
-/// @param joint the one at `index` @param load the rigid body's torque on it over each log, full rate [N*m | N]
+/// Where a gap sits: the intervals of the joint's velocity, speed, position, acceleration, load and direction, and of
+/// other joints' positions, that hold more of its power than of the samples. Listed are those that are clearer than
+/// every interval of every signal that the same error has when it is shifted in time against the motion
+/// (ReportOptions::region_chance). Else an interval of time, if an error of the same spectrum that is the same
+/// everywhere never has one that is as clear. Else one of frequency. The clearest first.
+/// @param index the joint @param load the rigid body's torque on it over each log, full rate [N*m | N]
 /// @param error its filtered residual likewise @param noise its noise floor
-GapPlace where(const Joint& joint, std::size_t index, const std::vector<const ProcessedLog*>& logs,
+GapPlace where(const Robot& robot, std::size_t index, const std::vector<const ProcessedLog*>& logs,
                const std::vector<Eigen::VectorXd>& load, const std::vector<Eigen::VectorXd>& error, double noise,
                const ReportOptions& options);
 

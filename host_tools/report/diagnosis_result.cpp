@@ -39,16 +39,14 @@ json to_json(const GapRegion& region) {
            {"to", region.to},
            {"share_of_gap", or_null(region.share_of_gap)},
            {"share_of_time", or_null(region.share_of_time)}};
+  if (region.joint > 0) out["joint"] = region.joint;
   if (!region.log.empty()) out["log"] = region.log;
   return out;
 }
 
 GapRegion region_of(const json& file) {
-  return {file.at("signal"),
-          number_of(file.at("from")),
-          number_of(file.at("to")),
-          optional_of(file.at("share_of_gap")),
-          optional_of(file.at("share_of_time")),
+  return {file.at("signal"),        file.value("joint", std::size_t{0}),  number_of(file.at("from")),
+          number_of(file.at("to")), optional_of(file.at("share_of_gap")), optional_of(file.at("share_of_time")),
           file.value("log", "")};
 }
 

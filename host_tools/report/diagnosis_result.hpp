@@ -19,7 +19,8 @@ Verdict verdict_of(std::string_view name);
 
 /// A region of the motion in which a gap sits.
 struct GapRegion {
-  std::string signal;  ///< dq, q, ddq, load, t, direction, frequency
+  std::string signal;     ///< dq, speed, q, ddq, load, t, direction, frequency
+  std::size_t joint = 0;  ///< from 1: the other joint whose q it is; 0: the joint's own signal
   double from = 0, to = 0;
   std::optional<double> share_of_gap, share_of_time;
   std::string log;  ///< empty: of all logs
@@ -27,7 +28,7 @@ struct GapRegion {
 
 /// Where a gap sits.
 struct GapPlace {
-  std::string sentence;  ///< "61 % of the gap at velocity -0.05 .. 0.05 rad/s, in 8 % of the time"
+  std::string sentence;  ///< "61 % of the gap is at reversals, below 0.05 rad/s, in 8 % of the time"
   std::vector<GapRegion> regions;
 };
 

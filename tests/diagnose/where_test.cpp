@@ -2,6 +2,7 @@
 
 #include "host_tools/diagnose/where.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -33,7 +34,7 @@ class Where : public testing::Test {
     VectorXd error(log_.samples());
     for (Index k = 0; k < error.size(); ++k) error[k] = inside(motion.q(k, 0), motion.dq(k, 0), log_.t[k]) ? 1 : 0.1;
     const VectorXd load = predict(model_, log_).col(static_cast<Index>(joint));
-    return where(model_.robot.joints[joint], joint, {&log_}, {load}, {error}, 0.1, {});
+    return where(model_.robot, joint, {&log_}, {load}, {error}, 0.1, {});
   }
   static GapRegion region(const std::vector<GapRegion>& all, const std::string& signal) {
     const auto found = std::find_if(all.begin(), all.end(), [&](const GapRegion& r) { return r.signal == signal; });
@@ -87,9 +88,56 @@ TEST_F(Where, AnErrorThatHasNothingToDoWithTheMotionHasNoPlaceInIt) {
 }
 
 TEST_F(Where, TheSentenceHasTheClearestRegion) {
-  EXPECT_TRUE(place([](double q, double, double) {
-                return q > 0.2 && q < 0.4;
-              }).sentence.find("% of the gap is at position 0.") != std::string::npos);
+  EXPECT_THAT(
+      place([](double q, double, double) { return q > 0.2 && q < 0.4; }).sentence,
+      testing::MatchesRegex("[19].* % of the gap is between 0\\.[12].* and 0\\.[34].* rad, in .* % of the time"));
+}
+
+TEST_F(Where, SlowMotionIsAtReversals) {
+  const GapPlace found = place([](double, double dq, double) { return std::fabs(dq) < 0.2; });
+  const GapRegion slow = found.regions.at(0);
+  EXPECT_TRUE(slow.signal == "speed" || slow.signal == "dq");
+  EXPECT_LT(slow.from, 0.02);
+  EXPECT_NEAR(slow.to, 0.2, 0.06);
+  EXPECT_THAT(found.sentence, testing::HasSubstr("at reversals, below 0."));
+}
+
+TEST_F(Where, AnotherJointsPositionIsNamedWithIt) {
+  constexpr std::size_t other = 3;
+  VectorXd error(log_.samples());
+  for (Index k = 0; k < error.size(); ++k) error[k] = log_.q(k, other) > 0.5 ? 1 : 0.1;
+  const VectorXd load = predict(model_, log_).col(static_cast<Index>(joint));
+  const GapPlace found = where(model_.robot, joint, {&log_}, {load}, {error}, 0.1, {});
+  ASSERT_FALSE(found.regions.empty());
+  EXPECT_EQ(found.regions[0].signal, "q");
+  EXPECT_EQ(found.regions[0].joint, other + 1);
+  EXPECT_NEAR(found.regions[0].from, 0.5, 0.1);
+  EXPECT_THAT(found.sentence, testing::HasSubstr("while joint 4 is between 0."));
+}
+
+TEST_F(Where, TheFirstSecondsAreCalledSo) {
+  EXPECT_THAT(place([](double, double, double t) { return t < 3; }).sentence, testing::HasSubstr("in the first "));
+  EXPECT_THAT(place([](double, double, double t) { return t > 17; }).sentence, testing::HasSubstr("in the last "));
+}
+
+// Slow noise has louder and quieter seconds, too.
+TEST_F(Where, SlowNoiseSeldomHasAPlace) {
+  Random random(9);
+  const VectorXd load = predict(model_, log_).col(static_cast<Index>(joint));
+  int placed = 0;
+  constexpr int draws = 60;
+  for (int draw = 0; draw < draws; ++draw) {
+    VectorXd error(log_.samples());
+    double slow = 0;
+    for (double& value : error) value = slow = 0.99 * slow + 0.1 * random.normal();  // 0.4 s
+    for (const GapRegion& region : where(model_.robot, joint, {&log_}, {load}, {error}, 0.1, {}).regions)
+      if (region.signal != "frequency") {
+        ++placed;
+        break;
+      }
+  }
+  // 2 % in the motion and 2 % in time are allowed: 7 of 60 have a chance of 0.6 %.
+  EXPECT_LE(placed, 6);
 }
 
 }  // namespace
