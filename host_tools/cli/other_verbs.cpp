@@ -11,6 +11,7 @@
 #include "host_tools/cli/verb.hpp"
 #include "host_tools/excite/excite.hpp"
 #include "host_tools/pipeline/forward_log.hpp"
+#include "host_tools/pipeline/next_experiment.hpp"
 #include "host_tools/pipeline/one_log.hpp"
 #include "host_tools/pipeline/refine_model.hpp"
 #include "host_tools/simulate/simulate.hpp"
@@ -21,7 +22,7 @@ namespace fxdyn::cli {
 
 Action add_excite(CLI::App& verb) {
   struct Options {
-    std::string project, out;
+    std::string project, out, after;
     bool paper = false;
   };
   const auto options = std::make_shared<Options>();
@@ -29,13 +30,20 @@ Action add_excite(CLI::App& verb) {
   verb.add_flag("--paper", options->paper,
                 "no project: the trajectory of the paper's Table 1, as printed and corrected")
       ->excludes(project);
+  verb.add_option("--after", options->after,
+                  "results of `diagnose`: plan 10 to 20 s of motion that decide what it left open");
   verb.add_option("--out", options->out, "directory for the results")->required();
   return [options] {
     if (!options->paper && options->project.empty())
       throw InputError("excite: name a PROJECT, or --paper; see fxdyn excite --help");
     Progress progress;
-    fmt::print("{}", options->paper ? excite_paper(options->out)
-                                    : excite(read_project(options->project), options->out, progress));
+    if (options->paper) {
+      fmt::print("{}", excite_paper(options->out));
+    } else if (options->after.empty()) {
+      fmt::print("{}", excite(read_project(options->project), options->out, progress));
+    } else {
+      fmt::print("{}", excite_after(read_project(options->project), options->after, options->out, progress));
+    }
   };
 }
 

@@ -38,47 +38,77 @@ Log to_log(const Motion& motion) {
 
 }  // namespace
 
+MatrixXd information_left(const MatrixXd& columns, const MatrixXd& cross, const MatrixXd& nuisance) {
+  constexpr double rank_tolerance = 1e-12;
+  const VectorXd scale = nuisance.diagonal().unaryExpr([](double x) { return x > 0 ? 1 / std::sqrt(x) : 0.0; });
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(scale.asDiagonal() * nuisance * scale.asDiagonal());
+  const double most = eigen.eigenvalues().tail(1)[0];
+  const VectorXd inverse =
+      eigen.eigenvalues().unaryExpr([=](double x) { return x > rank_tolerance * most ? 1 / x : 0.0; });
+  const MatrixXd half = scale.asDiagonal() * eigen.eigenvectors();
+  return columns - cross.transpose() * (half * inverse.asDiagonal() * half.transpose()) * cross;
+}
+
 std::vector<Index> columns_from(Index first, Index count) {
   std::vector<Index> indices;
   for (Index i = 0; i < count; ++i) indices.push_back(first + i);
   return indices;
 }
 
-void Information::add_blocks(const IdentifiedModel& nominal, const std::vector<Motion>& motions,
-                             const std::vector<RobotColumns>& columns) {
+namespace {
+
+/// All that the catalogue has beyond the nominal model, with typical shapes.
+std::vector<EffectCandidate> catalogue_of(const Robot& robot, const std::vector<Motion>& motions,
+                                          const std::vector<RobotColumns>& columns) {
   std::vector<MatrixXd> torque, structural;
   for (const RobotColumns& c : columns) {
     torque.push_back(c.torque());
     structural.push_back(c.structural());
   }
-  const std::size_t n = robot_of(nominal).size();
+  std::vector<EffectCandidate> out;
+  for (const EffectInfo& info : effect_infos()) {
+    if (info.nominal || info.unites_others()) continue;  // what shows those shows it
+    for (std::size_t j = 0; j < (info.acts_on == ActsOn::body ? 1 : robot.size()); ++j) {
+      for (const auto& shape : typical_shapes(info.name, j, robot, motions, torque, structural))
+        out.push_back({std::string(info.name), j, shape});
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+void Information::add_blocks(const Robot& robot, const std::vector<EffectCandidate>& candidates) {
   Index at = base;
-  const auto add = [&](std::string_view effect, std::size_t joint, std::vector<double> shape) {
-    const EffectInfo& info = *find_effect(effect);
-    Block block{{std::string(effect), joint, std::move(shape)},
-                info.acts_on == ActsOn::body,
-                at,
-                static_cast<Index>(info.linear.size())};
-    block.raw.resize(n);
+  const auto add = [&](const EffectCandidate& candidate) {
+    const EffectInfo& info = *find_effect(candidate.effect);
+    Block block{candidate, info.acts_on == ActsOn::body, at, static_cast<Index>(info.linear.size())};
+    block.raw.resize(robot.size());
     at += block.count;
     blocks.push_back(std::move(block));
   };
-  for (std::size_t j = 0; j < n; ++j) {
-    for (const std::string& effect : nominal_effects()) add(effect, j, {});
+  for (std::size_t j = 0; j < robot.size(); ++j) {
+    for (const std::string& effect : nominal_effects()) add({effect, j, {}});
   }
   nominal_blocks = blocks.size();
-  for (const EffectInfo& info : effect_infos()) {
-    if (info.nominal || info.unites_others()) continue;  // what shows those shows it
-    for (std::size_t j = 0; j < (info.acts_on == ActsOn::body ? 1 : n); ++j) {
-      for (const auto& shape : typical_shapes(info.name, j, robot_of(nominal), motions, torque, structural))
-        add(info.name, j, shape);
-    }
-  }
+  for (const EffectCandidate& candidate : candidates) add(candidate);
   gram = MatrixXd::Zero(at, at);
 }
 
 Information::Information(const IdentifiedModel& nominal, const std::vector<Motion>& motions,
                          const VectorXd& white_noise, std::optional<double> torque_cutoff_hz, Progress& progress) {
+  measure(nominal, motions, white_noise, torque_cutoff_hz, nullptr, &progress);
+}
+
+Information::Information(const IdentifiedModel& nominal, const std::vector<Motion>& motions,
+                         const VectorXd& white_noise, std::optional<double> torque_cutoff_hz,
+                         const std::vector<EffectCandidate>& candidates) {
+  measure(nominal, motions, white_noise, torque_cutoff_hz, &candidates, nullptr);
+}
+
+void Information::measure(const IdentifiedModel& nominal, const std::vector<Motion>& motions,
+                          const VectorXd& white_noise, std::optional<double> torque_cutoff_hz,
+                          const std::vector<EffectCandidate>* candidates, Progress* progress) {
   std::vector<Log> logs;
   for (const Motion& motion : motions) logs.push_back(to_log(motion));
   SignalSettings signals;
@@ -90,11 +120,12 @@ Information::Information(const IdentifiedModel& nominal, const std::vector<Motio
   const DhChain chain = to_dh(robot_of(nominal));
   const BaseSet base_set = find_base(chain);
   base = static_cast<Index>(base_set.columns.size());
-  add_blocks(nominal, motions, columns);
+  add_blocks(robot_of(nominal),
+             candidates != nullptr ? *candidates : catalogue_of(robot_of(nominal), motions, columns));
 
   for (std::size_t m = 0; m < motions.size(); ++m)
     add_motion(motions[m], logs[m], columns[m], white_noise, chain, base_set, progress);
-  progress.done();
+  if (progress != nullptr) progress->done();
   for (Block& block : blocks) {
     for (MatrixXd& raw : block.raw) raw /= seconds;
   }
@@ -102,7 +133,7 @@ Information::Information(const IdentifiedModel& nominal, const std::vector<Motio
 
 void Information::add_motion(const Motion& motion, const Log& recorded, const RobotColumns& columns,
                              const VectorXd& white_noise, const DhChain& chain, const BaseSet& base_set,
-                             Progress& progress) {
+                             Progress* progress) {
   const auto n = static_cast<std::size_t>(motion.q.cols());
   const ProcessedLog log = process(recorded, filter);
   const Index samples = log.last - log.first;
@@ -114,7 +145,7 @@ void Information::add_motion(const Motion& motion, const Log& recorded, const Ro
   noise = white_noise * std::sqrt(cutoff / nyquist);
   const VectorXd weight = std::sqrt(2 * cutoff * duration / static_cast<double>(log.rows())) * noise.cwiseInverse();
 
-  progress.stage(fmt::format("what {} shows", motion.name), blocks.size() + n);
+  if (progress != nullptr) progress->stage(fmt::format("what {} shows", motion.name), blocks.size() + n);
   std::vector<std::vector<MatrixXd>> effect(blocks.size());  // [block][joint], filtered and decimated
   parallel_for(blocks.size(), [&](std::size_t b) {
     const EffectColumns full = columns(blocks[b].candidate);
@@ -127,7 +158,7 @@ void Information::add_motion(const Motion& motion, const Log& recorded, const Ro
       blocks[b].raw[j] = blocks[b].raw[j].size() == 0 ? power : MatrixXd(blocks[b].raw[j] + power);
       effect[b][j] = log.decimate(log.filter_columns(c));
     }
-    progress.step();
+    if (progress != nullptr) progress->step();
   });
 
   std::vector<MatrixXd> rows(n, MatrixXd(motion.q.rows(), base));
@@ -159,7 +190,7 @@ void Information::add_motion(const Motion& motion, const Log& recorded, const Ro
     grams[j] = MatrixXd::Zero(x.cols(), x.cols());
     grams[j].selfadjointView<Eigen::Lower>().rankUpdate(x.transpose());
     grams[j].triangularView<Eigen::StrictlyUpper>() = grams[j].transpose();
-    progress.step();
+    if (progress != nullptr) progress->step();
   });
   for (std::size_t j = 0; j < n; ++j) gram(places[j], places[j]) += grams[j];
 }

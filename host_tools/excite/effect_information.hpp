@@ -30,15 +30,23 @@ std::vector<std::vector<double>> typical_shapes(std::string_view effect, std::si
                                                 const std::vector<Eigen::MatrixXd>& torque,
                                                 const std::vector<Eigen::MatrixXd>& structural);
 
+/// Information on columns that is left when those of a nuisance are fitted too: columns - cross^T nuisance^+ cross.
+/// Rank of the nuisance: eigenvalues above 1e-12 of the largest, its diagonal normalised to 1.
+Eigen::MatrixXd information_left(const Eigen::MatrixXd& columns, const Eigen::MatrixXd& cross,
+                                 const Eigen::MatrixXd& nuisance);
+
 /// first, first + 1, .. first + count - 1
 std::vector<Eigen::Index> columns_from(Eigen::Index first, Eigen::Index count);
 
 /// Columns of all effects over all motions, as information: sums over rows of products, weighted so that the unit is
 /// one over a coefficient's variance.
 struct Information {
-  /// @param noise, torque_cutoff_hz: see SightSettings
+  /// Of the whole catalogue with its typical shapes. @param noise, torque_cutoff_hz: see SightSettings
   Information(const IdentifiedModel& nominal, const std::vector<Motion>& motions, const Eigen::VectorXd& noise,
               std::optional<double> torque_cutoff_hz, Progress& progress);
+  /// Of these alone, each a block after the nominal ones.
+  Information(const IdentifiedModel& nominal, const std::vector<Motion>& motions, const Eigen::VectorXd& noise,
+              std::optional<double> torque_cutoff_hz, const std::vector<EffectCandidate>& candidates);
 
   FilterFit filter;
   double seconds = 0, independent_samples = 0;
@@ -49,10 +57,12 @@ struct Information {
   Eigen::MatrixXd gram;
 
  private:
-  void add_blocks(const IdentifiedModel& nominal, const std::vector<Motion>& motions,
-                  const std::vector<RobotColumns>& columns);
+  void measure(const IdentifiedModel& nominal, const std::vector<Motion>& motions, const Eigen::VectorXd& noise,
+               std::optional<double> torque_cutoff_hz, const std::vector<EffectCandidate>* candidates,
+               Progress* progress);
+  void add_blocks(const Robot& robot, const std::vector<EffectCandidate>& candidates);
   void add_motion(const Motion& motion, const Log& log, const RobotColumns& columns, const Eigen::VectorXd& noise,
-                  const DhChain& chain, const BaseSet& base_set, Progress& progress);
+                  const DhChain& chain, const BaseSet& base_set, Progress* progress);
 };
 
 }  // namespace fxdyn

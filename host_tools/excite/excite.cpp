@@ -34,32 +34,6 @@ json conditioning_json(const Conditioning& c) {
   return {{"base", number(c.base)}, {"all", number(c.all)}, {"log_det", number(c.log_determinant)}};
 }
 
-json trajectory_json(const PlannedTrajectory& trajectory, const Robot& robot) {
-  json out{{"name", trajectory.name},
-           {"kind", trajectory.kind},
-           {"file", trajectory.name + ".csv"},
-           {"plot", trajectory.name + ".svg"},
-           {"duration_s", trajectory.t[trajectory.t.size() - 1]},
-           {"samples", trajectory.t.size()},
-           {"start", list(trajectory.q.row(0).transpose())}};
-  if (trajectory.series.empty()) {
-    out["dwell_s"] = trajectory.dwell_s;
-    out["moves_s"] = trajectory.moves_s;
-    out["poses"] = json::array();
-    for (const auto& pose : trajectory.poses.rowwise()) out["poses"].push_back(list(pose.transpose()));
-    return out;
-  }
-  out["period_s"] = trajectory.period_s;
-  out["periods"] = trajectory.periods;
-  out["series"] = json::array();
-  for (std::size_t j = 0; j < robot.size(); ++j) {
-    json series = series_json(trajectory.series[j]);
-    series["joint"] = robot.joints[j].name;
-    out["series"].push_back(std::move(series));
-  }
-  return out;
-}
-
 json settings_json(const ExciteSettings& settings) {
   return {{"period_s", settings.period_s}, {"order", settings.order},   {"trajectories", settings.trajectories},
           {"step_s", settings.step_s},     {"starts", settings.starts}, {"margin", settings.margin},
@@ -158,6 +132,36 @@ std::string position_unit(const Robot& robot) {
 
 }  // namespace
 
+json trajectory_json(const PlannedTrajectory& trajectory, const Robot& robot) {
+  json out{{"name", trajectory.name},
+           {"kind", trajectory.kind},
+           {"file", trajectory.name + ".csv"},
+           {"plot", trajectory.name + ".svg"},
+           {"duration_s", trajectory.t[trajectory.t.size() - 1]},
+           {"samples", trajectory.t.size()},
+           {"start", list(trajectory.q.row(0).transpose())}};
+  if (trajectory.series.empty()) {
+    out["dwell_s"] = trajectory.dwell_s;
+    out["moves_s"] = trajectory.moves_s;
+    out["poses"] = json::array();
+    for (const auto& pose : trajectory.poses.rowwise()) out["poses"].push_back(list(pose.transpose()));
+    return out;
+  }
+  out["period_s"] = trajectory.period_s;
+  out["periods"] = trajectory.periods;
+  out["series"] = json::array();
+  for (std::size_t j = 0; j < robot.size(); ++j) {
+    json series = series_json(trajectory.series[j]);
+    series["joint"] = robot.joints[j].name;
+    out["series"].push_back(std::move(series));
+  }
+  return out;
+}
+
+void write_motion(const fs::path& directory, const Motion& motion, const Robot& robot) {
+  write_motion(directory, motion, joint_names(robot), position_unit(robot));
+}
+
 void write_motion(const fs::path& directory, const Motion& motion, const std::vector<std::string>& names,
                   const std::string& unit) {
   Log log;
@@ -202,7 +206,7 @@ std::string excite(const Project& project, const fs::path& directory, Progress& 
   document["sight"] = sight_json(sight, nominal.assumptions);
   progress.stage("writing", plan.trajectories.size());
   for (const PlannedTrajectory& one : plan.trajectories) {
-    write_motion(directory, one, joint_names(project.robot), position_unit(project.robot));
+    write_motion(directory, one, project.robot);
     progress.step();
   }
   progress.done();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 
 #include "host_tools/excite/plan.hpp"
@@ -11,6 +12,12 @@ namespace fxdyn {
 /// and <name>.svg each, and excite.json. Returns the table for the terminal.
 /// @throws InputError, DataError as make_plan(); then nothing is written.
 std::string excite(const Project& project, const std::filesystem::path& directory, Progress& progress);
+
+/// The same of a robot's motion.
+void write_motion(const std::filesystem::path& directory, const Motion& motion, const Robot& robot);
+
+/// An entry of the key "trajectories" of excite.json.
+nlohmann::json trajectory_json(const PlannedTrajectory& trajectory, const Robot& robot);
 
 /// NAME.csv and NAME.svg of a motion; joint names for the key of the plot, the unit of position for its axes.
 void write_motion(const std::filesystem::path& directory, const Motion& motion, const std::vector<std::string>& names,

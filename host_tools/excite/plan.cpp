@@ -10,8 +10,8 @@
 
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/excite/evolution.hpp"
+#include "host_tools/excite/feasible.hpp"
 #include "host_tools/excite/pose_walk.hpp"
-#include "host_tools/excite/series_coordinates.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/parallel.hpp"
 #include "host_tools/support/random.hpp"
@@ -36,7 +36,6 @@ constexpr int population = 16;
 int search_generations(Index coordinates) { return 30 + static_cast<int>(coordinates); }
 int polish_generations(Index coordinates) { return 60 + 6 * static_cast<int>(coordinates); }
 constexpr int polish_rounds = 2;
-constexpr int pool_size = 150;  ///< feasible poses, to start from and to dwell at
 constexpr Index static_poses = 10;
 /// Objective: log(condition of the base) + all_weight log(condition of all) - weight log det / parameters. The
 /// determinant is the smoother guide, the condition numbers are the aim.
@@ -44,8 +43,7 @@ constexpr double search_weight = 0.5, polish_weight = 1.0, all_weight = 0.25;
 /// Of a violation, see LimitCheck: large enough that no optimum lies beyond a limit.
 constexpr double penalty = 50;
 
-/// Kept while optimising, beside the margin: what falls between the samples of the search.
-constexpr double between_samples = 0.02;
+constexpr double between_samples = FeasibleMotions::between_samples;
 
 /// Indices in ascending order of the values.
 std::vector<std::size_t> ascending(const std::vector<double>& values) {
@@ -61,13 +59,13 @@ class Planner {
       : project_(project),
         settings_(project.excite),
         progress_(progress),
-        check_(make_check(project, directory, plan_.notes)),
+        feasible_(project, directory, plan_.notes),
+        check_(feasible_.check()),
         columns_(project.robot, sign_widths(project, directory)) {
     choose_noise();
   }
 
   Plan plan() {
-    find_poses();
     random_baseline();
     search();
     if (has_static()) choose_walk();
@@ -85,14 +83,6 @@ class Planner {
   }
 
  private:
-  static LimitCheck make_check(const Project& project, const std::filesystem::path& directory,
-                               std::vector<std::string>& notes) {
-    MotionLimits limits = motion_limits(project);
-    notes = limits.notes;
-    auto model = torque_model(project, directory, notes);
-    return {project.robot, std::move(limits), std::move(model), project.excite.margin};
-  }
-
   static VectorXd sign_widths(const Project& project, const std::filesystem::path& directory) {
     VectorXd widths = VectorXd::Constant(static_cast<Index>(project.robot.size()), JointFit{}.sign_width);
     if (const auto file = directory / "model.json"; std::filesystem::exists(file)) {
@@ -140,68 +130,6 @@ class Planner {
     }
   }
 
-  /// Poses at rest within position limits, box and torque limits.
-  void find_poses() {
-    Random random(settings_.seed * 1000003 + 17);
-    const auto draw = [&] {
-      VectorXd q(joints());
-      for (Index j = 0; j < q.size(); ++j) q[j] = random.uniform(check_.lower()[j], check_.upper()[j]);
-      return q;
-    };
-    VectorXd best;
-    double least = infinity;
-    for (int tries = 0; tries < 50 * pool_size && pool_.size() < pool_size; ++tries) {
-      const VectorXd q = draw();
-      const double violation = check_.violation(one_pose(q), between_samples);
-      if (violation < least) {
-        least = violation;
-        best = q;
-      }
-      if (violation == 0) pool_.push_back(q);
-    }
-    if (!pool_.empty()) return;
-    const VectorXd middle = 0.5 * (check_.lower() + check_.upper()), half = 0.5 * (check_.upper() - check_.lower());
-    const auto pose = [&](const VectorXd& x) {
-      return VectorXd(middle + half.cwiseProduct(x.cwiseMax(-1).cwiseMin(1)));
-    };
-    const VectorXd x =
-        minimise([&](const VectorXd& at) { return check_.violation(one_pose(pose(at)), between_samples); },
-                 (best - middle).cwiseQuotient(half), {200, population, 0.2, settings_.seed}, [] {});
-    best = pose(x);
-    if (check_.violation(one_pose(best), between_samples) == 0) {
-      pool_.push_back(best);
-      return;
-    }
-    refuse("no pose at rest", one_pose(best));
-  }
-
-  [[noreturn]] void refuse(std::string_view what, const Motion& nearest) const {
-    throw InputError(
-        fmt::format("{}: {} keeps the limits and their margins; the best one found violates {}; widen that "
-                    "limit or lower [excite] margin ({})",
-                    project_.file.string(), what, check_.worst(nearest, between_samples), settings_.margin));
-  }
-
-  /// Shrinks the motion until it is feasible; whether it got there.
-  bool make_feasible(const SeriesCoordinates& coordinates, VectorXd& x) const {
-    for (int i = 0; check_.violation(coordinates.decode(x).motion, between_samples) > 0; ++i) {
-      if (i == 40) return false;
-      coordinates.shrink(x, 0.85);
-    }
-    return true;
-  }
-
-  VectorXd random_feasible(const SeriesCoordinates& coordinates, std::uint64_t seed) const {
-    Random random(seed);
-    VectorXd x;
-    for (int tries = 0; tries < 20; ++tries) {
-      const auto pick = static_cast<std::size_t>(random.uniform() * static_cast<double>(pool_.size()));
-      x = coordinates.random(random.next(), pool_[pick]);
-      if (make_feasible(coordinates, x)) return x;
-    }
-    refuse("no motion", coordinates.decode(x).motion);
-  }
-
   MatrixXd information(const SeriesCoordinates& coordinates, const Motion& motion) const {
     return columns_.information(motion, plan_.noise) * coordinates.kind().periods;
   }
@@ -238,7 +166,7 @@ class Planner {
       for (std::size_t k = 0; k < list.size(); ++k) {
         const std::uint64_t seed = (settings_.seed * 1000 + k) * 1000 + i;
         Draw& draw = draws_[k][i];
-        draw.x = random_feasible(coordinates_[k], seed);
+        draw.x = feasible_.random(coordinates_[k], seed);
         draw.information = information(coordinates_[k], coordinates_[k].decode(draw.x).motion);
         sum += draw.information;
         if (k == 0) firsts[i] = conditioning(sum);
@@ -303,7 +231,7 @@ class Planner {
              penalty * check_.violation(decoded.motion, between_samples);
     };
     VectorXd x = minimise(objective, start, evolution, [&] { progress_.step(); });
-    if (!make_feasible(coordinates, x)) return;
+    if (!feasible_.make_feasible(coordinates, x)) return;
     const MatrixXd own = information(coordinates, coordinates.decode(x).motion);
     if (const double at = value(others + own, weight); at < best_value) {
       best_value = at;
@@ -311,20 +239,15 @@ class Planner {
     }
   }
 
-  /// Samples the series at the plan's step; what the coarse samples missed shrinks it.
   void add_fourier(std::size_t index) {
     const SeriesCoordinates& coordinates = coordinates_[index];
-    VectorXd x = chosen_[index].x;
     PlannedTrajectory planned;
     planned.kind = coordinates.kind().name;
     planned.period_s = coordinates.period_s();
     planned.periods = coordinates.kind().periods;
-    for (int shrunk = 0;; ++shrunk) {
-      planned.series = coordinates.decode(x).series;
-      static_cast<Motion&>(planned) = play(planned.series, planned.period_s, planned.periods, settings_.step_s);
-      if (check_.violation(planned) == 0 || shrunk == most_shrinks) break;  // what remains, check_all() refuses
-      coordinates.shrink(x, 0.98);
-    }
+    FeasibleMotions::Sampled sampled = feasible_.sample(coordinates, chosen_[index].x);
+    planned.series = std::move(sampled.series);
+    static_cast<Motion&>(planned) = std::move(sampled.motion);
     plan_.trajectories.push_back(std::move(planned));
   }
 
@@ -339,7 +262,6 @@ class Planner {
     }
   }
 
-  static constexpr int most_shrinks = 100;
   MatrixXd static_information(const PoseWalk& walk) const {
     return columns_.information(walk.motion(coarse_step_s), plan_.noise);
   }
@@ -347,8 +269,8 @@ class Planner {
   PoseWalk random_walk(Random& random) const {
     PoseWalk out;
     for (int tries = 0; tries < 100 && static_cast<Index>(out.poses.size()) < static_poses; ++tries) {
-      const auto pick = static_cast<std::size_t>(random.uniform() * static_cast<double>(pool_.size()));
-      out.extend(pool_[pick], check_, between_samples);
+      const auto pick = static_cast<std::size_t>(random.uniform() * static_cast<double>(feasible_.poses().size()));
+      out.extend(feasible_.poses()[pick], check_, between_samples);
     }
     return out;
   }
@@ -356,17 +278,18 @@ class Planner {
   /// Poses one by one, each the one that adds most to log det.
   void choose_walk() {
     progress_.stage("choosing poses", static_cast<std::size_t>(static_poses));
-    std::vector<MatrixXd> gains(pool_.size());
-    parallel_for(pool_.size(), [&](std::size_t i) {
-      gains[i] = PoseWalk::dwell_s * columns_.information(one_pose(pool_[i]), plan_.noise);
+    std::vector<MatrixXd> gains(feasible_.poses().size());
+    parallel_for(feasible_.poses().size(), [&](std::size_t i) {
+      gains[i] = PoseWalk::dwell_s * columns_.information(one_pose(feasible_.poses()[i]), plan_.noise);
     });
     MatrixXd sum = total_;
     while (static_cast<Index>(walk_.poses.size()) < static_poses) {
-      std::vector<double> lost(pool_.size());
-      parallel_for(pool_.size(), [&](std::size_t i) { lost[i] = -log_determinant(sum + gains[i]); });
+      std::vector<double> lost(feasible_.poses().size());
+      parallel_for(feasible_.poses().size(), [&](std::size_t i) { lost[i] = -log_determinant(sum + gains[i]); });
       const std::vector<std::size_t> order = ascending(lost);
-      const auto next = std::find_if(order.begin(), order.end(),
-                                     [&](std::size_t i) { return walk_.extend(pool_[i], check_, between_samples); });
+      const auto next = std::find_if(order.begin(), order.end(), [&](std::size_t i) {
+        return walk_.extend(feasible_.poses()[i], check_, between_samples);
+      });
       if (next == order.end()) break;
       sum += gains[*next];
       progress_.step();
@@ -434,9 +357,9 @@ class Planner {
   const ExciteSettings& settings_;
   Progress& progress_;
   Plan plan_;
-  LimitCheck check_;
+  FeasibleMotions feasible_;
+  const LimitCheck& check_;
   ParameterColumns columns_;
-  std::vector<VectorXd> pool_;
   std::vector<SeriesCoordinates> coordinates_;  ///< of each Fourier trajectory
   std::vector<std::vector<Draw>> draws_;        ///< likewise, random ones
   std::vector<Draw> chosen_;                    ///< likewise, the plan's

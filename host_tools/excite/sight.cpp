@@ -24,25 +24,6 @@ constexpr double nothing_left = 1e-5;
 constexpr double confused_from = 0.95;
 /// Smallest effect that still counts as seen, share of rated torque.
 constexpr double seen_below = 0.005;
-/// Eigenvalues of a normalised information matrix below this count as zero.
-constexpr double rank_tolerance = 1e-12;
-
-/// Inverse of a positive semidefinite matrix on its range, rank decided after normalising the diagonal to 1.
-MatrixXd pseudo_inverse(const MatrixXd& a) {
-  const VectorXd scale = a.diagonal().unaryExpr([](double x) { return x > 0 ? 1 / std::sqrt(x) : 0.0; });
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(scale.asDiagonal() * a * scale.asDiagonal());
-  const double most = eigen.eigenvalues().tail(1)[0];
-  const VectorXd inverse =
-      eigen.eigenvalues().unaryExpr([=](double x) { return x > rank_tolerance * most ? 1 / x : 0.0; });
-  const MatrixXd half = scale.asDiagonal() * eigen.eigenvectors();
-  return half * inverse.asDiagonal() * half.transpose();
-}
-
-/// Information on columns that is left when those of the nuisance are fitted too.
-MatrixXd schur(const MatrixXd& columns, const MatrixXd& cross, const MatrixXd& nuisance) {
-  return columns - cross.transpose() * pseudo_inverse(nuisance) * cross;
-}
-
 /// Directions of an effect's columns, each of unit information before the nominal model takes its part, and what that
 /// leaves of each (rho^2).
 struct Directions {
@@ -174,11 +155,12 @@ Judge::Judge(const IdentifiedModel& nominal, const Information& information, dou
   const MatrixXd& g = info_.gram;
   const auto all = nominal_columns_;
   const auto inertia = columns_from(0, base), friction = columns_from(base, last.first + last.count - base);
-  after_base_ = schur(g, g.topRows(base), g.topLeftCorner(base, base));
+  after_base_ = information_left(g, g.topRows(base), g.topLeftCorner(base, base));
   // A healthy recording of the same motions determines the base parameters, its friction fitted apart.
   MatrixXd nuisance = g(all, all);
-  nuisance.topLeftCorner(base, base) += schur(g(inertia, inertia), g(friction, inertia), g(friction, friction));
-  after_healthy_ = schur(g, g(all, Eigen::all), nuisance);
+  nuisance.topLeftCorner(base, base) +=
+      information_left(g(inertia, inertia), g(friction, inertia), g(friction, friction));
+  after_healthy_ = information_left(g, g(all, Eigen::all), nuisance);
   without_.resize(info_.nominal_blocks);
   parallel_for(without_.size(), [&](std::size_t b) { without_[b] = after_nominal({&info_.blocks[b]}); });
 }
@@ -192,7 +174,7 @@ MatrixXd Judge::after_nominal(const std::vector<const Block*>& left_out) const {
     if (!out) columns.push_back(i);
   }
   const MatrixXd& g = info_.gram;
-  return schur(g, g(columns, Eigen::all), g(columns, columns));
+  return information_left(g, g(columns, Eigen::all), g(columns, columns));
 }
 
 std::vector<const Block*> Judge::shapes_of(std::string_view effect, std::optional<std::size_t> joint) const {
