@@ -36,6 +36,7 @@ class NextMotion : public testing::Test {
 
 TEST_F(NextMotion, OddsGrowWithTheSquareOfTheEffect) {
   options_.generations = 0;
+  options_.most_motions = 1;
   const NextMotions once = plan({{viscous_or("", 0.1)}, {}}), twice = plan({{viscous_or("", 0.2)}, {}});
   ASSERT_EQ(once.trajectories.size(), twice.trajectories.size());
   EXPECT_GT(once.odds[0], 0);
