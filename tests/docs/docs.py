@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """docs.py words | links | spelling: what every page for users looks like.
 
-words     sentences of at most 25 words in README.md, CONTRIBUTING.md, docs/README.md and docs/guide, phrases that nobody understood
+words     sentences of at most 25 words in README.md, CONTRIBUTING.md, docs/README.md and docs/guide, phrases that nobody understood,
+          decisions of at most 400 words
 links     every relative link and anchor of every page leads somewhere, and every page of docs has a link to it
 spelling  aspell, British English, on the pages that `words` reads; terms.txt has the field's words
 Headings, tables, formulas and code are aside. One line a complaint; exit code 1 where there is one.
@@ -13,6 +14,7 @@ import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+MOST_OF_A_DECISION = 400  # words: one page that is read to its end
 MOST_WORDS = 25  # of a sentence; what technical writing for second-language readers asks for
 
 # Phrases of a vocabulary that only their author knew.
@@ -125,6 +127,11 @@ def check_words(root):
         for phrase in BANNED:
             if phrase in text:
                 yield f'{page.name}: "{phrase}", say what it means'
+    for path in sorted((root / 'docs/decisions').glob('*.md')):
+        page = Page(path, root)
+        count = sum(len(words(plain(text))) for line, text in page.blocks())
+        if count > MOST_OF_A_DECISION:
+            yield f'{page.name}: {count} words, at most {MOST_OF_A_DECISION}: history goes to docs/findings'
 
 
 def check_links(root):

@@ -61,6 +61,13 @@ class Words(Tree):
         self.assertEqual(len(self.complaints('words')), 1)
 
 
+    def test_a_decision_of_400_words_passes_and_one_more_does_not(self):
+        self.page('docs/decisions/1.md', '# A decision\n\n' + ' '.join(['word'] * 400) + '\n')
+        self.assertEqual(self.complaints('words'), [])
+        self.page('docs/decisions/1.md', '# A decision\n\n' + ' '.join(['word'] * 401) + '\n')
+        self.assertEqual(len(self.complaints('words')), 1)
+
+
 class Links(Tree):
     def test_a_missing_file_and_a_missing_anchor(self):
         self.page('README.md', '[a](docs/guide/a.md) [b](docs/guide/b.md) [c](docs/guide/a.md#two-words) [d](docs/guide/a.md#three)\n')
