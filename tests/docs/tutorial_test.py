@@ -72,6 +72,10 @@ def main():
     replay = json.loads((work / 'out/replay.json').read_text())
     if not replay['bit_exact'] or not replay['logs']:
         failures.append('the firmware is not the host, bit for bit')
+    written = float(re.search(r'takes about (\d+) instructions', page)[1])
+    measured = replay['logs'][0]['instructions_per_tick']['most']
+    if abs(measured - written) > 0.05 * written:  # the compiler's and the kernels' may change a little
+        failures.append(f'a tick takes {measured} instructions, the page says {written:.0f}')
     failures += figures_that_differ(page, work / 'out')
     print('\n'.join(failures) or 'the tutorial does what it says')
     return 1 if failures else 0
