@@ -15,7 +15,7 @@ from pages import ITEM, Page  # noqa: E402: after its path is known
 class Html(html.parser.HTMLParser):
     def __init__(self, path):
         super().__init__()
-        self.ids, self.links, self.counts, self.article = set(), [], {}, 0
+        self.ids, self.links, self.counts, self.article, self.text = set(), [], {}, 0, ''
         self.feed(path.read_text())
 
     def handle_starttag(self, tag, attributes):
@@ -27,6 +27,9 @@ class Html(html.parser.HTMLParser):
         self.article += tag == 'article'
         if self.article:
             self.counts[tag] = self.counts.get(tag, 0) + 1
+
+    def handle_data(self, data):
+        self.text += data if self.article else ''
 
     def handle_endtag(self, tag):
         self.article -= tag == 'article'
@@ -60,6 +63,8 @@ def missing(site, pages):
         counts = pages[path].counts
         if counts.get('li', 0) != items:
             yield f"{source.name}: {counts.get('li', 0)} of {items} items are items"
+        if '```' in pages[path].text:
+            yield f'{source.name}: a block of code is no block'
         if counts.get('table', 0) != tables:
             yield f"{source.name}: {counts.get('table', 0)} of {tables} tables are tables"
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """tutorial_test.py FXDYN WORK: runs the commands of docs/guide/tutorial.md in their order, as a reader would, results in WORK; and
-compares what came out with the figures and the words that the page promises. Blocks `sh build` are left out: they build the program that
-runs this test."""
+compares what came out with the figures and the words that the page promises. Blocks after `<!-- test: not run` are left out: they build the
+program that runs this test."""
 import json
 import pathlib
 import re
@@ -59,7 +59,8 @@ def main():
     program, work = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
     shutil.rmtree(work, ignore_errors=True)
     page = PAGE.read_text()
-    blocks = re.findall(r'^```sh\n(.*?)^```', page, flags=re.M | re.S)
+    run = re.sub(r'^<!-- test: not run.*?-->\n```sh\n.*?^```', '', page, flags=re.M | re.S)
+    blocks = re.findall(r'^```sh\n(.*?)^```', run, flags=re.M | re.S)
     script = '\n'.join(blocks).replace('out/tutorial', str(work)).replace('$PWD/build/host/host_tools/cli', str(program.parent))
     done = subprocess.run(['bash', '-euxo', 'pipefail', '-c', script], cwd=ROOT, capture_output=True, text=True)
     if done.returncode != 0:

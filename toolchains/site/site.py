@@ -4,6 +4,7 @@
 The pages are staged in OUT/pages: README.md is the start page, the rest keeps its place below docs. A link to a page or picture is
 kept. A link to a file of the code becomes plain text, since the site has no code. A link that leads nowhere is an error.
 """
+import json
 import os
 import pathlib
 import re
@@ -89,6 +90,27 @@ def stage(out):
     (out / 'findings/index.md').write_text('# Findings\n\n' + '\n'.join(sorted(findings)) + '\n')
     contents = out / 'contents.md'
     contents.write_text(contents.read_text() + '\n## Reference\n[Headers of the model](api/index.html), by Doxygen.\n')
+    return paths
+
+
+def navigation(paths):
+    """The parts of docs/README.md with their pages, then the findings."""
+    page = Page(ROOT / 'docs/README.md', ROOT)
+    parts = [{'Start': ['index.md', 'contents.md']}]
+    for _, line in page.prose:
+        if line.startswith('## '):
+            parts.append({line[3:]: []})
+        pages = next(iter(parts[-1].values()))
+        for match in LINK.finditer(line):
+            path = (page.path.parent / match[2].partition('#')[0]).resolve()
+            name = paths.get(str(path.relative_to(ROOT)))
+            if name and name.endswith('.md') and name not in pages:
+                pages.append(name)
+    listed = {name for part in parts for pages in part.values() for name in pages}
+    others = sorted(name for name in paths.values() if name.endswith('.md') and name not in listed)
+    parts += [{'Findings': [name for name in others if name.startswith('findings/')]},
+              {'Project': [name for name in others if not name.startswith('findings/')]}]
+    return [part for part in parts if next(iter(part.values()))]
 
 
 def main():
@@ -98,10 +120,11 @@ def main():
     out = pathlib.Path(sys.argv[1]).resolve()
     shutil.rmtree(out, ignore_errors=True)
     pages = out / 'pages'
-    stage(pages)
+    paths = stage(pages)
     settings = (HERE / 'Doxyfile').read_text() + f'\nOUTPUT_DIRECTORY = {pages}\n'
     subprocess.run(['doxygen', '-'], input=settings, text=True, check=True, cwd=ROOT)
-    (out / 'mkdocs.yml').write_text((HERE / 'mkdocs.yml').read_text() + f'docs_dir: {pages}\nsite_dir: {out}/html\n')
+    nav = json.dumps(navigation(paths))  # JSON is YAML, too
+    (out / 'mkdocs.yml').write_text((HERE / 'mkdocs.yml').read_text() + f'docs_dir: {pages}\nsite_dir: {out}/html\nnav: {nav}\n')
     subprocess.run(['mkdocs', 'build', '--strict', '--quiet', '--config-file', str(out / 'mkdocs.yml')], check=True)
     print(out / 'html/index.html')
     return 0
