@@ -96,7 +96,7 @@ def stage(out):
 def navigation(paths):
     """The parts of docs/README.md with their pages, then the findings."""
     page = Page(ROOT / 'docs/README.md', ROOT)
-    parts = [{'Start': ['index.md', 'contents.md']}]
+    parts = [{'fxdyn': ['index.md', 'contents.md']}]
     for _, line in page.prose:
         if line.startswith('## '):
             parts.append({line[3:]: []})
