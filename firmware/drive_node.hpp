@@ -24,7 +24,7 @@
 #include "model/version.hpp"
 #include "model/wrapping.hpp"
 
-// The drive node (docs/decisions/0006-drive-node.md). How a main_<board>.cpp wires it:
+// The drive node (docs/guide/node-behaviour.md). How a main_<board>.cpp wires it:
 //
 //   #include FXDYN_TABLES_HEADER
 //   constexpr fxdyn::RatedTorques<Model> rated{fxdyn::tables::rated_torque};   // Model = fxdyn::tables::Model

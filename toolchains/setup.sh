@@ -20,6 +20,8 @@ packages=(
   clang-14 lld-14 libclang-rt-14-dev clang-format-14 clang-tidy-14
   # tests
   libgtest-dev libunicorn-dev librapidcheck-dev libbenchmark-dev liborocos-kdl-dev libmujoco-dev libpagmo-dev python3 llvm-14
+  # spelling of the pages, their site, the reference of the headers
+  aspell aspell-en mkdocs mkdocs-material doxygen
 )
 
 "$(dirname "$0")/install.sh" "${packages[@]}"

@@ -1,4 +1,4 @@
-// What the drive node does when something is missing or wrong: docs/decisions/0006-drive-node.md.
+// What the drive node does when something is missing or wrong: docs/guide/node-behaviour.md.
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

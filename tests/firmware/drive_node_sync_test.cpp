@@ -1,4 +1,4 @@
-// What the drive node does when SYNC is lost, late, at a wrong rate or gone: docs/decisions/0006-drive-node.md.
+// What the drive node does when SYNC is lost, late, at a wrong rate or gone: docs/guide/node-behaviour.md.
 
 #include <gtest/gtest.h>
 

@@ -22,7 +22,7 @@ constexpr can::Duration quiet = std::chrono::milliseconds(3);
 constexpr can::Duration setpoints_after_sync = std::chrono::microseconds(200);
 constexpr std::uint32_t most_recovery_ticks = 4 * ramp_ticks;
 /// A wrong rate of SYNC is forgiven after a window of right ones, which begins with the window's end
-/// (docs/decisions/0006).
+/// (docs/guide/node-behaviour.md).
 constexpr std::uint32_t rate_recovery_ticks = 2 * 256 + most_recovery_ticks;
 constexpr std::uint16_t wrong_rate = 0x8700, wrong_tables_code = 0x6320, heartbeat_lost = 0x8130;
 /// 0x2014 where the test has no business with it, and where the node's own timer is to act.

@@ -12,8 +12,8 @@
 
 namespace fxdyn::hil {
 
-/// What a node makes of the setpoints and SYNCs that reach it, as docs/decisions/0006 says: which ticks are fresh, what
-/// it counts, and the model beside it.
+/// What a node makes of the setpoints and SYNCs that reach it, as docs/guide/node-behaviour.md says: which ticks are
+/// fresh, what it counts, and the model beside it.
 template <class Model>
 class NodePicture {
  public:

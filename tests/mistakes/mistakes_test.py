@@ -4,6 +4,7 @@ looks at what it says: the exit code, the right cause in one line, no crash, not
 
 Keys of a [[mistake]]:
   name, exit        its name and the exit code; said: parts of what is printed; unsaid: what must not be
+  cure              what to do, for docs/guide/messages.md, which messages.py makes of this list
   run               arguments, default: identify robot.toml --out out
   rows, of          new values of columns of a log, as expressions of the row's columns and k; of: default train.csv
   where             a condition: the other rows stay as they are; drop: rows that go

@@ -177,7 +177,7 @@ TEST(LuGreEffect, FollowsTheOdeForTenMinutesOfCreepAndReversals) {
 }
 
 /// What the model's step does over the whole range of velocities, with the bristles' damping and without: largest error
-/// and RMS, of rated torque. docs/decisions/0008-lugre.md has these figures.
+/// and RMS, of rated torque. docs/findings/2026-11-25-lugre-step.md has these figures.
 TEST(LuGreEffect, FollowsTheOdeFromCreepToFullSpeed) {
   double largest = 0, largest_rms = 0, of_creep = 0, largest_fixed = 0;
   for (const Program program : programs) {
