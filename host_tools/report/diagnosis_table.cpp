@@ -83,7 +83,7 @@ std::string joint_rows(const std::vector<JointDiagnosis>& joints) {
   const std::size_t width = name_width(joints);
   const auto row = [&](const std::string& name, const std::string& verdict, const std::string& gap,
                        const std::string& unit, const std::string& noise, const std::string& left) {
-    return fmt::format("{:<{}}{:<17}{:>20} {:<4}{:>8}{:>17}  ", name, width, verdict, gap, unit, noise, left);
+    return fmt::format("{:<{}}{:<17}{:>19} {:<4}{:>8}{:>18}  ", name, width, verdict, gap, unit, noise, left);
   };
   std::string head = row("joint", "verdict", "gap before -> after", "", "noise", "left unexplained");
   std::string out = head + "effects\n";
