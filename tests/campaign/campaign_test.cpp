@@ -131,11 +131,11 @@ TEST(Campaign, VisibilityIsToldBeforehand) {
 
 const char* const diagnosis_text = R"({"verdict": "explained",
  "joints": [
-  {"index": 1, "verdict": "nothing_missing", "effects": []},
-  {"index": 2, "verdict": "explained", "effects": [
+  {"index": 1, "verdict": "nothing_missing", "where": {"sentence": "", "regions": []}, "effects": []},
+  {"index": 2, "verdict": "explained", "where": {"sentence": "", "regions": []}, "effects": [
     {"effect": "stribeck", "certainty": "established", "score": 20.0, "alternatives": ["presliding", "ripple"]},
     {"effect": "spring", "certainty": "established", "score": 90.0, "alternatives": ["gravity_compensator"]}]},
-  {"index": 3, "verdict": "unexplained", "effects": []}],
+  {"index": 3, "verdict": "unexplained", "where": {"sentence": "", "regions": []}, "effects": []}],
  "robot_effects": [{"effect": "payload", "certainty": "established", "score": 50.0, "alternatives": []}]})";
 
 json truth_with(const json& effects) { return {{"effects", effects}, {"background", json::array()}}; }
@@ -178,6 +178,23 @@ TEST(CampaignScore, PairsOutsideAndClean) {
   EXPECT_FALSE(accepted.at("flagged"));
   EXPECT_TRUE(accepted.at("accepted"));
   EXPECT_TRUE(scored(json::array()).at("false_alarm"));
+  EXPECT_EQ(scored(json::array()).at("joints_placed"), 0);
+
+  // Where it sits: in the signal, and they overlap.
+  const json spot{{"effect", "tight_spot"},
+                  {"joint", 3},
+                  {"outside", true},
+                  {"place", {{"signal", "q"}, {"from", 0.2}, {"to", 0.4}}}};
+  const auto placed = [&](const json& region) {
+    json moved = diagnosis;
+    moved["joints"][2]["where"]["regions"] = json::array({region});
+    return score(truth_with(json::array({spot})), moved, {}).at("placed").get<bool>();
+  };
+  EXPECT_TRUE(placed({{"signal", "q"}, {"from", 0.3}, {"to", 0.6}}));
+  EXPECT_FALSE(placed({{"signal", "q"}, {"from", 0.5}, {"to", 0.6}}));
+  EXPECT_FALSE(placed({{"signal", "q"}, {"joint", 1}, {"from", 0.3}, {"to", 0.6}}));
+  EXPECT_FALSE(placed({{"signal", "dq"}, {"from", 0.3}, {"to", 0.6}}));
+  EXPECT_FALSE(score(truth_with(json::array({spot})), diagnosis, {}).at("placed"));
 
   // A background that was there before is no alarm.
   json quiet = truth_with(json::array());

@@ -315,6 +315,8 @@ json truth_json(const Case& wanted, const Ground& ground) {
       change.back().col(static_cast<Index>(outside.joint)) = outside_torque(outside, motion);
     }
     json entry{{"effect", outside.effect}, {"joint", outside.joint + 1}, {"other", outside.other + 1}};
+    if (const auto place = place_of(outside))
+      entry["place"] = {{"signal", place->signal}, {"from", place->from}, {"to", place->to}};
     const std::vector<std::string> stands_for = names_of_form(outside.effect);
     if (stands_for.empty()) {
       entry["outside"] = true;

@@ -68,12 +68,44 @@ Outside draw_outside(const std::string& effect, std::size_t joint, const Plan& p
   return outside;
 }
 
+namespace {
+
+/// Constants of a seed; the phase is drawn first, whether an effect has one or not.
+struct Constants {
+  Random random;
+  double phase;
+  explicit Constants(const Outside& o) : random(o.seed ^ 0x5EED), phase(random.uniform(0, 2 * std::numbers::pi)) {}
+};
+
+struct Spot {
+  double centre, width;
+};
+Spot spot_of(const Outside& o, Random& random) {
+  const double range = o.high - o.low, centre = o.low + range * random.uniform(0.3, 0.7);
+  return {centre, range * random.uniform(0.04, 0.1)};
+}
+
+double stop_of(const Outside& o, Random& random) { return o.high - (o.high - o.low) * random.uniform(0.08, 0.2); }
+
+}  // namespace
+
+std::optional<Place> place_of(const Outside& o) {
+  Constants constants(o);
+  if (o.effect == "tight_spot") {
+    const Spot spot = spot_of(o, constants.random);
+    return Place{"q", spot.centre - spot.width, spot.centre + spot.width};  // 84 % of its power
+  }
+  if (o.effect == "end_stop") return Place{"q", stop_of(o, constants.random), o.high};
+  return {};
+}
+
 VectorXd outside_torque(const Outside& o, const Motion& motion) {
-  Random random(o.seed ^ 0x5EED);
+  Constants constants(o);
+  Random& random = constants.random;
   const auto j = static_cast<Index>(o.joint), k = static_cast<Index>(o.other);
   const ArrayXd q = motion.q.col(j), dq = motion.dq.col(j), ddq = motion.ddq.col(j);
   const ArrayXd sign = (dq / (0.01 * o.velocity)).tanh();
-  const double phase = random.uniform(0, 2 * std::numbers::pi);
+  const double phase = constants.phase;
   ArrayXd column;
   if (o.effect == "other_position") {
     const double waves = random.uniform(1.2, 3) * 2 * std::numbers::pi / (o.other_high - o.other_low);
@@ -87,16 +119,14 @@ VectorXd outside_torque(const Outside& o, const Motion& motion) {
   } else if (o.effect == "product_of_velocities") {
     column = dq / o.velocity * motion.dq.col(k).array() / o.other_velocity;
   } else if (o.effect == "tight_spot") {
-    const double range = o.high - o.low;
-    const double centre = o.low + range * random.uniform(0.3, 0.7), width = range * random.uniform(0.04, 0.1);
-    column = sign * (-((q - centre) / width).square()).exp();
+    const Spot spot = spot_of(o, random);
+    column = sign * (-((q - spot.centre) / spot.width).square()).exp();
   } else if (o.effect == "jerk") {
     column = differentiate(motion.ddq.col(j), motion.step_s) / o.acceleration;
   } else if (o.effect == "acceleration_squared") {
     column = ddq * ddq.abs() / (o.acceleration * o.acceleration);
   } else if (o.effect == "end_stop") {
-    const double range = o.high - o.low, begins = o.high - range * random.uniform(0.08, 0.2);
-    column = (q - begins).max(0.0) / range * 10;
+    column = (q - stop_of(o, random)).max(0.0) / (o.high - o.low) * 10;
   } else if (o.effect == "exponential_stribeck") {
     column = sign * (-dq.abs() / (o.velocity * random.uniform(0.02, 0.08))).exp();
   } else if (o.effect == "power_viscous") {

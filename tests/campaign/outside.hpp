@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,13 @@ Outside draw_outside(const std::string& effect, std::size_t joint, const Plan& p
 
 /// Its torque over a motion; motion.t is the time since the session's start.
 Eigen::VectorXd outside_torque(const Outside& outside, const Motion& motion);
+
+/// Where its torque sits, in the signals of a gap's regions; none: all over the motion.
+struct Place {
+  std::string signal;
+  double from = 0, to = 0;
+};
+std::optional<Place> place_of(const Outside& outside);
 
 /// The amplitude that makes it the share of rated torque (RMS over the plan's motions).
 void scale(Outside& outside, double share, const Plan& plan);

@@ -77,6 +77,28 @@ std::vector<Named> named_effects(const json& diagnosis, const std::string& certa
   return named;
 }
 
+/// Whether the clearest region of a joint's gap is where the torque sits: in its signal, and they overlap. A tight spot
+/// of friction changes sign with the direction, so that the region may be of the position alone.
+bool is_placed(const json& joint, const json& place) {
+  const json& regions = joint.at("where").at("regions");
+  if (regions.empty()) return false;
+  const json& first = regions.front();
+  return first.at("signal") == place.at("signal") && first.value("joint", 0) == 0 &&
+         first.at("from").get<double>() <= place.at("to").get<double>() &&
+         first.at("to").get<double>() >= place.at("from").get<double>();
+}
+
+/// Joints, and those of them that have a sentence with a place.
+void count_places(const json& diagnosis, json& out) {
+  std::size_t joints = 0, placed = 0;
+  for (const json& entry : diagnosis.at("joints")) {
+    ++joints;
+    placed += static_cast<std::size_t>(!entry.at("where").at("regions").empty());
+  }
+  out["joints"] = joints;
+  out["joints_placed"] = placed;
+}
+
 json score(const json& truth, const json& diagnosis, std::optional<double> closure) {
   const std::string verdict = diagnosis.at("verdict");
   std::vector<Named> named = named_effects(diagnosis, "established"), likely = named_effects(diagnosis, "likely");
@@ -109,6 +131,7 @@ json score(const json& truth, const json& diagnosis, std::optional<double> closu
     out["false_alarm"] =
         !named.empty() || verdict == "unexplained" || verdict == "partly_explained" || verdict == "not_excited";
     out["passed"] = !out["false_alarm"];
+    count_places(diagnosis, out);
     return out;
   }
 
@@ -140,6 +163,8 @@ json score(const json& truth, const json& diagnosis, std::optional<double> closu
   if (first.value("outside", false)) {
     const std::size_t joint = true_joint(first);
     const bool flagged = unexplained.contains(joint);
+    if (first.contains("place") && joint > 0)
+      out["placed"] = is_placed(diagnosis.at("joints").at(joint - 1), first.at("place"));
     const bool taken = any_of(named.begin(), named.end(), [&](const Named& one) { return one.joint == joint; });
     out["flagged"] = flagged;
     out["accepted"] = std::any_of(named.begin(), named.end(),
