@@ -192,8 +192,8 @@ struct ReportOptions {
   /// chance; an error that has nothing to do with the motion makes as clear a region of any signal; theory: the clearest
   /// of 49 errors, each shifted in time against the motion (time: the same spectrum, stationary)
   double region_chance = 0.02;
-  /// share of the gap less share of the samples; what another joint's position has to be clearer than the joint's own
-  /// motion, which it follows on a planned motion; hand
+  /// share of the evidence; by which another joint's position has to be clearer than the joint's own motion, which it
+  /// follows on a planned motion; hand
   double other_joint = 0.1;
 };
 

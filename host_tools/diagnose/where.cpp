@@ -29,6 +29,14 @@ struct Region {
   double share = 0, of_time = 0;  ///< of the gap's power, of the samples
   std::string log{};              ///< empty: of all logs
   double contrast() const { return share - of_time; }
+  /// Log likelihood ratio of a scan statistic, per unit of power: share ln(share / of_time) + the same of the rest
+  /// (Kulldorff, "A spatial scan statistic", Comm. Statist. Theory Methods 26, 1997). Of two regions with one contrast
+  /// the narrower one is the clearer.
+  double evidence() const {
+    const auto term = [](double a, double b) { return a > 0 ? a * std::log(a / b) : 0; };
+    const double inside = std::min(share, 1.0);
+    return inside > of_time && of_time > 0 ? term(inside, of_time) + term(1 - inside, 1 - of_time) : 0;
+  }
 };
 
 /// Values of a signal in classes of equal width, without the outermost half per cent.
@@ -58,9 +66,10 @@ class Classes {
       for (Index b = a; b < bins; ++b) {
         p += of_class[b];
         c += count_[b];
-        if (p / whole - c / samples <= best.contrast()) continue;
-        best.share = p / whole;
-        best.of_time = c / samples;
+        const Region region{"", 0, 0, 0, p / whole, c / samples};
+        if (region.evidence() <= best.evidence()) continue;
+        best.share = region.share;
+        best.of_time = region.of_time;
         best.from = from_ + (to_ - from_) * static_cast<double>(a) / bins;
         best.to = from_ + (to_ - from_) * static_cast<double>(b + 1) / bins;
       }
@@ -134,9 +143,9 @@ std::vector<Region> in_motion(const Samples& samples, double chance) {
   const int draws = draws_for(chance);
   for (int s = 1; s <= draws; ++s) {
     const VectorXd other = shifted(samples, static_cast<double>(s) / (draws + 1));
-    for (const Classes& of : classes) by_chance = std::max(by_chance, of.clearest(other, whole, count).contrast());
+    for (const Classes& of : classes) by_chance = std::max(by_chance, of.clearest(other, whole, count).evidence());
   }
-  std::erase_if(regions, [&](const Region& r) { return r.contrast() <= by_chance; });
+  std::erase_if(regions, [&](const Region& r) { return r.evidence() <= by_chance; });
   return regions;
 }
 
@@ -213,7 +222,7 @@ Region clearest_in_time(const std::vector<const ProcessedLog*>& logs, const Samp
                         .clearest(power.segment(first, rows), power.sum(), static_cast<double>(power.size()));
     region.signal = "t";
     if (logs.size() > 1) region.log = logs[l]->name;
-    if (region.contrast() > best.contrast()) best = region;
+    if (region.evidence() > best.evidence()) best = region;
   }
   return best;
 }
@@ -224,7 +233,7 @@ std::vector<Region> in_time(const std::vector<const ProcessedLog*>& logs, const 
   Random random(1);
   for (int draw = 0; draw < draws_for(chance); ++draw) {
     const VectorXd power = stationary(samples, random).cwiseAbs2().array() - samples.noise_square;
-    if (clearest_in_time(logs, samples, power).contrast() >= best.contrast()) return {};
+    if (clearest_in_time(logs, samples, power).evidence() >= best.evidence()) return {};
   }
   return {best};
 }
@@ -271,7 +280,7 @@ GapPlace where(const Robot& robot, std::size_t index, const std::vector<const Pr
   }
   // What another joint's position explains, its own motion may explain as well: the joint's own is told first.
   std::sort(regions.begin(), regions.end(), [&](const Region& a, const Region& b) {
-    const auto rank = [&](const Region& r) { return r.contrast() - (r.joint > 0 ? options.other_joint : 0); };
+    const auto rank = [&](const Region& r) { return r.evidence() * (r.joint > 0 ? 1 - options.other_joint : 1); };
     return rank(a) > rank(b);
   });
   // What has no place in the motion may have one in time, or in the spectrum.
