@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "host_tools/check/check.hpp"
+#include "host_tools/support/time_text.hpp"
 
 namespace fxdyn {
 
@@ -43,26 +44,18 @@ void add_rest(const LogFacts& log, const LogFactOptions& options, double begin, 
   if (!front && !back) return;
   std::string text, fix;
   if (front) {
-    text = fmt::format("at rest from {} to {} s", seconds_text(begin), seconds_text(log.rest_until_s));
-    fix = "from_s = " + seconds_text(log.rest_until_s);
+    text = fmt::format("at rest from {} to {} s", time_text(begin), time_text(log.rest_until_s));
+    fix = "from_s = " + time_text(log.rest_until_s);
   }
   if (back) {
-    text +=
-        fmt::format("{}at rest from {} to {} s", front ? ", " : "", seconds_text(log.rest_from_s), seconds_text(end));
-    fix += fmt::format("{}to_s = {}", front ? "\n" : "", seconds_text(log.rest_from_s));
+    text += fmt::format("{}at rest from {} to {} s", front ? ", " : "", time_text(log.rest_from_s), time_text(end));
+    fix += fmt::format("{}to_s = {}", front ? "\n" : "", time_text(log.rest_from_s));
   }
   text += ": stiction holds any torque there, and the fit takes it for friction";
   out.push_back({false, "rest", {}, log.name, text, fix});
 }
 
 }  // namespace
-
-std::string seconds_text(double seconds) {
-  std::string text = fmt::format("{:.3f}", seconds);
-  while (text.back() == '0') text.pop_back();
-  if (text.back() == '.') text += '0';
-  return text;
-}
 
 LogFacts facts_of(const Log& log, const LogFactOptions& options) {
   LogFacts facts;
@@ -72,8 +65,8 @@ LogFacts facts_of(const Log& log, const LogFactOptions& options) {
   facts.rate_hz = 1 / log.step_s;
   facts.resampled = log.resampled;
   facts.time_note = log.time_note;
-  facts.q_lower = log.q.colwise().minCoeff().transpose();
-  facts.q_upper = log.q.colwise().maxCoeff().transpose();
+  facts.q_lower = log.q.colwise().minCoeff().transpose().array() + 0.0;  // no "-0"
+  facts.q_upper = log.q.colwise().maxCoeff().transpose().array() + 0.0;
   Index short_window = 1, window = 1;
   facts.speed = coarse_speed(log, options.speed_window_s, short_window).cwiseAbs().colwise().maxCoeff().transpose();
   const Eigen::MatrixXd speed = coarse_speed(log, options.rest_window_s, window).cwiseAbs();

@@ -60,6 +60,8 @@ struct ArrangementOptions {
   /// share of the torque's RMS; q and tau are exchanged where more than the first stays as given and less than the
   /// second exchanged; hand
   double unexplained = 0.5, explained = 0.3;
+  /// -; a log whose samples raise a joint's residual by more is looked at alone; hand: another speed raises it by less
+  double disagree = 1.3;
   /// findings in one set of logs, at most
   int most = 4;
 };

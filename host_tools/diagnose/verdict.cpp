@@ -14,6 +14,7 @@
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/parallel.hpp"
+#include "host_tools/support/time_text.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
@@ -265,9 +266,14 @@ class ReportWriter {
   void advise_on_gap(std::size_t j, const std::vector<GapRegion>& regions) {
     std::string which;
     if (!regions.empty())
-      which = fmt::format(" where the gap sits ({} from {:.3g} to {:.3g})", regions[0].signal, regions[0].from,
-                          regions[0].to);
+      which = fmt::format(" where the gap sits ({} from {} to {})", regions[0].signal,
+                          edge_text(regions[0], regions[0].from), edge_text(regions[0], regions[0].to));
     advise(fmt::format("record more of joint {}{}", j + 1, which));
+  }
+
+  /// An edge of a region: a moment of a log needs more digits than a speed.
+  static std::string edge_text(const GapRegion& region, double edge) {
+    return region.signal == "t" ? time_text(edge) : fmt::format("{:.3g}", edge);
   }
 
   static GapPlace place(const Impacts& impacts) {

@@ -8,6 +8,7 @@
 
 #include "host_tools/diagnose/shifted_residual.hpp"
 #include "host_tools/signals/spectrum.hpp"
+#include "host_tools/support/time_text.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
@@ -194,7 +195,8 @@ std::string place_of(const GapRegion& region, const Joint& joint) {
   if (region.signal == "ddq") return range("acceleration", position + "/s^2");
   if (region.signal == "load") return range("load", joint.torque_unit());
   if (region.signal == "frequency") return range("frequency", "Hz");
-  return range("time", "s") + (region.log.empty() ? "" : " of " + region.log);
+  return fmt::format("at time {} .. {} s{}", time_text(region.from), time_text(region.to),
+                     region.log.empty() ? "" : " of " + region.log);
 }
 
 std::string sentence(const GapRegion& region, const Joint& joint) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "host_tools/check/check.hpp"
+#include "host_tools/support/time_text.hpp"
 
 namespace fxdyn {
 namespace {
@@ -92,6 +93,13 @@ TEST(LogFacts, StandstillAtTheEndsIsToldWithItsWindow) {
   EXPECT_EQ(findings[0].kind, "rest");
   EXPECT_EQ(findings[0].fix.find("from_s = "), 0U);
   EXPECT_NE(findings[0].fix.find("to_s = "), std::string::npos);
+}
+
+TEST(LogFacts, TimesHaveMillisecondsWhereverTheyBegin) {
+  EXPECT_EQ(time_text(1762000003.2857), "1762000003.286");
+  EXPECT_EQ(time_text(2), "2.0");
+  EXPECT_EQ(time_text(-1e-5), "0.0");
+  EXPECT_EQ(time_text(-12.5), "-12.5");
 }
 
 TEST(LogFacts, AJointThatNeverMovesIsTold) {
