@@ -155,7 +155,7 @@ void append(std::vector<CheckFinding> more, std::vector<CheckFinding>& to) {
 /// train logs; what it shows less than surely is another load or another day.
 std::vector<CheckFinding> compare_alone(const Project& project, const TorqueSamples& train, Log log,
                                         const FilterFit& filter, const ArrangementOptions& options) {
-  if (log.tau.size() == 0) return {};
+  check_torque(log, project.robot);
   const std::string name = log.file.filename().string();
   Project alone = project;
   for (LogEntry& entry : alone.logs) {
@@ -195,6 +195,14 @@ std::vector<LogFacts> read_facts(const Project& project, const std::filesystem::
   return out;
 }
 
+/// What the logs alone show, against the URDF's limits too, where the project wants it.
+std::vector<CheckFinding> findings_alone(const Project& project, const std::vector<LogFacts>& facts,
+                                         const LogFactOptions& options) {
+  std::vector<CheckFinding> out = findings_of(facts, project.robot, options);
+  for (CheckFinding& finding : out) finding.error = finding.error && project.check.columns;
+  return out;
+}
+
 /// The lines to paste, within a sentence.
 std::string inline_text(const std::string& lines) {
   std::string out;
@@ -211,7 +219,7 @@ std::vector<std::string> check_before_fit(const Project& project, const std::fil
                                           GateData& data, const CheckOptions& options) {
   std::vector<CheckFinding> findings = compare_with_urdf(project, directory, data.logs, options.arrangement);
   const std::vector<LogFacts> facts = read_facts(project, directory, data.logs, data.rows, options, findings);
-  append(findings_of(facts, project.robot, options.facts), findings);
+  append(findings_alone(project, facts, options.facts), findings);
   std::vector<std::string> notes;
   for (const CheckFinding& finding : findings) {
     std::string text = (finding.log.empty() ? "" : finding.log + ": ") + finding.text;
@@ -245,7 +253,7 @@ CheckResult check(const Project& project, const std::filesystem::path& directory
     result.findings.push_back(
         {false, "no_train_log", {}, "", "no log has role = \"train\": nothing is compared with the URDF", ""});
   }
-  append(findings_of(result.logs, project.robot, options.facts), result.findings);
+  append(findings_alone(project, result.logs, options.facts), result.findings);
   return result;
 }
 

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -53,6 +54,23 @@ void add_rest(const LogFacts& log, const LogFactOptions& options, double begin, 
   }
   text += ": stiction holds any torque there, and the fit takes it for friction";
   out.push_back({false, "rest", {}, log.name, text, fix});
+}
+
+/// A slide that goes much further than its rail is long.
+CheckFinding too_long(const Robot& robot, Index j, double lower, double upper) {
+  const Limits& limits = *robot.joints[static_cast<std::size_t>(j)].limits;
+  const double range = limits.upper - limits.lower;
+  // What remains of the rail in mm; next to nothing: cm.
+  const double gain = 1e-3 * (upper - lower) > 0.02 * range ? 1e-3 : 1e-2;
+  std::vector<double> gains(robot.size(), 1.0);
+  gains[static_cast<std::size_t>(j)] = gain;
+  return {true,
+          "too_long",
+          static_cast<std::size_t>(j),
+          "",
+          fmt::format("{} goes from {:.4g} to {:.4g} m, where the URDF's limits leave {:.3g} m: its q is in {}?",
+                      of_joint(robot, j), lower, upper, range, gain < 5e-3 ? "mm" : "cm"),
+          fmt::format("in [signals], times what stands there:\nposition_gain = [{}]", fmt::join(gains, ", "))};
 }
 
 }  // namespace
@@ -169,6 +187,10 @@ std::vector<CheckFinding> findings_of(const std::vector<LogFacts>& logs, const R
     if (!joint.limits || joint.continuous) continue;
     const double range = joint.limits->upper - joint.limits->lower;
     const double beyond = std::max(upper[j] - joint.limits->upper, joint.limits->lower - lower[j]);
+    if (joint.type == JointType::prismatic && range > 0 && upper[j] - lower[j] > options.impossible * range) {
+      out.push_back(too_long(robot, j, lower[j], upper[j]));
+      continue;
+    }
     if (range > 0 && beyond > options.beyond * range) {
       out.push_back(
           {false, "beyond_limits", at, "",

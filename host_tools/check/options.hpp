@@ -84,6 +84,9 @@ struct LogFactOptions {
   double least_range = 0.05;
   /// share of the URDF's range; a motion that goes so far beyond it is told; hand
   double beyond = 0.05;
+  /// -; times the URDF's range; a slide that covers more is not in m; hand: rails in cm or mm cover 5 to 1000 times
+  /// theirs
+  double impossible = 10;
   /// rad | m; a wider range is a placeholder; hand: eight turns
   double widest = 50;
   /// -; times the URDF's velocity limit; hand
