@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "host_tools/check/column_words.hpp"
 #include "host_tools/check/torque_column.hpp"
 #include "host_tools/simulate/recordings.hpp"
+#include "host_tools/support/error.hpp"
 
 namespace fxdyn {
 
@@ -126,42 +128,132 @@ std::vector<CheckFinding> check_columns(const Project& project, const std::vecto
   return out;
 }
 
-CheckResult check(const Project& project, const std::filesystem::path& directory, const CheckOptions& options) {
-  CheckResult result;
-  KnownRows known;
-  for (const Role role : {Role::baseline, Role::train, Role::validate, Role::test}) {
-    for (const Log& log : read_logs(project, role, directory, &known))
-      result.logs.push_back(facts_of(log, options.facts));
+namespace {
+
+/// What the train and validate logs show against the URDF.
+std::vector<CheckFinding> compare_with_urdf(const Project& project, const std::filesystem::path& directory,
+                                            const std::vector<ProcessedLog>& logs, const ArrangementOptions& options) {
+  if (!project.check.columns) return {};
+  // The logs are read once more only where nothing fits.
+  if (is_unexplained(project, logs, options) &&
+      are_exchanged(project, read_logs(project, Role::train, directory), options)) {
+    return {{true,
+             "exchanged",
+             {},
+             "",
+             "the columns of q and tau look exchanged: the URDF explains the positions as torques",
+             "the columns of tau as those of q, and those of q as tau:\ncolumns = { q = .., tau = .. }"}};
   }
-  std::vector<ProcessedLog> train;
-  if (project.has_role(Role::train)) {
-    if (project.check.columns &&
-        are_exchanged(project, read_logs(project, Role::train, directory), options.arrangement)) {
-      result.findings.push_back(
-          {true,
-           "exchanged",
-           {},
-           "",
-           "the columns of q and tau look exchanged: the URDF explains the positions as torques",
-           "the columns of tau as those of q, and those of q as tau:\ncolumns = { q = .., tau = .. }"});
-    } else {
-      const GateData data = read_gate_data(project, directory);
-      result.findings = check_columns(project, data.logs, options.arrangement);
-      const FilterFit& filter = data.logs.front().filter;
-      result.signals = {filter.excited_hz, filter.position_cutoff_hz, filter.torque_cutoff_hz, {}};
-      if (project.check.columns) result.signals->torque_lead = torque_lead(project, data.logs, options.arrangement);
-      train = data.logs;
+  return check_columns(project, logs, options);
+}
+
+void append(std::vector<CheckFinding> more, std::vector<CheckFinding>& to) {
+  std::move(more.begin(), more.end(), std::back_inserter(to));
+}
+
+/// A log that decides nothing in the fit may have columns of its own. Looked at alone, where it disagrees with the
+/// train logs; what it shows less than surely is another load or another day.
+std::vector<CheckFinding> compare_alone(const Project& project, const TorqueSamples& train, Log log,
+                                        const FilterFit& filter, const ArrangementOptions& options) {
+  check_torque(log, project.robot);
+  const std::string name = log.file.filename().string();
+  Project alone = project;
+  for (LogEntry& entry : alone.logs) {
+    entry.role = entry.role == log.role ? Role::train : Role::baseline;
+    entry.own_format = true;  // what is to be written belongs into its [[log]]
+  }
+  log.role = Role::train;
+  std::vector<ProcessedLog> logs;
+  logs.push_back(process(std::move(log), filter));
+  const double lead_s = project.signals.torque_lead_s.value_or(0);
+  std::vector<CheckFinding> out;
+  if (!disagrees(project.robot, train, sample_torque(logs, options.samples, lead_s), options)) return out;
+  for (CheckFinding& finding : check_columns(alone, logs, options)) {
+    if (!finding.error) continue;
+    finding.log = name;
+    out.push_back(std::move(finding));
+  }
+  return out;
+}
+
+/// Facts of all logs, read role by role; findings of those that the fit does not see.
+/// @param fitted train and validate logs; empty: there is none to compare with
+std::vector<LogFacts> read_facts(const Project& project, const std::filesystem::path& directory,
+                                 const std::vector<ProcessedLog>& fitted, KnownRows& known, const CheckOptions& options,
+                                 std::vector<CheckFinding>& findings) {
+  std::optional<TorqueSamples> train;
+  if (project.check.columns && !fitted.empty())
+    train = sample_torque(fitted, options.arrangement.samples, project.signals.torque_lead_s.value_or(0));
+  std::vector<LogFacts> out;
+  for (const Role role : {Role::baseline, Role::train, Role::validate, Role::test}) {
+    for (Log& log : read_logs(project, role, directory, &known)) {
+      out.push_back(facts_of(log, options.facts));
+      if (role == Role::train || !train) continue;
+      append(compare_alone(project, *train, std::move(log), fitted.front().filter, options.arrangement), findings);
     }
   }
+  return out;
+}
+
+/// What the logs alone show, against the URDF's limits too, where the project wants it.
+std::vector<CheckFinding> findings_alone(const Project& project, const std::vector<LogFacts>& facts,
+                                         const LogFactOptions& options) {
+  std::vector<CheckFinding> out = findings_of(facts, project.robot, options);
+  for (CheckFinding& finding : out) finding.error = finding.error && project.check.columns;
+  return out;
+}
+
+/// The lines to paste, within a sentence.
+std::string inline_text(const std::string& lines) {
+  std::string out;
+  for (const char c : lines) {
+    if (c == '\n') out += out.ends_with(':') ? " " : ", ";
+    if (c != '\n') out += c;
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<std::string> check_before_fit(const Project& project, const std::filesystem::path& directory,
+                                          GateData& data, const CheckOptions& options) {
+  std::vector<CheckFinding> findings = compare_with_urdf(project, directory, data.logs, options.arrangement);
+  const std::vector<LogFacts> facts = read_facts(project, directory, data.logs, data.rows, options, findings);
+  append(findings_alone(project, facts, options.facts), findings);
+  std::vector<std::string> notes;
+  for (const CheckFinding& finding : findings) {
+    std::string text = (finding.log.empty() ? "" : finding.log + ": ") + finding.text;
+    if (!finding.fix.empty()) text += "; write " + inline_text(finding.fix);
+    if (finding.error) throw DataError(text + ", or [check] columns = false if the columns are right");
+    // Reading them has told some already.
+    for (const auto* known : {&data.notes, &notes}) {
+      if (std::find(known->begin(), known->end(), text) != known->end()) text.clear();
+    }
+    if (!text.empty()) notes.push_back(std::move(text));
+  }
+  return notes;
+}
+
+CheckResult check(const Project& project, const std::filesystem::path& directory, const CheckOptions& options) {
+  CheckResult result;
+  std::vector<ProcessedLog> train;
+  KnownRows known;
+  if (project.has_role(Role::train)) {
+    GateData data = read_gate_data(project, directory);
+    append(compare_with_urdf(project, directory, data.logs, options.arrangement), result.findings);
+    result.signals = {data.filter.excited_hz, data.filter.position_cutoff_hz, data.filter.torque_cutoff_hz, {}};
+    if (project.check.columns) result.signals->torque_lead = torque_lead(project, data.logs, options.arrangement);
+    train = std::move(data.logs);
+    known = std::move(data.rows);
+  }
+  result.logs = read_facts(project, directory, train, known, options, result.findings);
   result.joints = joints_of(result.logs, project.robot, train);
-  for (CheckFinding& finding : saturation_of(result.joints, options.facts))
-    result.findings.push_back(std::move(finding));
-  if (train.empty() && !project.has_role(Role::train)) {
+  append(saturation_of(result.joints, options.facts), result.findings);
+  if (!project.has_role(Role::train)) {
     result.findings.push_back(
         {false, "no_train_log", {}, "", "no log has role = \"train\": nothing is compared with the URDF", ""});
   }
-  for (CheckFinding& finding : findings_of(result.logs, project.robot, options.facts))
-    result.findings.push_back(std::move(finding));
+  append(findings_alone(project, result.logs, options.facts), result.findings);
   return result;
 }
 

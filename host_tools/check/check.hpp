@@ -70,8 +70,6 @@ struct CheckResult {
 };
 
 LogFacts facts_of(const Log& log, const LogFactOptions& options);
-/// A time of a log for a project file: whole milliseconds, also of stamps that count from 1970.
-std::string seconds_text(double seconds);
 /// @param train processed; may be empty
 std::vector<JointFacts> joints_of(const std::vector<LogFacts>& logs, const Robot& robot,
                                   const std::vector<ProcessedLog>& train);
@@ -84,6 +82,11 @@ std::vector<CheckFinding> findings_of(const std::vector<LogFacts>& logs, const R
 /// the project does not want it ([check] columns = false).
 std::vector<CheckFinding> check_columns(const Project& project, const std::vector<ProcessedLog>& logs,
                                         const ArrangementOptions& options = {});
+/// For verbs that go on to a fit: what check() would complain of, as notes. Test logs are looked at, too, but decide
+/// nothing.
+/// @throws DataError: the data can't be what the project says, with the line to write
+std::vector<std::string> check_before_fit(const Project& project, const std::filesystem::path& directory,
+                                          GateData& data, const CheckOptions& options = {});
 /// All of it. Logs of scenarios are made below `directory`.
 CheckResult check(const Project& project, const std::filesystem::path& directory, const CheckOptions& options = {});
 

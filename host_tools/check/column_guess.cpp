@@ -87,6 +87,16 @@ bool is_command(const std::vector<std::string>& words) {
   });
 }
 
+/// What drives a slide; other forces are those of a sensor at the tool.
+bool is_drive_force(const std::vector<std::string>& words, const Robot& robot) {
+  const bool slides = std::any_of(robot.joints.begin(), robot.joints.end(),
+                                  [](const Joint& joint) { return joint.type == JointType::prismatic; });
+  const auto has = [&](std::initializer_list<const char*> list) {
+    return std::any_of(words.begin(), words.end(), [&](const std::string& word) { return is_one_of(word, list); });
+  };
+  return slides && has({"force", "forces", "thrust"}) && !has({"tcp", "tool", "ft", "wrench", "contact", "sensor"});
+}
+
 struct Column {
   std::string name;
   Kind kind{};
@@ -118,7 +128,7 @@ Column describe(const std::string& name, const Robot& robot) {
     if (std::from_chars(word.data(), word.data() + word.size(), value).ec == std::errc()) out.number = value;
   }
   const auto kind = kind_of(words);
-  out.kind = kind.value_or(kinds);
+  out.kind = kind.value_or(is_drive_force(words, robot) ? torque : kinds);
   out.rank = is_command(words) ? 2 : is_processed(words) ? 1 : 0;
   return out;
 }

@@ -143,6 +143,12 @@ class MoveWords {
         keys.push_back(fmt::format("{} = {}", signal, quoted(format_->columns.at(signal))));
       }
     }
+    // What the project leaves out stays out.
+    for (const char* signal : {"dq", "ddq", "qlink"}) {
+      if (format_ == nullptr) break;
+      const auto given = format_->columns.find(signal);
+      if (given != format_->columns.end() && given->second.empty()) keys.push_back(fmt::format("{} = false", signal));
+    }
     return fmt::format("columns = {{ {} }}", fmt::join(keys, ", "));
   }
 
@@ -187,7 +193,8 @@ class MoveWords {
     for (Index j = 0; j < now.motion_offset.size(); ++j) {
       const bool given = format_ != nullptr && !format_->position_offset.empty();
       const double before = given ? format_->position_offset[static_cast<std::size_t>(j)] : 0;
-      out.push_back(fmt::format("{:.4g}", std::remainder(before + now.motion_offset[j], 2 * std::numbers::pi)));
+      const double sum = std::remainder(before + now.motion_offset[j], 2 * std::numbers::pi);
+      out.push_back(fmt::format("{:g}", std::round(1e4 * sum) / 1e4 + 0.0));  // no "-0"
     }
     return fmt::format("{}", fmt::join(out, ", "));
   }

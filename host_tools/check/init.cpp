@@ -10,7 +10,10 @@
 
 #include "host_tools/check/check.hpp"
 #include "host_tools/check/column_guess.hpp"
+#include "host_tools/check/course.hpp"
+#include "host_tools/project/log_entries.hpp"
 #include "host_tools/support/error.hpp"
+#include "host_tools/support/time_text.hpp"
 
 namespace fxdyn {
 
@@ -30,7 +33,7 @@ std::string list(const std::vector<std::string>& columns) {
 
 /// Whether the names are those that a project need not say: q1, q2, ...
 bool is_default(const LogFormat& format) {
-  if (format.columns.at("t") != "t") return false;
+  if (format.columns.size() > 1 || format.columns.at("t") != "t") return false;
   for (const auto& [signal, names] : format.joint_columns) {
     for (std::size_t j = 0; j < names.size(); ++j)
       if (names[j] != fmt::format("{}{}", signal, j + 1)) return false;
@@ -41,13 +44,49 @@ bool is_default(const LogFormat& format) {
 struct Recorded {
   fs::path file;
   LogFacts facts;
+  Course course;
+  double from_s = 0, to_s = 0;  ///< without standstill
 };
 
-/// Whether two logs show the same motion: their joints' ranges agree to one part in a hundred.
-bool same_motion(const LogFacts& a, const LogFacts& b) {
-  const Eigen::VectorXd range = (a.q_upper - a.q_lower).cwiseMax(1e-9);
-  return ((a.q_upper - b.q_upper).cwiseAbs().array() < 0.01 * range.array()).all() &&
-         ((a.q_lower - b.q_lower).cwiseAbs().array() < 0.01 * range.array()).all();
+Recorded recorded_of(const fs::path& file, const Log& log, const LogFactOptions& options) {
+  Recorded out{file, facts_of(log, options), {}};
+  const LogFacts& facts = out.facts;
+  out.from_s = facts.rest_until_s - facts.begin_s > options.rest ? facts.rest_until_s : facts.begin_s;
+  out.to_s = facts.end_s - facts.rest_from_s > options.rest ? facts.rest_from_s : facts.end_s;
+  out.course = course_of(log, facts.rest_until_s, facts.rest_from_s);
+  return out;
+}
+
+/// The columns by their names, or as they are given.
+ColumnGuess columns_in(const fs::path& file, const Robot& robot, const std::string& given) {
+  ColumnGuess guess = guess_columns(read_head(file), robot);
+  if (!given.empty()) {
+    LogFormat named = columns_of(given, robot);
+    for (const auto& [signal, prefix] : named.columns) {
+      if (prefix.empty()) {
+        guess.format.joint_columns.erase(signal);
+        guess.format.columns[signal] = "";
+        continue;
+      }
+      for (std::size_t j = 0; j < robot.size() && signal != "t"; ++j)
+        named.joint_columns[signal].push_back(fmt::format("{}{}", prefix, j + 1));
+    }
+    const auto is_named = [&](const std::string& signal) {
+      return signal == "t" ? named.columns.contains(signal) : named.joint_columns.contains(signal);
+    };
+    if (is_named("t")) guess.format.columns["t"] = named.columns.at("t");
+    if (is_named("tau")) guess.torque_is_current = false;
+    for (const auto& [signal, names] : named.joint_columns) guess.format.joint_columns[signal] = names;
+    // "t in one column (..)"
+    std::erase_if(guess.missing, [&](const std::string& what) { return is_named(what.substr(0, what.find(' '))); });
+  }
+  if (!guess.missing.empty()) {
+    throw InputError(
+        fmt::format("{}: no column is seen for {}; name them, or their numbers from 0: --columns '{{ t = "
+                    "\"..\", q = [\"..\", ..], tau = [\"..\", ..] }}'",
+                    file.string(), fmt::join(guess.missing, ", ")));
+  }
+  return guess;
 }
 
 /// Roles by trajectories: repetitions of one motion share theirs. One motion: empty.
@@ -57,7 +96,7 @@ std::vector<std::string> roles_of(const std::vector<Recorded>& logs) {
   for (std::size_t i = 0; i < logs.size(); ++i) {
     std::size_t same = i;
     for (std::size_t k = 0; k < i && same == i; ++k)
-      if (same_motion(logs[k].facts, logs[i].facts)) same = k;
+      if (same_course(logs[k].course, logs[i].course)) same = k;
     motion.push_back(same == i ? motions++ : motion[same]);
   }
   std::vector<std::string> roles;
@@ -67,22 +106,26 @@ std::vector<std::string> roles_of(const std::vector<Recorded>& logs) {
   return roles;
 }
 
-void write_signals(const ColumnGuess& guess, const std::vector<double>& position_gain, std::size_t joints,
-                   std::string& out) {
-  const LogFormat& format = guess.format;
-  if (is_default(format) && !guess.torque_is_current && position_gain.empty()) return;
+/// @param format of the guess, with what the numbers have shown of its units
+void write_signals(const ColumnGuess& guess, const LogFormat& format, std::size_t joints, std::string& out) {
+  const bool by_names = !format.columns.at("t").starts_with('#');
+  if (is_default(format) && !guess.torque_is_current && format.position_gain.empty()) return;
   out += "\n[signals]\n";
   if (!is_default(format)) {
     out += fmt::format("# which column of the file holds what, joint by joint{}\n",
-                       format.columns.at("t").starts_with('#') ? "; numbers count from 0" : "");
+                       by_names ? "" : "; numbers count from 0");
     std::string columns = "t = " + quoted(format.columns.at("t"));
     for (const auto& [signal, names] : format.joint_columns) columns += fmt::format(", {} = {}", signal, list(names));
-    out += fmt::format("columns = {{ {} }}\n", columns);
+    std::string left_out;
+    for (const auto& [signal, prefix] : format.columns)
+      if (prefix.empty()) left_out += fmt::format(", {} = false", signal);
+    if (!left_out.empty()) out += "# its velocity is in another unit than q: left out, and differentiated from q\n";
+    out += fmt::format("columns = {{ {}{} }}\n", columns, left_out);
   }
   for (const std::string& note : guess.notes) out += fmt::format("# {}\n", note);
-  if (!position_gain.empty()) {
+  if (!format.position_gain.empty()) {
     out += "# q looks like degrees: to rad\n";
-    out += fmt::format("position_gain = [{:.10g}]\n", fmt::join(position_gain, ", "));
+    out += fmt::format("position_gain = [{:.10g}]\n", fmt::join(format.position_gain, ", "));
   }
   if (guess.torque_is_current) {
     out +=
@@ -91,42 +134,51 @@ void write_signals(const ColumnGuess& guess, const std::vector<double>& position
   }
 }
 
+std::string name_in_project(const fs::path& file, const fs::path& directory) {
+  return file == "-" ? "-" : fs::relative(file, directory).generic_string();
+}
+
 void write_log_entry(const Recorded& log, const fs::path& directory, const std::string& role, double from, double to,
                      std::string& out) {
   const LogFacts& facts = log.facts;
   out += fmt::format("\n# {:.4g} s at {:.4g} Hz\n[[log]]\nfile = \"{}\"\nrole = \"{}\"\n", facts.seconds, facts.rate_hz,
-                     fs::relative(log.file, directory).generic_string(), role);
-  if (from > facts.begin_s) out += fmt::format("from_s = {}\n", seconds_text(from));
-  if (to < facts.end_s) out += fmt::format("to_s = {}\n", seconds_text(to));
+                     name_in_project(log.file, directory), role);
+  if (from > facts.begin_s) out += fmt::format("from_s = {}\n", time_text(from));
+  if (to < facts.end_s) out += fmt::format("to_s = {}\n", time_text(to));
+}
+
+/// A log whose positions may be degrees: the format gets the gain, and loses a velocity that is in another unit.
+Log read_in_its_unit(const fs::path& file, std::size_t joints, const std::vector<bool>& turns, LogFormat& format) {
+  for (;;) {
+    try {
+      return read_log(file, joints, turns, format, {}, {});
+    } catch (const InputError& error) {
+      const std::string why = error.what();
+      const bool gain = why.find("multiply by pi/180") != std::string::npos && format.position_gain.empty();
+      const bool velocity = why.find("dq = false") != std::string::npos && format.joint_columns.contains("dq");
+      if (!gain && !velocity) throw;
+      for (const bool turn : turns)
+        if (gain) format.position_gain.push_back(turn ? std::numbers::pi / 180 : 1);
+      for (const char* signal : {"dq", "ddq"}) {
+        if (velocity && format.joint_columns.erase(signal) > 0) format.columns[signal] = "";
+      }
+    }
+  }
 }
 
 }  // namespace
 
-std::string init_project(const std::vector<fs::path>& logs, const fs::path& urdf, const fs::path& directory) {
+std::string init_project(const std::vector<fs::path>& logs, const fs::path& urdf, const fs::path& directory,
+                         const std::string& columns) {
   const Robot robot = read_urdf(urdf);
   std::vector<bool> turns;
   for (const Joint& joint : robot.joints) turns.push_back(joint.type == JointType::revolute);
-  const ColumnGuess guess = guess_columns(read_head(logs.front()), robot);
-  if (!guess.missing.empty()) {
-    throw InputError(
-        fmt::format("{}: no column is seen for {}; name them: columns = {{ t = \"..\", q = [\"..\", ..], tau = "
-                    "[\"..\", ..] }}",
-                    logs.front().string(), fmt::join(guess.missing, ", ")));
-  }
+  const ColumnGuess guess = columns_in(logs.front(), robot, columns);
   LogFormat format = guess.format;
-  std::vector<double> position_gain;
   std::vector<Recorded> recorded;
   const LogFactOptions options;
-  for (const fs::path& file : logs) {
-    try {
-      recorded.push_back({file, facts_of(read_log(file, robot.size(), turns, format, {}, {}), options)});
-    } catch (const InputError& error) {
-      if (std::string(error.what()).find("degrees") == std::string::npos || !position_gain.empty()) throw;
-      for (const bool turn : turns) position_gain.push_back(turn ? std::numbers::pi / 180 : 1);
-      format.position_gain = position_gain;
-      recorded.push_back({file, facts_of(read_log(file, robot.size(), turns, format, {}, {}), options)});
-    }
-  }
+  for (const fs::path& file : logs)
+    recorded.push_back(recorded_of(file, read_in_its_unit(file, robot.size(), turns, format), options));
 
   std::string out = fmt::format("# {}: {} joints ({})\n", robot.name, robot.size(),
                                 fmt::join(
@@ -141,13 +193,11 @@ std::string init_project(const std::vector<fs::path>& logs, const fs::path& urdf
   out += "# gravity = [0.0, 0.0, -9.81]   # in the base frame: write another where the base is not level\n";
   out += fmt::format("# rated_torque = [{}]   # of each joint, from the data sheet\n",
                      fmt::join(std::vector<std::string>(robot.size(), ".."), ", "));
-  write_signals(guess, position_gain, robot.size(), out);
+  write_signals(guess, format, robot.size(), out);
 
   const std::vector<std::string> roles = roles_of(recorded);
   for (std::size_t i = 0; i < recorded.size(); ++i) {
-    const LogFacts& facts = recorded[i].facts;
-    const double from = facts.rest_until_s - facts.begin_s > options.rest ? facts.rest_until_s : facts.begin_s;
-    const double to = facts.end_s - facts.rest_from_s > options.rest ? facts.rest_from_s : facts.end_s;
+    const double from = recorded[i].from_s, to = recorded[i].to_s;
     if (!roles.empty()) {
       write_log_entry(recorded[i], directory, roles[i], from, to, out);
       continue;

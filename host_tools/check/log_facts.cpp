@@ -1,10 +1,12 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "host_tools/check/check.hpp"
+#include "host_tools/support/time_text.hpp"
 
 namespace fxdyn {
 
@@ -43,26 +45,35 @@ void add_rest(const LogFacts& log, const LogFactOptions& options, double begin, 
   if (!front && !back) return;
   std::string text, fix;
   if (front) {
-    text = fmt::format("at rest from {} to {} s", seconds_text(begin), seconds_text(log.rest_until_s));
-    fix = "from_s = " + seconds_text(log.rest_until_s);
+    text = fmt::format("at rest from {} to {} s", time_text(begin), time_text(log.rest_until_s));
+    fix = "from_s = " + time_text(log.rest_until_s);
   }
   if (back) {
-    text +=
-        fmt::format("{}at rest from {} to {} s", front ? ", " : "", seconds_text(log.rest_from_s), seconds_text(end));
-    fix += fmt::format("{}to_s = {}", front ? "\n" : "", seconds_text(log.rest_from_s));
+    text += fmt::format("{}at rest from {} to {} s", front ? ", " : "", time_text(log.rest_from_s), time_text(end));
+    fix += fmt::format("{}to_s = {}", front ? "\n" : "", time_text(log.rest_from_s));
   }
   text += ": stiction holds any torque there, and the fit takes it for friction";
   out.push_back({false, "rest", {}, log.name, text, fix});
 }
 
-}  // namespace
-
-std::string seconds_text(double seconds) {
-  std::string text = fmt::format("{:.3f}", seconds);
-  while (text.back() == '0') text.pop_back();
-  if (text.back() == '.') text += '0';
-  return text;
+/// A slide that goes much further than its rail is long.
+CheckFinding too_long(const Robot& robot, Index j, double lower, double upper) {
+  const Limits& limits = *robot.joints[static_cast<std::size_t>(j)].limits;
+  const double range = limits.upper - limits.lower;
+  // What remains of the rail in mm; next to nothing: cm.
+  const double gain = 1e-3 * (upper - lower) > 0.02 * range ? 1e-3 : 1e-2;
+  std::vector<double> gains(robot.size(), 1.0);
+  gains[static_cast<std::size_t>(j)] = gain;
+  return {true,
+          "too_long",
+          static_cast<std::size_t>(j),
+          "",
+          fmt::format("{} goes from {:.4g} to {:.4g} m, where the URDF's limits leave {:.3g} m: its q is in {}?",
+                      of_joint(robot, j), lower, upper, range, gain < 5e-3 ? "mm" : "cm"),
+          fmt::format("in [signals], times what stands there:\nposition_gain = [{}]", fmt::join(gains, ", "))};
 }
+
+}  // namespace
 
 LogFacts facts_of(const Log& log, const LogFactOptions& options) {
   LogFacts facts;
@@ -72,8 +83,8 @@ LogFacts facts_of(const Log& log, const LogFactOptions& options) {
   facts.rate_hz = 1 / log.step_s;
   facts.resampled = log.resampled;
   facts.time_note = log.time_note;
-  facts.q_lower = log.q.colwise().minCoeff().transpose();
-  facts.q_upper = log.q.colwise().maxCoeff().transpose();
+  facts.q_lower = log.q.colwise().minCoeff().transpose().array() + 0.0;  // no "-0"
+  facts.q_upper = log.q.colwise().maxCoeff().transpose().array() + 0.0;
   Index short_window = 1, window = 1;
   facts.speed = coarse_speed(log, options.speed_window_s, short_window).cwiseAbs().colwise().maxCoeff().transpose();
   const Eigen::MatrixXd speed = coarse_speed(log, options.rest_window_s, window).cwiseAbs();
@@ -176,6 +187,10 @@ std::vector<CheckFinding> findings_of(const std::vector<LogFacts>& logs, const R
     if (!joint.limits || joint.continuous) continue;
     const double range = joint.limits->upper - joint.limits->lower;
     const double beyond = std::max(upper[j] - joint.limits->upper, joint.limits->lower - lower[j]);
+    if (joint.type == JointType::prismatic && range > 0 && upper[j] - lower[j] > options.impossible * range) {
+      out.push_back(too_long(robot, j, lower[j], upper[j]));
+      continue;
+    }
     if (range > 0 && beyond > options.beyond * range) {
       out.push_back(
           {false, "beyond_limits", at, "",

@@ -60,6 +60,8 @@ struct ArrangementOptions {
   /// share of the torque's RMS; q and tau are exchanged where more than the first stays as given and less than the
   /// second exchanged; hand
   double unexplained = 0.5, explained = 0.3;
+  /// -; a log whose samples raise a joint's residual by more is looked at alone; hand: another speed raises it by less
+  double disagree = 1.3;
   /// findings in one set of logs, at most
   int most = 4;
 };
@@ -82,6 +84,9 @@ struct LogFactOptions {
   double least_range = 0.05;
   /// share of the URDF's range; a motion that goes so far beyond it is told; hand
   double beyond = 0.05;
+  /// -; times the URDF's range; a slide that covers more is not in m; hand: rails in cm or mm cover 5 to 1000 times
+  /// theirs
+  double impossible = 10;
   /// rad | m; a wider range is a placeholder; hand: eight turns
   double widest = 50;
   /// -; times the URDF's velocity limit; hand

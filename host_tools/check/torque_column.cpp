@@ -10,11 +10,12 @@ namespace fxdyn {
 namespace {
 
 struct Explained {
-  double nats = 0, left = 0;
+  double nats = 0, left = 0, most = 0;
   bool enough = false;
 };
 
-/// How well the URDF as it is explains the samples; `left`: share of the torque's RMS that stays, mean over joints.
+/// How well the URDF as it is explains the samples; `left`: share of the torque's RMS that stays, mean over joints;
+/// `most`: of the joint that it explains least.
 Explained explain(const Robot& robot, const TorqueSamples& samples, const ArrangementOptions& options) {
   const ArrangementEvidence evidence(robot, samples, options);
   Explained out;
@@ -27,6 +28,7 @@ Explained explain(const Robot& robot, const TorqueSamples& samples, const Arrang
     const double size = std::sqrt(samples.tau.col(j).squaredNorm() / static_cast<double>(samples.size()));
     if (!evidence.moves(j) || !(size > 0)) continue;
     out.left += score.rms[j] / size;
+    out.most = std::max(out.most, score.rms[j] / size);
     ++joints;
   }
   out.left /= std::max(1.0, joints);
@@ -84,6 +86,34 @@ std::optional<MeasuredLead> torque_lead(const Project& project, const std::vecto
   const double vertex = bend > 0 ? step * (square[0] - square[2]) / (2 * bend) : INFINITY;
   if (std::fabs(vertex) > step) return {};
   return MeasuredLead{known + vertex, step * std::sqrt(2 * options.blurred * square[1] / bend)};
+}
+
+bool is_unexplained(const Project& project, const std::vector<ProcessedLog>& logs, const ArrangementOptions& options) {
+  const Explained given = explain(project.robot, sample_torque(logs, options.samples), options);
+  return given.enough && given.most > options.unexplained;
+}
+
+bool disagrees(const Robot& robot, const TorqueSamples& train, const TorqueSamples& log,
+               const ArrangementOptions& options) {
+  TorqueSamples both = train;
+  const auto append = [](const Eigen::MatrixXd& more, Eigen::MatrixXd& to) {
+    to.conservativeResize(to.rows() + more.rows(), Eigen::NoChange);
+    to.bottomRows(more.rows()) = more;
+  };
+  append(log.q, both.q);
+  append(log.dq, both.dq);
+  append(log.ddq, both.ddq);
+  append(log.tau, both.tau);
+  both.independent += log.independent;
+  const Arrangement given = as_given(robot);
+  const ArrangementEvidence alone(robot, train, options), together(robot, both, options);
+  if (!alone.enough()) return false;
+  const Eigen::VectorXd before = alone(given).rms, after = together(given).rms;
+  for (Eigen::Index j = 0; j < before.size(); ++j) {
+    const double size = std::sqrt(train.tau.col(j).squaredNorm() / static_cast<double>(train.size()));
+    if (alone.moves(j) && after[j] > options.disagree * std::max(before[j], options.perfect * size)) return true;
+  }
+  return false;
 }
 
 bool are_exchanged(const Project& project, const std::vector<Log>& train, const ArrangementOptions& options) {

@@ -74,14 +74,17 @@ Action add_check(CLI::App& verb) {
 Action add_init(CLI::App& verb) {
   struct Options {
     std::vector<std::string> logs;
-    std::string urdf;
+    std::string urdf, columns;
   };
   const auto options = std::make_shared<Options>();
   verb.add_option("LOG", options->logs, "logs (CSV) of the robot, with or without a line of names")->required();
   verb.add_option("--urdf", options->urdf, "the robot's URDF")->required();
+  verb.add_option(
+      "--columns", options->columns,
+      "where the names do not tell: '{ t = \"..\", q = [\"..\", ..], tau = [\"..\", ..] }', names or numbers");
   return [options] {
     fmt::print("{}", init_project({options->logs.begin(), options->logs.end()}, options->urdf,
-                                  std::filesystem::current_path()));
+                                  std::filesystem::current_path(), options->columns));
     fmt::print(stderr, "next, if this is written to robot.toml: fxdyn check robot.toml\n");
   };
 }

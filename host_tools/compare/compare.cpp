@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "host_tools/check/check.hpp"
 #include "host_tools/compare/figures.hpp"
 #include "host_tools/compare/known_shapes.hpp"
 #include "host_tools/compare/mlp.hpp"
@@ -72,9 +73,10 @@ constexpr const char* searched[] = {"bls_pso", "bls_pso_friction", "bls_pso_phys
 
 class Comparison {
  public:
-  /// @param resumable swarms keep their last generation in `directory`
+  /// @param resumable a verb's own: the logs are checked, swarms keep their last generation in `directory`
   Comparison(const Project& project, const fs::path& directory, bool resumable)
       : project_(project), directory_(directory), data_(read_gate_data(project_, directory)), resumable_(resumable) {
+    if (resumable) check_before_fit(project_, directory_, data_);  // "named_bls" tells its notes
     for (const char* name : searched) {
       if (const auto resume = resume_file(name)) resume->check_inputs();
     }

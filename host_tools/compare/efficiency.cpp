@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host_tools/check/check.hpp"
 #include "host_tools/compare/compare.hpp"
 #include "host_tools/identify/identify.hpp"
 #include "host_tools/project/provenance.hpp"
@@ -73,6 +74,12 @@ class Efficiency {
     }
   }
 
+  /// @throws DataError: the logs can't be what the project says
+  void check_logs() const {
+    GateData data = read_gate_data(project_, directory_);
+    for (const std::string& note : check_before_fit(project_, directory_, data)) fmt::print(stderr, "note: {}\n", note);
+  }
+
   EfficiencyResult run() {
     EfficiencyResult out{.project_hash = project_hash(project_), .made_from = made_from(project_, directory_, false)};
     for (const double s : seconds) add(out.curve, s, 0.5, methods);
@@ -120,7 +127,9 @@ class Efficiency {
 }  // namespace
 
 EfficiencyResult efficiency(const fs::path& project, const fs::path& directory) {
-  EfficiencyResult result = Efficiency(project, directory).run();
+  Efficiency study(project, directory);
+  study.check_logs();
+  EfficiencyResult result = study.run();
   write_file(directory / "efficiency.json", to_json(result).dump(1) + "\n");
   return result;
 }

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host_tools/support/time_text.hpp"
+
 namespace fxdyn::diagnosis {
 namespace {
 
@@ -31,7 +33,7 @@ std::string words_of_time(const GapRegion& region, const std::vector<const Proce
   const bool begins = region.from - first < near_s, ends = last - region.to < near_s;
   if (begins && !ends) return fmt::format("in the first {:.2g} s{}", region.to - first, of);
   if (ends && !begins) return fmt::format("in the last {:.2g} s{}", last - region.from, of);
-  return between(region, "s") + of;
+  return fmt::format("between {} and {} s{}", time_text(region.from), time_text(region.to), of);
 }
 
 /// Slow motion that is small against the logs' fastest is where a joint reverses.

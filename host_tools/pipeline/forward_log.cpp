@@ -50,7 +50,9 @@ std::string forward_log(const fs::path& model_file, const fs::path& log_file, In
   log.role = Role::test;
   Progress progress;
   progress.stage("simulating the motion", 1);
-  const Forward forward = simulate_forward(model, log, process(log, model.filter), given);
+  const ProcessedLog processed = process(log, model.filter);
+  require_log_of(model, log_file, processed, predict(model, processed));
+  const Forward forward = simulate_forward(model, log, processed, given);
   progress.step();
   progress.done();
   const ForwardResult result = forward_result(forward, model.robot, log, given);

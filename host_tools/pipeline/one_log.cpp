@@ -11,6 +11,7 @@
 #include "host_tools/identify/known_load.hpp"
 #include "host_tools/identify/payload.hpp"
 #include "host_tools/identify/payload_result.hpp"
+#include "host_tools/pipeline/log_check.hpp"
 #include "host_tools/regression/metrics_result.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
@@ -41,6 +42,11 @@ Log read_log_for(const IdentifiedModel& model, const fs::path& file, std::option
   Log log = read_log(file, model.robot.size(), revolute, format_of(model, file), from_s, to_s, torque_required);
   if (!log.time_note.empty()) fmt::print(stderr, "note: {}\n", log.time_note);
   return log;
+}
+
+void require_log_of(const IdentifiedModel& model, const fs::path& file, const ProcessedLog& log,
+                    const Eigen::MatrixXd& torque) {
+  for (const std::string& note : check_log_for(model, file, log, torque)) fmt::print(stderr, "note: {}\n", note);
 }
 
 namespace {
@@ -139,8 +145,10 @@ std::string identify_payload(const fs::path& model_file, const fs::path& log_fil
     throw InputError(
         fmt::format("{}: would be overwritten by the model with load; choose another --out", model_file.string()));
   }
-  const Log log = read_log_for(model, log_file, {}, {});
-  const LoadFit fit = identify_load(model, process(log, model.filter));
+  const ProcessedLog log = process(read_log_for(model, log_file, {}, {}), model.filter);
+  check_weighable(model, log);
+  require_log_of(model, log_file, log, predict(model, log));
+  const LoadFit fit = identify_load(model, log);
   model.body.push_back(fit.effect);
   model.drop_tables();  // they are another model's now
   const PayloadResult report = payload_result(fit, model.robot);
@@ -161,8 +169,10 @@ std::string identify_torque_gains(const fs::path& model_file, const fs::path& un
   ProcessSettings settings;
   const auto seconds = [](const Log& log) { return log.step_s * static_cast<double>(log.samples()); };
   settings.shortest_interval_s = (seconds(without) + seconds(with)) / GateOptions{}.most_rows;
-  const std::vector<JointGain> gains =
-      identify_gains(model, load, process(without, model.filter, settings), process(with, model.filter, settings));
+  const ProcessedLog first = process(without, model.filter, settings), second = process(with, model.filter, settings);
+  require_log_of(model, unloaded, first, predict(model, first));
+  require_log_of(model, loaded, second, predict(model, second));
+  const std::vector<JointGain> gains = identify_gains(model, load, first, second);
   const GainResult result = gain_result(gains, load, model.robot, gain);
   const std::string unknown = unknown_gains(result);
   write_file(directory / "payload.json", to_json(result).dump(1) + "\n");
@@ -198,6 +208,7 @@ std::string predict_log(const fs::path& model_file, const fs::path& log_file, co
   } else {
     torque = predict(model, processed);
   }
+  require_log_of(model, log_file, processed, torque);
   const fs::path out = directory / prediction_name(log_file);
   std::error_code ignored;
   if (fs::equivalent(out, log_file, ignored)) {

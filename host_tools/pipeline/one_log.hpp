@@ -1,10 +1,12 @@
 #pragma once
 
+#include <Eigen/Dense>
 #include <filesystem>
 #include <optional>
 #include <string>
 
 #include "host_tools/effects/forward.hpp"
+#include "host_tools/regression/dataset.hpp"
 #include "host_tools/signals/log.hpp"
 
 namespace fxdyn {
@@ -13,6 +15,11 @@ namespace fxdyn {
 /// @throws InputError also where the project's logs differ in them
 Log read_log_for(const IdentifiedModel& model, const std::filesystem::path& file, std::optional<double> from_s,
                  std::optional<double> to_s, bool torque_required = true);
+
+/// Ends with the cause where the log can't be of the model's robot; see check_log_for(). Notes go to the terminal.
+/// @throws DataError
+void require_log_of(const IdentifiedModel& model, const std::filesystem::path& file, const ProcessedLog& log,
+                    const Eigen::MatrixXd& torque);
 
 struct Prediction {
   bool fixed = false;  ///< as the firmware computes, else in double

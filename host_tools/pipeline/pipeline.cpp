@@ -51,6 +51,9 @@ GateData& Pipeline::data() {
     data_ = std::make_unique<GateData>(read_gate_data(project_, directory_));
     data_notes_ = data_->notes;
     progress_.step();
+    progress_.stage("checking the logs", 1);
+    for (std::string& note : check_before_fit(project_, directory_, *data_)) data_notes_.push_back(std::move(note));
+    progress_.step();
     progress_.done();
   }
   return *data_;
@@ -79,27 +82,6 @@ std::optional<IdentifiedModel> Pipeline::written(std::initializer_list<std::stri
   IdentifiedModel model = read_model(file);
   const bool wanted = std::find(stages.begin(), stages.end(), model.stage) != stages.end();
   return wanted && is_current(model) ? std::optional(std::move(model)) : std::nullopt;
-}
-
-namespace {
-
-std::string one_line(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text;
-}
-
-}  // namespace
-
-void Pipeline::check_data() {
-  if (checked_) return;
-  checked_ = true;
-  for (const CheckFinding& finding : check_columns(project_, data().logs)) {
-    if (finding.error) {
-      throw DataError(fmt::format("{}; write {}, or [check] columns = false if the columns are right", finding.text,
-                                  one_line(finding.fix)));
-    }
-    data_notes_.push_back(finding.text);
-  }
 }
 
 void Pipeline::check_motion() {
@@ -157,7 +139,6 @@ void Pipeline::write_possible_bodies(const std::optional<PhysicalFit>& bodies) c
 
 void Pipeline::identify() {
   const ThreadLimit limit(data().threads);
-  check_data();
   data().notes = data_notes_;
   const auto fitter = fxdyn::identify(project_, data(), progress_);
   progress_.stage("fit, standard deviations, possible bodies", 1);
@@ -182,7 +163,6 @@ void Pipeline::identify() {
 void Pipeline::diagnose() {
   const auto start = Clock::now();
   const ThreadLimit limit(data().threads);
-  check_data();
   data().notes = data_notes_;
   std::vector<ProcessedLog> baseline;
   for (Log& log : read_logs(project_, Role::baseline, directory_, &data().rows)) {
@@ -352,7 +332,6 @@ void Pipeline::report() {
 }
 
 void Pipeline::run() {
-  fs::create_directories(directory_);  // fails now rather than after the work
   check_motion();
   diagnose();
   train();

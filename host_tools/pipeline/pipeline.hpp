@@ -57,6 +57,8 @@ class Pipeline {
   StageErrors stage_errors(const IdentifiedModel& model, const std::string& stage);
 
  private:
+  /// Read on first use, and checked before anything is fitted; see check_before_fit().
+  /// @throws DataError: the logs can't be what the project says
   GateData& data();
   /// References of train, validate and baseline logs: what a diagnosed model depends on.
   const std::vector<LogReference>& diagnosed_logs();
@@ -64,9 +66,6 @@ class Pipeline {
   /// DIR/model.json, if it is current and one of these stages made it.
   std::optional<IdentifiedModel> written(std::initializer_list<std::string_view> stages);
   void check_motion();
-  /// The project's columns, signs and zeros, before any fit; see check_columns().
-  /// @throws DataError: they can't be right
-  void check_data();
   /// Index (from 1) and name of a joint about which diagnosis could say nothing.
   std::optional<std::pair<int, std::string>> not_excited() const;
   /// @throws DataError: there is one
@@ -84,7 +83,6 @@ class Pipeline {
   std::vector<std::string> data_notes_;  ///< of reading the logs alone
   std::optional<std::vector<LogReference>> diagnosed_logs_;
   Progress progress_;
-  bool checked_ = false;  ///< check_data() has looked
 };
 
 }  // namespace fxdyn

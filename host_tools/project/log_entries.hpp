@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "host_tools/project/project.hpp"
 #include "host_tools/support/error.hpp"
@@ -9,6 +10,10 @@ namespace fxdyn {
 
 /// Where an entry's log is, once its scenario has been simulated.
 std::filesystem::path log_file(const LogEntry& entry, const std::filesystem::path& directory);
+
+/// The value of a project's key `columns`, as in "{ t = 0, q = [1, 2] }".
+/// @throws InputError
+LogFormat columns_of(const std::string& text, const Robot& robot);
 
 /// Whether the windows of two logs have a moment in common.
 bool share_time(const LogEntry& a, const LogEntry& b);

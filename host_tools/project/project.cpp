@@ -68,6 +68,18 @@ class ProjectReader {
     project_.file = fs::absolute(file);
   }
 
+  /// Of one key alone, given on the command line.
+  ProjectReader(std::string name, toml::table root, const Robot& robot)
+      : file_(std::move(name)), root_(std::move(root)) {
+    project_.robot = robot;
+  }
+  LogFormat read_columns() {
+    Table root({file_, "", 1}, root_);
+    LogFormat format = read_format(root, {});
+    root.finish();
+    return format;
+  }
+
   Project read() {
     Table root({file_, "", 1}, root_);
     read_robot(Table(root.need("robot", "add a table [robot] with urdf = \"...\"")));
@@ -177,7 +189,11 @@ class ProjectReader {
   void read_columns(const std::string& signal, const Value& value, LogFormat& format) {
     format.columns.erase(signal);
     format.joint_columns.erase(signal);
-    if (value.is_string()) {
+    if (value.is_boolean()) {
+      if (value.boolean() || signal == "t" || signal == "q" || signal == "tau")
+        value.place().fail("name its columns; `dq = false` and the like leave out what is not needed");
+      format.columns[signal] = "";
+    } else if (value.is_string()) {
       format.columns[signal] = value.string();
     } else if (signal == "t") {
       format.columns[signal] = column_name(value);
@@ -441,6 +457,16 @@ class ProjectReader {
 
 bool Project::has_role(Role role) const {
   return std::any_of(logs.begin(), logs.end(), [role](const LogEntry& entry) { return entry.role == role; });
+}
+
+LogFormat columns_of(const std::string& text, const Robot& robot) {
+  try {
+    return ProjectReader("--columns", toml::parse("columns = " + text), robot).read_columns();
+  } catch (const toml::parse_error& error) {
+    throw InputError(
+        fmt::format("--columns: not valid TOML: {}; write '{{ t = \"..\", q = [\"..\", ..], tau = [\"..\", ..] }}'",
+                    error.description()));
+  }
 }
 
 Project read_project(const fs::path& file) { return ProjectReader(file).read(); }

@@ -1,9 +1,11 @@
 #include "host_tools/project/provenance.hpp"
 
 #include <cstring>
+#include <sstream>
 
 #include "host_tools/project/log_entries.hpp"
 #include "host_tools/support/files.hpp"
+#include "host_tools/support/toml.hpp"
 
 namespace fxdyn {
 namespace {
@@ -28,7 +30,17 @@ json read_seconds(const fs::path& directory) {
 
 }  // namespace
 
-std::string project_hash(const Project& project) { return hash_of(read_file(project.file) + read_file(project.urdf)); }
+std::string project_hash(const Project& project) {
+  toml::table table = toml_input::parse(project.file);
+  // What export alone asks for: a refused export goes on from the model that is there.
+  if (toml::table* target = table["target"].as_table()) {
+    target->erase("accept_error");
+    if (target->empty()) table.erase("target");
+  }
+  std::ostringstream text;
+  text << table;
+  return hash_of(text.str() + read_file(project.urdf));
+}
 
 json made_from(const Project& project, const fs::path& directory, bool of_model) {
   json out{{"logs", json::object()}};

@@ -10,7 +10,7 @@
 
 namespace fxdyn {
 
-/// Of the project file and its URDF.
+/// Of the project's keys and values, without [target] accept_error, and of its URDF.
 std::string project_hash(const Project& project);
 
 /// What a result was made from: {"logs": {file relative to DIR: hash}, "model": hash of DIR/model.json without its

@@ -34,8 +34,10 @@ struct Load {
     MatrixXd columns(log.samples(), 6);
     columns << VectorXd::Ones(log.samples()), dq.array().sign().matrix(), dq, q, differentiate(dq, log.step_s),
         log.tau.col(joint);
-    // what is not linear in the motion has frequencies above the band; the torque too
-    const MatrixXd rows = filter.apply(columns).middleRows(edge, log.samples() - 2 * edge);
+    // What is not linear in the motion has frequencies above the band; the torque too. In place, column by column: a
+    // long log is not held twice.
+    for (Index c = 0; c < columns.cols(); ++c) columns.col(c) = filter.apply(columns.col(c));
+    const auto rows = columns.middleRows(edge, log.samples() - 2 * edge);
     products += rows.transpose() * rows;
     samples += static_cast<double>(rows.rows());
   }

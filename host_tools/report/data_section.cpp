@@ -3,6 +3,7 @@
 #include "host_tools/page/page.hpp"
 #include "host_tools/regression/metrics_result.hpp"
 #include "host_tools/report/section.hpp"
+#include "host_tools/support/time_text.hpp"
 
 namespace fxdyn {
 
@@ -14,8 +15,8 @@ std::string data_section(const ReportInput& input, const json& file) {
   Table logs({{"log"}, {"from [s]", "n"}, {"to [s]", "n"}, {"role"}, {"what it decided"}});
   for (const LogErrors& log : result.logs) {
     logs.add({{log.file},
-              number(log.from_s, 6),
-              number(log.to_s, 6),
+              {time_text(log.from_s), "n"},
+              {time_text(log.to_s), "n"},
               {to_string(log.role)},
               {log.role == Role::train      ? "the parameters"
                : log.role == Role::validate ? "which effects and nodes are kept"

@@ -8,6 +8,7 @@
 #include "host_tools/report/diagnosis_words.hpp"
 #include "host_tools/report/section.hpp"
 #include "host_tools/support/files.hpp"
+#include "host_tools/support/time_text.hpp"
 
 namespace fxdyn {
 namespace {
@@ -146,7 +147,7 @@ std::string evidence_section(const HeldOutEvidence& evidence) {
   std::string files;
   for (const HeldOutEvidence::Log& log : evidence.held_out) {
     files += fmt::format("{}{} ({}, {} .. {} s)", files.empty() ? "" : ", ", log.file, to_string(log.role),
-                         words::figure(log.from_s), words::figure(log.to_s));
+                         time_text(log.from_s), time_text(log.to_s));
   }
   out += table.html();
   out += paragraph(

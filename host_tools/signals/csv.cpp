@@ -72,6 +72,8 @@ class Header {
         add_named(static_cast<Signal>(signal), given->second, joints);
         continue;
       }
+      const auto prefix_of = format.columns.find(name);
+      if (prefix_of != format.columns.end() && prefix_of->second.empty()) continue;  // not wanted
       const bool required = signal == q || (signal == tau && torque_required) || format.columns.contains(name);
       add(static_cast<Signal>(signal), prefix(format, name), joints, required);
     }

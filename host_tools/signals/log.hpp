@@ -43,10 +43,11 @@ struct Log {
 
 /// How to read a log; the defaults are the file format of the design (t, q1.., dq1.., ddq1.., tau1.., qlink1..).
 struct LogFormat {
-  std::map<std::string, std::string> columns{};  ///< signal (t q dq ddq tau qlink temp) -> column prefix in the file
-  std::vector<double> torque_gain{};             ///< measured column -> N*m; empty: 1
-  std::vector<double> position_gain{};           ///< measured position -> rad | m, velocities too; empty: 1
-  std::vector<double> position_offset{};         ///< added to the position after its gain [rad | m]; empty: 0
+  /// Signal (t q dq ddq tau qlink temp) -> column prefix in the file; empty: what is optional is not read.
+  std::map<std::string, std::string> columns{};
+  std::vector<double> torque_gain{};      ///< measured column -> N*m; empty: 1
+  std::vector<double> position_gain{};    ///< measured position -> rad | m, velocities too; empty: 1
+  std::vector<double> position_offset{};  ///< added to the position after its gain [rad | m]; empty: 0
   /// Signal -> one column a joint, in the order of the chain; in place of a prefix. "#3": the fourth column of the
   /// file.
   std::map<std::string, std::vector<std::string>> joint_columns{};

@@ -15,6 +15,12 @@ using Eigen::Index;
 
 namespace {
 
+/// What to write where q and its derivatives are in different units: position_gain is all theirs.
+std::string leave_out_velocity(const Log& log) {
+  return fmt::format("leave out the velocity (columns = {{ dq = false{} }}), which is then differentiated from q",
+                     log.ddq.size() > 0 ? ", ddq = false" : "");
+}
+
 /// Units: compares dq with the slope of q.
 void check_velocity(const Log& log, Index joint, bool revolute, const std::string& where) {
   constexpr double degrees = 180 / std::numbers::pi;
@@ -31,13 +37,14 @@ void check_velocity(const Log& log, Index joint, bool revolute, const std::strin
   const auto near = [ratio](double value) { return std::abs(ratio / value - 1) < 0.15; };
   if (revolute && near(degrees)) {
     throw InputError(
-        fmt::format("{}: q{} looks like degrees (it changes {:.3g} times as fast as dq{} says); multiply by pi/180",
-                    where, joint + 1, ratio, joint + 1));
+        fmt::format("{}: q{} looks like degrees (it changes {:.3g} times as fast as dq{} says); multiply by pi/180 "
+                    "(position_gain), and {}",
+                    where, joint + 1, ratio, joint + 1, leave_out_velocity(log)));
   }
   if (revolute && near(1 / degrees)) {
-    throw InputError(
-        fmt::format("{}: dq{} looks like degrees (q{} changes only {:.3g} times as fast); multiply by pi/180", where,
-                    joint + 1, joint + 1, ratio));
+    throw InputError(fmt::format(
+        "{}: dq{} looks like degrees (q{} changes only {:.3g} times as fast): it lacks a factor of pi/180; {}", where,
+        joint + 1, joint + 1, ratio, leave_out_velocity(log)));
   }
   if (near(1e-3)) {
     throw InputError(

@@ -94,6 +94,7 @@ class Value {
     if (!node_.is_boolean()) place_.fail("expected true or false");
     return *node_.value<bool>();
   }
+  bool is_boolean() const { return node_.is_boolean(); }
   bool is_string() const { return node_.is_string(); }
   bool is_list() const { return node_.is_array(); }
   std::string string() const {

@@ -81,6 +81,7 @@ NewSession read_session(const Pipeline& pipeline, const IdentifiedModel& model, 
   settings.shortest_interval_s = row_interval_s;  // a second of it counts what a second of the train logs does
   out.refit.push_back(process(std::move(refit), model.filter, settings));
   out.held_out = process(std::move(held_out), model.filter);
+  require_log_of(model, file, out.refit.front(), predict(model, out.refit.front()));
   const std::vector<bool> moving = moving_joints(out.refit);
   for (std::size_t j = 0; j < moving.size(); ++j) {
     if (!moving[j])

@@ -3,8 +3,10 @@
 
 #include <cmath>
 #include <numbers>
+#include <sstream>
 
 #include "host_tools/check/column_guess.hpp"
+#include "host_tools/check/course.hpp"
 #include "host_tools/check/init.hpp"
 #include "tests/support/files.hpp"
 
@@ -70,6 +72,15 @@ TEST(ColumnGuess, TakesNamesOfJointsAndNumbersFromZeroOrOne) {
   EXPECT_EQ(from_one.format.joint_columns.at("tau"), (Names{"tau1", "tau2"}));
 }
 
+TEST(ColumnGuess, ForcesDriveSlidesAlone) {
+  Robot robot = read_urdf(two_joints());
+  const std::string forces = "t,q1,q2,force_1,force_2", at_tool = "t,q1,q2,actual_TCP_force_1,actual_TCP_force_2";
+  EXPECT_EQ(guess_columns(head_of(forces), robot).missing, Names{"tau"});
+  robot.joints[0].type = JointType::prismatic;
+  EXPECT_EQ(guess_columns(head_of(forces), robot).format.joint_columns.at("tau"), (Names{"force_1", "force_2"}));
+  EXPECT_EQ(guess_columns(head_of(at_tool), robot).missing, Names{"tau"});
+}
+
 TEST(ColumnGuess, TakesWhatWasMeasuredRatherThanWhatWasAsked) {
   const ColumnGuess guess =
       guess_columns(head_of("t,target_q1,target_q2,actual_q1,actual_q2\n"), read_urdf(two_joints()));
@@ -102,6 +113,20 @@ TEST(Init, WritesThatDegreesBecomeRadians) {
   expect_in("position_gain = [0.01745329252, 0.01745329252]", project);
 }
 
+TEST(Init, LeavesOutAVelocityInAnotherUnitThanThePosition) {
+  const std::string degrees = recording(2, false, 0, 180 / std::numbers::pi), rad = recording(2, true, 0);
+  std::istringstream q(degrees), all(rad);
+  std::string text = "t,q1,q2,dq1,dq2,tau1,tau2\n", a, b;
+  while (std::getline(q, a) && std::getline(all, b)) {
+    std::size_t end = 0, skip = 0;  // the first three fields of a, the last four of b
+    for (int k = 0; k < 3; ++k) end = a.find(',', end + 1), skip = b.find(',', skip + 1);
+    text += a.substr(0, end) + b.substr(skip) + "\n";
+  }
+  const std::string project = init("mixed.csv", text);
+  expect_in("dq = false }", project);
+  expect_in("position_gain = [0.01745329252, 0.01745329252]", project);
+}
+
 TEST(Init, GivesEachMotionOneRole) {
   const std::string head = "t,q1,q2,tau1,tau2\n";
   std::vector<std::filesystem::path> logs;
@@ -116,8 +141,53 @@ TEST(Init, GivesEachMotionOneRole) {
 
 TEST(Init, SaysWhichColumnsItDoesNotFind) {
   const auto log = write("nothing.csv", "a,b,c\n1,2,3\n4,5,6\n");
-  test::expect_refused(log, {"no column is seen for t, q, tau", "columns ="},
+  test::expect_refused(log, {"no column is seen for t, q, tau", "--columns '{ t = "},
                        [&] { init_project({log}, two_joints(), test::folder()); });
+}
+
+TEST(Init, TakesColumnsThatAreNamed) {
+  const std::string text = "a,b,c,d,e\n" + recording(2, false, 0);
+  const auto log = write("named.csv", text);
+  const std::string by_name = init_project({log}, two_joints(), test::folder(),
+                                           "{ t = \"a\", q = [\"c\", \"b\"], tau = { shoulder = 3, elbow = \"e\" } }");
+  expect_in("columns = { t = \"a\", q = [\"c\", \"b\"], tau = [3, \"e\"] }", by_name);
+  const auto half = write("half.csv", "stamp,q1,q2,x1,x2\n" + recording(2, false, 0));
+  expect_in("columns = { t = \"stamp\", q = [\"q1\", \"q2\"], tau = [\"x1\", \"x2\"] }",
+            init_project({half}, two_joints(), test::folder(), "{ tau = \"x\" }"));
+  test::expect_refused(half, {"no column is seen for tau"},
+                       [&] { init_project({half}, two_joints(), test::folder(), "{ q = \"q\" }"); });
+  const auto refused = [&](const std::string& columns) {
+    return [&, columns] { init_project({half}, two_joints(), test::folder(), columns); };
+  };
+  test::expect_refused("--columns", {"not valid TOML"}, refused("{ tau = "));
+  test::expect_refused("--columns", {"force"}, refused("{ force = \"x\" }"));
+}
+
+/// Positions alone tell whether it is one motion: 20 s of two sines, from `from_s` on.
+Course course(double w, double from_s, double seconds = 20, double noise = 0) {
+  Log log;
+  const auto count = static_cast<Eigen::Index>(seconds / 0.004);
+  log.t = Eigen::VectorXd::LinSpaced(count, 0, seconds);
+  log.q.resize(count, 2);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const double t = from_s + log.t[k];
+    log.q(k, 0) = std::sin(w * t) + noise * std::sin(991 * t);
+    log.q(k, 1) = std::sin(1.7 * w * t + 0.4) * std::cos(0.31 * t);
+  }
+  return course_of(log, 0, seconds);
+}
+
+TEST(Init, TellsMotionsByTheirCourse) {
+  const Course once = course(1.3, 0);
+  EXPECT_TRUE(same_course(once, course(1.3, 0, 20, 0.005)));
+  EXPECT_TRUE(same_course(once, course(1.3, 3.337)));   // begun later
+  EXPECT_TRUE(same_course(once, course(1.3, 4.5, 9)));  // a part
+  EXPECT_TRUE(same_course(course(1.3, 4.5, 9), once));
+  EXPECT_FALSE(same_course(once, course(1.5, 0)));  // fills the same ranges
+  EXPECT_FALSE(same_course(once, course(1.3, 40)));
+  Course mirrored = once;
+  mirrored.q.col(1) *= -1;
+  EXPECT_FALSE(same_course(once, mirrored));
 }
 
 }  // namespace

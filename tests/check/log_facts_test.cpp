@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "host_tools/check/check.hpp"
+#include "host_tools/support/time_text.hpp"
 
 namespace fxdyn {
 namespace {
@@ -94,6 +95,13 @@ TEST(LogFacts, StandstillAtTheEndsIsToldWithItsWindow) {
   EXPECT_NE(findings[0].fix.find("to_s = "), std::string::npos);
 }
 
+TEST(LogFacts, TimesHaveMillisecondsWhereverTheyBegin) {
+  EXPECT_EQ(time_text(1762000003.2857), "1762000003.286");
+  EXPECT_EQ(time_text(2), "2.0");
+  EXPECT_EQ(time_text(-1e-5), "0.0");
+  EXPECT_EQ(time_text(-12.5), "-12.5");
+}
+
 TEST(LogFacts, AJointThatNeverMovesIsTold) {
   Log log = log_of(0, 1, 2);
   log.q.col(1).setConstant(0.3);
@@ -105,6 +113,27 @@ TEST(LogFacts, PositionsAndSpeedsAreComparedWithTheUrdf) {
   EXPECT_EQ(kinds(log, two_joints(0.7, 3)), (Kinds{"beyond_limits", "beyond_limits"}));
   EXPECT_EQ(kinds(log, two_joints(2, 0.5)), (Kinds{"too_fast", "too_fast"}));
   EXPECT_EQ(kinds(log, two_joints(22, 3)), (Kinds{"little_range", "little_range"}));
+}
+
+TEST(LogFacts, ASlideThatGoesFurtherThanItsRailIsInAnotherUnit) {
+  Robot robot = two_joints(2, 3);
+  robot.joints[0].type = JointType::prismatic;
+  const LogFactOptions options;
+  const auto first = [&](double scale) {
+    Log log = log_of(0, 1, 2);
+    log.q.col(0) *= scale;
+    const auto findings = findings_of({facts_of(log, options)}, robot, options);
+    return findings.empty() ? CheckFinding{} : findings.front();
+  };
+  EXPECT_EQ(first(1).kind, "");
+  EXPECT_EQ(first(5).kind, "beyond_limits");  // the URDF may have it wrong
+  EXPECT_FALSE(first(5).error);
+  for (const auto& [scale, gain] : {std::pair{1000.0, "0.001"}, std::pair{30.0, "0.01"}}) {
+    const CheckFinding finding = first(scale);
+    EXPECT_TRUE(finding.error);
+    EXPECT_EQ(finding.kind, "too_long");
+    EXPECT_NE(finding.fix.find(std::string("position_gain = [") + gain + ", 1]"), std::string::npos) << finding.fix;
+  }
 }
 
 }  // namespace

@@ -5,8 +5,10 @@ looks at what it says: the exit code, the right cause in one line, no crash, not
 Keys of a [[mistake]]:
   name, exit        its name and the exit code; said: parts of what is printed; unsaid: what must not be
   cure              what to do, for docs/guide/messages.md, which messages.py makes of this list
+  before            arguments of a run on the good project, before the mistake is made
   run               arguments, default: identify robot.toml --out out
-  rows, of          new values of columns of a log, as expressions of the row's columns and k; of: default train.csv
+  rows, of          new values of columns of a log, as expressions of the row's columns, k and motion(t, phase) of good.py;
+                    of: default train.csv
   where             a condition: the other rows stay as they are; drop: rows that go
   columns           the line of names; front: text in front of the file; separator
   replace           [[file, old, new], ..] in the texts; write: other files
@@ -67,7 +69,7 @@ def changed_rows(mistake, rows):
     condition, dropped = compile(where, "where", "eval"), compile(mistake.get("drop", "False"), "drop", "eval")
     out = []
     for k, row in enumerate(rows):
-        names = dict(zip(good.COLUMNS, row), k=k)
+        names = dict(zip(good.COLUMNS, row), k=k, motion=good.motion)
         if eval(dropped, {}, names):
             continue
         row = list(row)
@@ -113,6 +115,13 @@ def feed(file, data):
         file.write_bytes(data)
     except BrokenPipeError:
         pass
+
+
+def run_before(fxdyn, mistake, files, folder):
+    prepare({}, files, folder)
+    done = subprocess.run([fxdyn, *mistake["before"].split()], cwd=folder, capture_output=True, timeout=TIMEOUT_S, check=False)
+    if done.returncode != 0:
+        raise SystemExit(f"mistakes: {mistake['name']}: before: {done.stderr.decode(errors='replace')}")
 
 
 def run(fxdyn, mistake, folder):
@@ -169,6 +178,8 @@ def main():
             continue
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
+            if "before" in mistake:
+                run_before(fxdyn, mistake, files, folder)
             prepare(mistake, files, folder)
             begin = time.monotonic()
             done = run(fxdyn, mistake, folder)

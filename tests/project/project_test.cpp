@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "host_tools/identify/identify.hpp"
+#include "host_tools/project/provenance.hpp"
 #include "host_tools/simulate/recordings.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "tests/support/files.hpp"
@@ -224,6 +225,17 @@ TEST(Project, NeedsNoLogUntilThereIsSomethingToLearn) {
     test::expect_refused(file, {"no log to learn from", "role = \"train\""},
                          [&] { read_gate_data(project, testing::TempDir()); });
   }
+}
+
+TEST(Project, ItsHashIsOfWhatTheModelDependsOn) {
+  const auto hash = [](const std::string& rest) {
+    return project_hash(read_project(write_project("hashed", robot + rest + log)));
+  };
+  const std::string plain = hash("");
+  EXPECT_EQ(hash("[target]\naccept_error = 0.03\n"), plain);  // of the export alone
+  EXPECT_EQ(hash("# a word\n"), plain);
+  EXPECT_NE(hash("[target]\ntick_s = 0.001\n"), plain);
+  EXPECT_NE(hash("[train]\nseed = 2\n"), plain);
 }
 
 TEST(Project, ReadsTheLogsOfARole) {

@@ -71,6 +71,17 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"from_zero", "t,q0,tau0\n0,1,2\n", {"count from 0", "q = [\"q0\"]"}}),
     [](const auto& parameter) { return parameter.param.name; });
 
+TEST(Csv, DegreesBesideAVelocityInRadiansCanBeRead) {
+  const auto file = write("degrees_and_rad.csv", sine(degrees, 1));
+  LogFormat format;
+  format.position_gain = {1 / degrees};
+  test::expect_refused(file, {"dq = false"}, [&] { read_log(file, 1, {true}, format, {}, {}); });
+  format.columns["dq"] = "";
+  const Log log = read_log(file, 1, {true}, format, {}, {}), rad = read(write("rad.csv", sine(1, 1)));
+  EXPECT_EQ(log.dq.size(), 0);
+  EXPECT_LT((log.q - rad.q).cwiseAbs().maxCoeff(), 1e-9);
+}
+
 TEST(Csv, StampsOfOtherUnitsAreSeconds) {
   for (const double per_second : {1e3, 1e6, 1e9}) {
     const Log log = read(write("unit.csv", sine(1, 1, per_second)));

@@ -61,6 +61,9 @@ TEST(Units, DegreesInThePositionOrTheVelocityAreNamed) {
   log = sines(2, 1.2, 0.3);
   log.dq.col(0) *= degrees;
   expect_said(log, "dq1 looks like degrees (q1 changes only 0.017");
+  expect_said(log, "columns = { dq = false }");
+  log.ddq = log.dq;
+  expect_said(log, "columns = { dq = false, ddq = false }");
 }
 
 TEST(Units, MillisecondsAreNamed) {
