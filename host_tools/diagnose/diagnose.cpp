@@ -264,7 +264,7 @@ class Diagnoser {
   static void add_rotor(Models& models, const DeflectionEffect& effect, double share) {
     if (effect.rotor <= 0 || rotor_of(models.current.joints[effect.joint]) != nullptr) return;
     const IdentifiedModel& model = models.current;
-    Rotor rotor{effect.joint, rotor_in_base(to_dh(model.robot), base_of(model), static_cast<Index>(effect.joint)),
+    Rotor rotor{effect.joint, rotor_in_base(to_dh(model.robot), base_set_of(model), static_cast<Index>(effect.joint)),
                 effect.rotor, share * effect.rotor};
     bring_rotor(models, rotor, effect.rotor);
   }
