@@ -32,7 +32,7 @@ class Compiled(unittest.TestCase):
     def test_a_source_is_read_by_its_own_object(self):
         self.assertEqual(compiled.after_change(DEPS, 'b/y.cpp'), {'b': 1})
 
-    def test_the_end_of_a_name_is_not_the_name(self):
+    def test_a_file_is_the_end_of_a_path(self):
         self.assertEqual(compiled.after_change(DEPS, 'h.hpp'), {'a': 1, 'b': 1})
         self.assertEqual(compiled.after_change(DEPS, 'r_h.hpp'), {})
 
