@@ -24,7 +24,7 @@ struct ArrangementOptions {
   double own_share = 3;
   /// share of the largest RMS velocity; a joint with less does not move; hand
   double standstill = 1e-3;
-  /// nats; what another arrangement must gain; hand: no sound robot of the twelve tried was told less
+  /// nats; what another arrangement must gain; hand: none of the twelve sound robots tried got a finding
   double gain = 15;
   /// share of the error of the joint that feels it most; where more is left, it is a warning; hand
   double sure = 0.8;
@@ -35,9 +35,9 @@ struct ArrangementOptions {
   double widest = 25;
   /// m; a slide that covers less may be in km or its URDF in mm; hand
   double shortest_slide = 0.01;
-  /// share of that error; where more is left, the odds alone are told; hand
+  /// share of that error; where more is left, the odds alone are reported; hand
   double hardly = 0.95;
-  /// nats; an arrangement that is nearer to the best is told as well; theory: log 1000
+  /// nats; an arrangement that is nearer to the best is reported as well; theory: log 1000
   double as_good = 6.9;
   /// rad; a smaller offset of the zero is no finding; hand: the issue asks for 20 degrees
   double least_zero = 0.17;
@@ -47,13 +47,14 @@ struct ArrangementOptions {
   double least_unit = 3;
   /// rad; gravity turned by less is a tilt, which diagnosis names; hand
   double least_turn = 0.35;
-  /// s; torque further from the motion's time is told; theory: identify tries up to StructureOptions::longest_lead_s
+  /// s; torque further from the motion's time is reported; theory: identify tries up to
+  /// StructureOptions::longest_lead_s
   double least_lead_s = 0.010;
-  /// share of what stays unexplained; torque is told to be late where moving it leaves less; hand: friction with a
+  /// share of what stays unexplained; torque is reported as late where moving it leaves less; hand: friction with a
   /// memory looks late, and leaves 0.6
   double lead_leaves = 0.5;
-  /// share of what stays unexplained, squared; a shift that adds less is not told from none; hand: what friction with a
-  /// memory adds on the measured sets
+  /// share of what stays unexplained, squared; a shift that adds less can't be separated from none; hand: what friction
+  /// with a memory adds on the measured sets
   double blurred = 0.1;
   /// s; longest one that is tried; that of [signals] torque_lead_s
   double longest_lead_s = 0.1;
@@ -68,7 +69,7 @@ struct ArrangementOptions {
 
 /// Thresholds of what is seen in each log alone.
 struct LogFactOptions {
-  /// share of the samples at the drive's limit that is told; hand
+  /// share of the samples at the drive's limit that is reported; hand
   double saturated = 0.01;
   /// s; standstill at an end of a log that is worth cutting; hand
   double rest = 1;
@@ -80,9 +81,9 @@ struct LogFactOptions {
   double noise_deviations = 4;
   /// share of the joint's largest speed; below all joints rest; hand
   double rest_speed = 0.005;
-  /// share of the URDF's range; a joint that covers less is told; hand
+  /// share of the URDF's range; a joint that covers less is reported; hand
   double least_range = 0.05;
-  /// share of the URDF's range; a motion that goes so far beyond it is told; hand
+  /// share of the URDF's range; a motion that goes so far beyond it is reported; hand
   double beyond = 0.05;
   /// -; times the URDF's range; a slide that covers more is not in m; hand: rails in cm or mm cover 5 to 1000 times
   /// theirs

@@ -12,7 +12,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-BaseSet base_of(const IdentifiedModel& model) {
+BaseSet base_set_of(const IdentifiedModel& model) {
   BaseSet base;
   for (const BaseParameter& parameter : model.base) base.columns.push_back(static_cast<Index>(parameter.column));
   return base;
@@ -22,7 +22,7 @@ bool separates_rotor(std::string_view effect) { return find_effect(effect)->sepa
 
 VectorXd hidden_rotor(const IdentifiedModel& model, std::size_t joint) {
   if (rotor_of(model.joints[joint]) != nullptr) return {};
-  return rotor_in_base(to_dh(model.robot), base_of(model), static_cast<Index>(joint));
+  return rotor_in_base(to_dh(model.robot), base_set_of(model), static_cast<Index>(joint));
 }
 
 double least_inertia(const IdentifiedModel& model, std::size_t joint, const std::vector<const MatrixXd*>& logs) {

@@ -18,7 +18,7 @@ struct Rotor {
 };
 
 /// The base parameters of a model as a set of columns, without their grouping.
-BaseSet base_of(const IdentifiedModel& model);
+BaseSet base_set_of(const IdentifiedModel& model);
 
 /// Whether an effect depends on the link's torque, in which the rotor has no part: it separates the two.
 bool separates_rotor(std::string_view effect);

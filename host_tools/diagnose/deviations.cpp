@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host_tools/diagnose/explore.hpp"
 #include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
@@ -34,6 +35,17 @@ double deviations_off_nothing(const Linearised& problem, const EffectId& id, con
     own -= with.transpose() * SymmetricSolver(MatrixXd(covariance(shapes, shapes))).inverse() * with;
   }
   return std::sqrt(std::max(0.0, theta.dot(SymmetricSolver(own).solve(theta))));
+}
+
+/// Whether two models have the same effects in the same places.
+bool same_unknowns(const IdentifiedModel& a, const IdentifiedModel& b) {
+  const auto same = [](const std::vector<EffectFit>& of_a, const std::vector<EffectFit>& of_b) {
+    return std::equal(of_a.begin(), of_a.end(), of_b.begin(), of_b.end(),
+                      [](const EffectFit& x, const EffectFit& y) { return x.effect == y.effect; });
+  };
+  return same(a.body, b.body) &&
+         std::equal(a.joints.begin(), a.joints.end(), b.joints.begin(), b.joints.end(),
+                    [&](const JointFit& x, const JointFit& y) { return same(x.effects, y.effects); });
 }
 
 }  // namespace
@@ -72,7 +84,7 @@ void add_deviations(Models& models, const Linearised& problem) {
     } else if (u.kind == Unknown::Kind::width) {
       model.joints[u.joint].sign_width_std = std * model.joints[u.joint].sign_width;
     } else {
-      EffectFit& effect = u.body ? model.body[u.effect] : model.joints[u.joint].effects[u.effect];
+      EffectFit& effect = u.body ? model.body.at(u.effect) : model.joints[u.joint].effects.at(u.effect);
       if (u.kind == Unknown::Kind::shape) {
         effect.shape_std[u.index] = std * effect.shape[u.index];
       } else {
@@ -87,6 +99,16 @@ void add_deviations(Models& models, const Linearised& problem) {
       }
     }
   }
+}
+
+void back_to_start(Outcome& outcome, const Models& start, const std::vector<SessionLog>& logs) {
+  Models& found = outcome.models;
+  if (found.rotors.size() != start.rotors.size() || !same_unknowns(found.current, start.current)) {
+    found = start;
+    outcome.look_again(logs);
+  }
+  found.current = start.current;
+  add_deviations(found, *outcome.problem);
 }
 
 }  // namespace fxdyn::diagnosis

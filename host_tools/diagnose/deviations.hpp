@@ -6,7 +6,10 @@
 
 namespace fxdyn::diagnosis {
 
+struct Outcome;
+
 /// Standard deviations of the current model's parameters from the information of a fit around the models as they are.
+/// @throws std::out_of_range: the problem has effects that the model lacks, so it is another model's
 void add_deviations(Models& models, const Linearised& problem);
 
 /// Standard deviations by which the coefficients of each group together are off nothing,
@@ -14,5 +17,10 @@ void add_deviations(Models& models, const Linearised& problem);
 /// What the shapes leave open is which curve it is, not whether it is there. A share, which is 1 by definition, gets
 /// 1e300.
 std::vector<double> deviations_off_nothing(const Linearised& problem, const std::vector<std::size_t>& groups);
+
+/// For a search of which no name is left: the models that it began with, with their standard deviations. What the
+/// search left otherwise (a rotor given up, an effect that stayed without a name) is dropped with its problem: the
+/// problem's unknowns have to be those of the model that the deviations are written into.
+void back_to_start(Outcome& outcome, const Models& start, const std::vector<SessionLog>& logs);
 
 }  // namespace fxdyn::diagnosis

@@ -94,17 +94,6 @@ VectorXd diluted(const Linearised& problem) {
   return weights;
 }
 
-/// Whether two models have the same effects in the same places.
-bool same_unknowns(const IdentifiedModel& a, const IdentifiedModel& b) {
-  const auto same = [](const std::vector<EffectFit>& of_a, const std::vector<EffectFit>& of_b) {
-    return std::equal(of_a.begin(), of_a.end(), of_b.begin(), of_b.end(),
-                      [](const EffectFit& x, const EffectFit& y) { return x.effect == y.effect; });
-  };
-  return same(a.body, b.body) &&
-         std::equal(a.joints.begin(), a.joints.end(), b.joints.begin(), b.joints.end(),
-                    [&](const JointFit& x, const JointFit& y) { return same(x.effects, y.effects); });
-}
-
 /// One diagnosis, step by step.
 class Diagnoser {
  public:
@@ -221,13 +210,7 @@ class Diagnoser {
   IdentifiedModel concluded(Outcome& outcome, const Gate& gate) const {
     Models& found = outcome.models;
     if (gate.groups.empty() && deflections_.found.empty()) {
-      if (found.rotors.size() != models_.rotors.size() || !same_unknowns(found.current, models_.current)) {
-        // The search gave up a rotor that the baseline has, or leaves one that nothing of the link's torque shows now.
-        found = models_;
-        outcome.look_again(logs_);
-      }
-      found.current = models_.current;
-      add_deviations(found, *outcome.problem);
+      back_to_start(outcome, models_, logs_);
     } else if (outcome.structured()) {
       Models in_band = found;
       refit(in_band, logs_, plain(), 4);
@@ -264,7 +247,7 @@ class Diagnoser {
   static void add_rotor(Models& models, const DeflectionEffect& effect, double share) {
     if (effect.rotor <= 0 || rotor_of(models.current.joints[effect.joint]) != nullptr) return;
     const IdentifiedModel& model = models.current;
-    Rotor rotor{effect.joint, rotor_in_base(to_dh(model.robot), base_of(model), static_cast<Index>(effect.joint)),
+    Rotor rotor{effect.joint, rotor_in_base(to_dh(model.robot), base_set_of(model), static_cast<Index>(effect.joint)),
                 effect.rotor, share * effect.rotor};
     bring_rotor(models, rotor, effect.rotor);
   }

@@ -22,7 +22,7 @@ LogColumns::LogColumns(const Models& models, const std::vector<SessionLog>& logs
     : models_(std::make_shared<const Models>(models)),
       logs_(&logs),
       chain_(to_dh(models.current.robot)),
-      base_(base_of(models.current)),
+      base_(base_set_of(models.current)),
       motions_(logs.size()),
       slow_(logs.size()),
       robot_(logs.size()) {

@@ -8,6 +8,8 @@
 #include "host_tools/effects/broad_learning_types.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/link_parameters.hpp"
+#include "host_tools/effects/model_identity.hpp"
+#include "host_tools/effects/parameter_values.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
 #include "model/version.hpp"
@@ -68,31 +70,16 @@ Robot to_robot(const json& j) {
   return robot;
 }
 
-json parameters_json(std::span<const ParameterInfo> infos, const std::vector<double>& values,
-                     const std::vector<double>& stds, bool prismatic) {
-  json list = json::array();
-  for (std::size_t i = 0; i < infos.size(); ++i) {
-    json entry = {
-        {"name", infos[i].name}, {"value", values[i]}, {"unit", prismatic ? infos[i].unit_prismatic : infos[i].unit}};
-    if (i < stds.size() && stds[i] > 0) entry["std"] = stds[i];
-    list.push_back(entry);
-  }
-  return list;
-}
-
 json effect_json(const EffectFit& fit, const JointFit& joint, bool prismatic) {
-  const EffectInfo* info = find_effect(fit.effect);
-  json parameters = parameters_json(info->shape, fit.shape, fit.shape_std, prismatic);
-  for (const json& entry : parameters_json(info->linear, fit.linear, fit.linear_std, prismatic))
-    parameters.push_back(entry);
-  if (info->has_sign_width) {
-    parameters.push_back({{"name", "width"}, {"value", joint.sign_width}, {"unit", prismatic ? "m/s" : "rad/s"}});
-    if (joint.sign_width_std > 0) parameters.back()["std"] = joint.sign_width_std;
+  json parameters = json::array();
+  for (const ParameterValue& p : parameter_values(fit, joint, prismatic)) {
+    parameters.push_back({{"name", p.name}, {"value", p.value}, {"unit", p.unit}});
+    if (p.std) parameters.back()["std"] = *p.std;
   }
   return {{"effect", fit.effect},
           {"origin", fit.named ? "named" : "nominal"},
-          {"side", "joint"},
-          {"equation", info->equation},
+          {"side", effects_side},
+          {"equation", find_effect(fit.effect)->equation},
           {"parameters", parameters}};
 }
 
@@ -252,6 +239,11 @@ JointFit to_joint(const json& j) {
   return fit;
 }
 
+InputError not_a_model(const std::filesystem::path& file, const json::exception& error) {
+  return InputError(
+      fmt::format("{}: not a valid model: {}; make it anew with `fxdyn identify`", file.string(), error.what()));
+}
+
 void check_friction(const IdentifiedModel& model) {
   for (std::size_t j = 0; j < model.joints.size(); ++j) {
     if (const auto why = why_it_does_not_brake(model.joints[j], model.joints[j].dq_limit))
@@ -313,7 +305,7 @@ json to_json(const IdentifiedModel& model) {
                     {"value", p.value},
                     {"std", p.std},
                     {"essential", p.essential},
-                    {"relative_std", p.value != 0 ? std::fabs(p.std / p.value) : 0.0}});
+                    {"relative_std", p.relative_std()}});
   }
   json inertia = json::array();
   for (const auto& link : model.inertia) inertia.push_back(to_array(link));
@@ -370,7 +362,29 @@ json to_json(const IdentifiedModel& model) {
 const Robot& robot_of(const IdentifiedModel& model) { return model.robot; }
 const std::vector<JointFit>& joints_of(const IdentifiedModel& model) { return model.joints; }
 const std::vector<EffectFit>& body_of(const IdentifiedModel& model) { return model.body; }
+const std::vector<BaseParameter>& base_of(const IdentifiedModel& model) { return model.base; }
+const FilterFit& filter_of(const IdentifiedModel& model) { return model.filter; }
+const std::string& project_of(const IdentifiedModel& model) { return model.project; }
 double tick_of(const IdentifiedModel& model) { return model.tick_s; }
+
+std::optional<ModelIdentity> read_identity(const std::filesystem::path& file) {
+  if (!std::filesystem::exists(file)) return {};
+  try {
+    const json j = json::parse(read_file(file));
+    ModelIdentity out{j.at("project_hash"), to_logs(j.at("logs")), {}};
+    if (j.contains("tables_crc")) out.tables_crc = j.at("tables_crc").get<std::uint32_t>();
+    return out;
+  } catch (const json::exception& error) {
+    throw not_a_model(file, error);
+  }
+}
+
+std::string hash_without_tables(const std::filesystem::path& file) {
+  if (!std::filesystem::exists(file)) return {};
+  json model = json::parse(read_file(file));
+  for (const char* key : {"formats", "layout", "tables_crc", "origin", "sequence"}) model.erase(key);
+  return hash_of(model.dump());
+}
 
 IdentifiedModel read_model(const std::filesystem::path& file) {
   const std::string text = read_file(file);
@@ -433,8 +447,7 @@ IdentifiedModel read_model(const std::filesystem::path& file) {
     if (j.contains("updates")) model.updates = to_logs(j.at("updates"));
     return model;
   } catch (const json::exception& error) {
-    throw InputError(
-        fmt::format("{}: not a valid model: {}; make it anew with `fxdyn identify`", file.string(), error.what()));
+    throw not_a_model(file, error);
   } catch (const InputError& error) {
     throw InputError(fmt::format("{}: {}", file.string(), error.what()));
   }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/effects/base_parameter.hpp"
 #include "host_tools/effects/filter_fit.hpp"
 #include "host_tools/effects/formats_json.hpp"
 #include "host_tools/effects/joint_fit.hpp"
@@ -17,15 +18,6 @@
 #include "host_tools/signals/log.hpp"
 
 namespace fxdyn {
-
-/// A base parameter: the standard parameter that stands for its group.
-struct BaseParameter {
-  std::size_t column = 0;  ///< 10 * link + parameter (model/rigid_body.hpp)
-  std::string name;        ///< e.g. "hx3": first moment of link 3 about x, DH frame
-  double value = 0, std = 0;
-  bool essential = true;   ///< the data would be explained worse without it
-  std::string expression;  ///< the sum of standard parameters that it is, e.g. "Jzz1 + Jxx2 + 0.18 m3"
-};
 
 /// What the layout of exported tables takes from the values in them, beside the formats: it stays when an update
 /// replaces the values, so that firmware that is built for the layout takes the new ones.

@@ -8,6 +8,7 @@ namespace fxdyn {
 struct LogReference {
   std::string file, role, hash;
   double from_s = 0, to_s = 0;
+  bool operator==(const LogReference&) const = default;
 };
 
 }  // namespace fxdyn

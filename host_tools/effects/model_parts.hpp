@@ -1,8 +1,11 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <string>
 #include <vector>
 
+#include "host_tools/effects/base_parameter.hpp"
+#include "host_tools/effects/filter_fit.hpp"
 #include "host_tools/effects/forward.hpp"
 #include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/robot/robot.hpp"
@@ -14,7 +17,10 @@ namespace fxdyn {
 const Robot& robot_of(const IdentifiedModel& model);
 const std::vector<JointFit>& joints_of(const IdentifiedModel& model);
 const std::vector<EffectFit>& body_of(const IdentifiedModel& model);
-double tick_of(const IdentifiedModel& model);  ///< [s]
+const std::vector<BaseParameter>& base_of(const IdentifiedModel& model);
+const FilterFit& filter_of(const IdentifiedModel& model);
+const std::string& project_of(const IdentifiedModel& model);  ///< its name
+double tick_of(const IdentifiedModel& model);                 ///< [s]
 
 /// The content of model.json.
 nlohmann::json to_json(const IdentifiedModel& model);

@@ -256,7 +256,7 @@ void check_felt(const std::vector<JointGain>& gains, const Robot& robot, const L
 std::vector<JointGain> identify_gains(const IdentifiedModel& model, const Load& load, const ProcessedLog& unloaded,
                                       const ProcessedLog& loaded, const LoadOptions& options) {
   if (!(load.mass > 0))
-    throw InputError(fmt::format("a known load of {:g} kg tells nothing: its mass is above 0", load.mass));
+    throw InputError(fmt::format("a known load of {:g} kg says nothing: its mass is above 0", load.mass));
   check_weighable(model, unloaded);
   check_weighable(model, loaded);
   std::vector<ProcessedLog> logs{unloaded, loaded};

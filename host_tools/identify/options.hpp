@@ -55,7 +55,7 @@ struct PlausibleOptions {
   double flip = 1;
   /// score; another unit must gain; theory: likewise by 63 %; the level by hand
   double unit = 2;
-  /// -; a smaller factor of one joint's torque is a gain, which check tells; theory: between 5 and 10
+  /// -; a smaller factor of one joint's torque is a gain, which check reports; theory: between 5 and 10
   double unit_factor = 7;
   /// score; units that are nearer to the best are as good; hand
   double as_good = 1;
@@ -118,7 +118,7 @@ struct LoadOptions {
   double density = 2000;
   /// relative standard deviation; a mass that is known no better is none; hand
   double largest_uncertainty = 0.3;
-  /// relative standard deviation; a joint whose gain a known load tells no better did not feel it; theory: three of
+  /// relative standard deviation; a joint whose gain a known load gives no better did not feel it; theory: three of
   /// them are the 3 % that a gain is wanted to
   double largest_gain_deviation = 0.01;
   /// share of the velocities' RMS; logs with and without a known load that differ more are of two motions; hand: up to

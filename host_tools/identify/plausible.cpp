@@ -333,7 +333,7 @@ void check_one_unit(const Robot& robot, const Rows& rows, const Rows::Fit& fit, 
   };
   const auto it = std::find_if(all.begin(), all.end(), possible);
   const Scaled& one = it == all.end() ? all.front() : *it;
-  // A gain that is moderately off is no other unit: `check` tells it, and a known load gives it.
+  // A gain that is moderately off is no other unit: `check` reports it, and a known load gives it.
   if (std::max(one.times, 1 / one.times) < rows.options().unit_factor) return;
   out.push_back({Severity::error, one.joint,
                  fmt::format("torque of {} is about {:g} times too {} beside the others': other units, or a gear left "

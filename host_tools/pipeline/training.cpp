@@ -259,7 +259,7 @@ std::vector<std::size_t> Trainer::without_gain(Training& out, bool beside) const
     const bool lower = !fitter_.has_validation() || after < before;
     if (lower && with[j].beats(without[j], options.worth_keeping)) continue;
     gone.push_back(j);
-    // What it failed by is what is told of it.
+    // Reported: the comparison that it failed.
     out.outcomes[j].error_without = lower ? without[j].rmse : before;
     out.outcomes[j].error_with = lower ? with[j].rmse : after;
   }

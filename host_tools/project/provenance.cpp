@@ -3,6 +3,7 @@
 #include <cstring>
 #include <sstream>
 
+#include "host_tools/effects/model_identity.hpp"
 #include "host_tools/project/log_entries.hpp"
 #include "host_tools/support/files.hpp"
 #include "host_tools/support/toml.hpp"
@@ -13,13 +14,10 @@ namespace {
 using nlohmann::json;
 namespace fs = std::filesystem;
 
+/// Null where there is no model.
 json hash_of_model(const fs::path& directory) {
-  const fs::path file = directory / "model.json";
-  if (!fs::exists(file)) return nullptr;
-  json model = json::parse(read_file(file));
-  // An export makes them anew without touching the model.
-  for (const char* key : {"formats", "layout", "tables_crc", "origin", "sequence"}) model.erase(key);
-  return hash_of(model.dump());
+  const std::string hash = hash_without_tables(directory / "model.json");
+  return hash.empty() ? json() : json(hash);
 }
 
 json read_seconds(const fs::path& directory) {

@@ -1,12 +1,12 @@
 #include <fmt/format.h>
 
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/page/page.hpp"
 #include "host_tools/report/section.hpp"
 
 namespace fxdyn {
 
 using namespace page;
-using nlohmann::json;
 
 namespace {
 
@@ -19,15 +19,15 @@ std::string uncertainty(double share) {
 
 }  // namespace
 
-std::string base_section(const ReportInput& input, const json&) {
+std::string base_section(const ReportInput& input, const nlohmann::json&) {
   constexpr const char* units[] = {"kg", "kg*m", "kg*m^2"};
   Table table({{"parameter"}, {"value", "n"}, {"std", "n"}, {"std / |value|", "n"}, {"unit"}});
-  for (const json& p : input.model.at("base_parameters")) {
-    const int kind = p.at("column").get<int>() % 10;
-    const double relative = p.at("relative_std");
-    table.add({{text(p.at("name"))},
-               number(p.at("value")),
-               number(p.at("std"), 2),
+  for (const BaseParameter& p : base_of(input.fitted)) {
+    const std::size_t kind = p.column % 10;
+    const double relative = p.relative_std();
+    table.add({{p.name},
+               number(p.value),
+               number(p.std, 2),
                {uncertainty(relative), relative > 0.3 ? "n bad" : "n"},
                {units[kind == 0  ? 0
                       : kind < 4 ? 1

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/page/page.hpp"
 #include "host_tools/regression/metrics_result.hpp"
 #include "host_tools/report/section.hpp"
@@ -28,12 +29,11 @@ std::string data_section(const ReportInput& input, const json& file) {
                    (input.results.role == "test" ? ", which decided nothing."
                                                  : ", since there is no test log: they are optimistic."));
   for (const std::string& note : result.notes) out += paragraph("Note: " + note + ".");
-  const json& filter = input.model.at("filter");
+  const FilterFit& filter = filter_of(input.fitted);
   out += paragraph(
       fmt::format("Filters (zero phase, Butterworth of order 4, forward and backward): motion {:.4g} Hz; torque and "
                   "every model column alike {:.4g} Hz; {:.3g} s dropped at both ends of each log.",
-                  filter.at("position_cutoff_hz").get<double>(), filter.at("torque_cutoff_hz").get<double>(),
-                  filter.at("edge_s").get<double>()));
+                  filter.position_cutoff_hz, filter.torque_cutoff_hz, filter.edge_s));
   return out;
 }
 

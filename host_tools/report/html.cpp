@@ -7,12 +7,12 @@
 #include "host_tools/report/results.hpp"
 #include "host_tools/report/section.hpp"
 #include "host_tools/support/files.hpp"
+#include "model/version.hpp"
 
 namespace fxdyn {
 namespace {
 
 using namespace page;
-using nlohmann::json;
 namespace fs = std::filesystem;
 
 constexpr const char* style = R"(
@@ -27,15 +27,14 @@ td.amber { background: #fdf0d0; } .split { columns: 2; column-gap: 3em; }
 .split tr { break-inside: avoid; } svg { width: 100%; height: auto; } .scroll { overflow-x: auto; }
 )";
 
-std::string header(const json& model, const MetricsResult& metrics) {
-  const json& robot = model.at("robot");
-  std::string out = fmt::format("<h1>{}</h1>\n", escape(text(robot.at("name"))));
-  const auto gravity = robot.at("gravity").get<std::vector<double>>();
+std::string header(const IdentifiedModel& model, const MetricsResult& metrics) {
+  const Robot& robot = robot_of(model);
+  std::string out = fmt::format("<h1>{}</h1>\n", escape(robot.name));
+  const Eigen::Vector3d& gravity = robot.gravity;
   out += fmt::format(
       "<p class=\"quiet\">project {}, {} moving joints, gravity [{:.4g} {:.4g} {:.4g}] m/s², tick {:.4g} ms, fxdyn "
       "{}</p>\n",
-      escape(text(model.at("project"))), robot.at("joints").size(), gravity[0], gravity[1], gravity[2],
-      1000 * model.at("tick_s").get<double>(), escape(text(model.at("tool_version"))));
+      escape(project_of(model)), robot.size(), gravity[0], gravity[1], gravity[2], 1000 * tick_of(model), version);
   out += paragraph(fmt::format(
       "{} base parameters. Torque is on the joint side of the gearbox, positive along the axis of the joint.",
       metrics.base_parameters));
@@ -50,8 +49,8 @@ void write_report(const IdentifiedModel& fitted, const std::vector<ProcessedLog>
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n<title>{} - "
       "fxdyn</title>\n<style>{}</style></head><body>\n",
       escape(robot_of(fitted).name), style);
-  const ReportInput input{fitted, to_json(fitted), logs, results, directory};
-  page += header(input.model, metrics_of(results["metrics"]));
+  const ReportInput input{fitted, logs, results, directory};
+  page += header(fitted, metrics_of(results["metrics"]));
   page += draw_sections(input, report_sections());
   page += "</body></html>\n";
   write_file(directory / "report.html", page);

@@ -4,8 +4,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <utility>
 
+#include "host_tools/effects/model_identity.hpp"
 #include "host_tools/project/provenance.hpp"
 #include "host_tools/regression/metrics_result.hpp"
 #include "host_tools/report/replay_result.hpp"
@@ -20,37 +22,37 @@ namespace fs = std::filesystem;
 
 json read_json(const fs::path& file) { return fs::exists(file) ? json::parse(read_file(file)) : json(); }
 
+/// The model in DIR; none: no model.json.
+using Model = std::optional<ModelIdentity>;
+
 /// Null where the file is missing or of other tables than the model's.
-json read_of_tables(const fs::path& file, const json& model) {
+json read_of_tables(const fs::path& file, const Model& model) {
   json content = read_json(file);
-  const bool same = !content.is_null() && model.contains("tables_crc") &&
-                    content.value("tables_crc", json()) == model.at("tables_crc");
-  return same ? content : json();
+  if (content.is_null() || !model || !model->tables_crc) return {};
+  return content.value("tables_crc", json()) == *model->tables_crc ? content : json();
 }
 
 /// diagnosis.json, if nominal.json, from which it started, is of the model's project and logs.
-json read_diagnosis(const fs::path& directory, const json& model) {
-  const json nominal = read_json(directory / "nominal.json");
-  for (const char* key : {"project_hash", "logs"}) {
-    if (nominal.contains(key) && model.contains(key) && nominal.at(key) != model.at(key)) return {};
-  }
-  return read_json(directory / "diagnosis.json");
+json read_diagnosis(const fs::path& directory, const Model& model) {
+  const Model nominal = read_identity(directory / "nominal.json");
+  const bool same =
+      !nominal || !model || (nominal->project_hash == model->project_hash && nominal->logs == model->logs);
+  return same ? read_json(directory / "diagnosis.json") : json();
 }
 
 /// Null where the file is missing or of another project than the model's, other logs or another model.
-json read_of_inputs(const std::string& verb, const fs::path& directory, const json& model,
+json read_of_inputs(const std::string& verb, const fs::path& directory, const Model& model,
                     std::vector<std::string>& stale) {
   json content = read_json(directory / (verb + ".json"));
   if (content.is_null()) return content;
-  const bool same = !model.is_null() &&
-                    content.value("project_hash", json()) == model.value("project_hash", json("")) &&
+  const bool same = model && content.value("project_hash", json()) == model->project_hash &&
                     is_unchanged(content.value("made_from", json()), directory);
   if (same) return content;
   stale.push_back(verb);
   return {};
 }
 
-json read_result(const ResultFile& result, const fs::path& directory, const json& model,
+json read_result(const ResultFile& result, const fs::path& directory, const Model& model,
                  std::vector<std::string>& stale) {
   const std::string name(result.name);
   switch (result.belongs) {
@@ -94,7 +96,7 @@ const json& Results::operator[](std::string_view name) const {
 
 Results read_results(const fs::path& directory) {
   Results results;
-  const json model = read_json(directory / "model.json");
+  const Model model = read_identity(directory / "model.json");
   for (const ReportSection& section : report_sections()) {
     const std::string name(section.needs.name);
     if (name.empty() || results.files.contains(name)) continue;

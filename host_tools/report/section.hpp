@@ -15,7 +15,6 @@ namespace fxdyn {
 /// What a section may draw from.
 struct ReportInput {
   const IdentifiedModel& fitted;           ///< effects/model_parts.hpp gives its parts, identified_model.hpp all of it
-  const nlohmann::json model;              ///< the same as in model.json, enough for most sections
   const std::vector<ProcessedLog>& logs;   ///< to draw: the test logs, else validate, else train
   const Results& results;                  ///< all result files that a section needs
   const std::filesystem::path& directory;  ///< where the results are
@@ -30,9 +29,6 @@ struct ReportSection {
   /// Content of the page from the heading on; empty: nothing to say.
   std::string (*draw)(const ReportInput& input, const nlohmann::json& result);
 };
-
-/// A string of a result.
-inline std::string text(const nlohmann::json& value) { return value.get<std::string>(); }
 
 /// In the order of the page.
 std::span<const ReportSection> report_sections();

@@ -10,6 +10,12 @@ namespace fxdyn {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
+namespace {
+
+constexpr const char* effect_name = "lugre";
+
+}  // namespace
+
 LuGreBristles::LuGreBristles(const EffectFit& effect)
     : sigma0_(effect.linear[0] / effect.shape[0]),
       sigma1_(effect.linear[1]),
@@ -54,14 +60,19 @@ double LuGreBristles::advance(double v0, double v1, double seconds) {
 
 bool has_lugre(const IdentifiedModel& plant) {
   return std::any_of(joints_of(plant).begin(), joints_of(plant).end(),
-                     [](const JointFit& joint) { return joint.find("lugre") != nullptr; });
+                     [](const JointFit& joint) { return joint.find(effect_name) != nullptr; });
+}
+
+void take_out_lugre(std::vector<JointFit>& joints) {
+  for (JointFit& joint : joints)
+    std::erase_if(joint.effects, [](const EffectFit& fit) { return fit.effect == effect_name; });
 }
 
 MatrixXd lugre_torque(const IdentifiedModel& plant, const MatrixXd& dq, double step_s) {
   MatrixXd tau = MatrixXd::Zero(dq.rows(), dq.cols());
   for (Index j = 0; j < dq.cols(); ++j) {
     const JointFit& joint = joints_of(plant)[static_cast<std::size_t>(j)];
-    const EffectFit* fit = joint.find("lugre");
+    const EffectFit* fit = joint.find(effect_name);
     if (fit == nullptr) continue;
     LuGreBristles bristles(*fit);
     for (Index k = 0; k < dq.rows(); ++k) {

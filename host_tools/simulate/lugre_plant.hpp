@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <vector>
 
 #include "host_tools/effects/forward.hpp"
 
@@ -30,6 +31,9 @@ class LuGreBristles {
 
 /// Whether a joint of the plant has the effect.
 bool has_lugre(const IdentifiedModel& plant);
+
+/// Takes the effect out of all joints: what is left is the model's own evaluator's.
+void take_out_lugre(std::vector<JointFit>& joints);
 
 /// Torque of the plant's `lugre` effects on a sampled motion whose velocity is linear between samples, samples x
 /// joints: F - Fc s, s the joint's Coulomb sign, so that it adds up with the effect `coulomb` as the model's does.

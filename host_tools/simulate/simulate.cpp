@@ -85,8 +85,7 @@ PlantRun closed_loop(const Scenario& scenario, Reference reference, double age_s
 /// The torque of the very motion that the log shows, however the plant came to it. LuGre friction has code of its own.
 void add_torque(const Scenario& scenario, double start_s, PlantRun& run) {
   IdentifiedModel plant = scenario.plant;
-  for (JointFit& joint : plant.joints)
-    std::erase_if(joint.effects, [](const EffectFit& fit) { return fit.effect == "lugre"; });
+  take_out_lugre(plant.joints);
   run.tau = predict(plant, run.q, run.dq, run.ddq, run.step_s, &run.deflections, start_s);
   if (has_lugre(scenario.plant)) run.tau += lugre_torque(scenario.plant, run.dq, run.step_s);
 }

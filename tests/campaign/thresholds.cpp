@@ -26,6 +26,7 @@ constexpr auto lack = &Options::lack_of_fit;
 constexpr auto gate = &Options::gate;
 constexpr auto impact = &Options::impact;
 constexpr auto deflection = &Options::deflection;
+constexpr auto recording = &Options::recording;
 
 std::vector<Threshold> before_the_search() {
   using namespace diagnosis;
@@ -40,7 +41,6 @@ std::vector<Threshold> before_the_search() {
       {"prior.rotor", "share", place<prior, &PriorOptions::rotor>},
       {"prior.link_rotor", "share", place<prior, &PriorOptions::link_rotor>, Reads::with_link_encoders},
       {"prior.changed", "deviations", place<prior, &PriorOptions::changed>, Reads::with_baseline},
-      {"session.position_band", "times the motion's", place<session, &SessionOptions::position_band>},
       {"session.still", "times the noise", place<session, &SessionOptions::still>},
   };
 }
@@ -56,8 +56,6 @@ std::vector<Threshold> of_the_search() {
       {"search.beyond_bound", "deviations", place<search, &SearchOptions::beyond_bound>},
       {"lack_of_fit.state", "chance", place<lack, &LackOfFitOptions::state>},
       {"lack_of_fit.time", "chance", place<lack, &LackOfFitOptions::time>},
-      {"lack_of_fit.line", "chance", place<lack, &LackOfFitOptions::line>},
-      {"lack_of_fit.slow_change", "chance", place<lack, &LackOfFitOptions::slow_change>, Reads::with_baseline},
   };
 }
 
@@ -85,6 +83,8 @@ std::vector<Threshold> of_the_judges() {
       {"deflection.least_part", "share", place<deflection, &DeflectionOptions::least_part>, Reads::with_link_encoders},
       {"deflection.same", "share", place<deflection, &DeflectionOptions::same>, Reads::with_link_encoders},
       {"deflection.noted", "times the noise", place<deflection, &DeflectionOptions::noted>, Reads::with_link_encoders},
+      {"recording.least_score", "score", place<recording, &RecordingOptions::least_score>},
+      {"recording.least_closure", "share", place<recording, &RecordingOptions::least_closure>},
   };
 }
 

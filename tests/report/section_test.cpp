@@ -33,7 +33,7 @@ std::string drawn(std::string_view name, const json& result, const std::filesyst
   if (section == sections.end()) return "no such section";
   Results results;
   results.files[std::string(section->needs.name)] = result;
-  return draw_sections({model, to_json(model), logs, results, directory}, {&*section, 1});
+  return draw_sections({model, logs, results, directory}, {&*section, 1});
 }
 
 TEST(Sections, EachHasItsName) {
@@ -60,7 +60,7 @@ TEST(Sections, OneMoreIsDrawnInItsPlace) {
   Results results;
   results.role = "test";
   const auto directory = test::folder();
-  const ReportInput input{model, {}, logs, results, directory};
+  const ReportInput input{model, logs, results, directory};
   EXPECT_EQ(draw_sections(input, both), "second test\n");
   results.files["numbers"] = {{"count", 3}};
   EXPECT_EQ(draw_sections(input, both), "first 3\nsecond test\n");
@@ -115,7 +115,7 @@ std::string section_page(std::string_view name, const MetricsResult& metrics) {
   const auto section = std::find_if(sections.begin(), sections.end(), [&](const auto& s) { return s.name == name; });
   const std::vector<ProcessedLog> logs;
   const auto directory = test::folder();
-  return draw_sections({model, to_json(model), logs, results, directory}, {&*section, 1});
+  return draw_sections({model, logs, results, directory}, {&*section, 1});
 }
 
 TEST(ErrorSection, TheExportedStageIsGreenWhereItIsTheBest) {
