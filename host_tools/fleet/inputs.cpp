@@ -5,6 +5,7 @@
 #include <set>
 #include <sstream>
 
+#include "host_tools/fleet/file_hashes.hpp"
 #include "host_tools/project/project.hpp"
 #include "host_tools/support/files.hpp"
 #include "host_tools/support/pipes.hpp"
@@ -100,7 +101,9 @@ Inputs inputs_of(const Fleet& fleet, const Member& member, const fs::path& folde
   }
   Sha256 all;
   all.add(fmt::format("fxdyn {}\n{}\n", version, fleet.verb));
-  for (const fs::path& file : files) all.add(fmt::format("{}\n{}\n", file.string(), sha256_of_file(file)));
+  FileHashes hashes(folder / "files.json");
+  for (const fs::path& file : files) all.add(fmt::format("{}\n{}\n", file.string(), hashes.of(file)));
+  hashes.keep();
   inputs.hash = all.text();
   return inputs;
 }

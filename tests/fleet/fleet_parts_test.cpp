@@ -5,9 +5,11 @@
 #include <filesystem>
 #include <fstream>
 
+#include "host_tools/fleet/file_hashes.hpp"
 #include "host_tools/fleet/fleet_file.hpp"
 #include "host_tools/fleet/summary.hpp"
 #include "host_tools/support/error.hpp"
+#include "host_tools/support/files.hpp"
 #include "host_tools/support/sha256.hpp"
 #include "host_tools/support/temporary_folder.hpp"
 
@@ -62,6 +64,40 @@ TEST(FalseDiscovery, OfNothingIsNothing) {
 TEST(FalseDiscovery, TakesTheLargestRankThatPasses) {
   EXPECT_EQ(benjamini_hochberg({std::log10(0.04), std::log10(0.045)}, 0.05).discoveries, 2u);
   EXPECT_EQ(benjamini_hochberg({std::log10(0.04), 0}, 0.05).discoveries, 0u);
+}
+
+TEST(FileHashes, RemembersWhatNobodyTouched) {
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "log.csv", memory = folder.path() / "files.json";
+  const auto write = [&](const std::string& text) { std::ofstream(file) << text; };
+  const auto hash = [&] {
+    fleet::FileHashes hashes(memory);
+    const std::string out = hashes.of(file);
+    hashes.keep();
+    return out;
+  };
+  write("abc");
+  EXPECT_EQ(hash(), sha256("abc"));
+  // Written a moment ago: nothing is remembered yet.
+  EXPECT_EQ(read_file(memory), "{}\n");
+  write("abd");
+  EXPECT_EQ(hash(), sha256("abd"));
+  // What the memory says of a file with another stamp does not count.
+  std::ofstream(memory) << "{\"" + file.string() + "\": [\"1 2 3\", \"wrong\"]}";
+  EXPECT_EQ(hash(), sha256("abd"));
+  std::ofstream(memory) << "half of somethi";
+  EXPECT_EQ(hash(), sha256("abd"));
+  // An old file, as of the machine itself: its hash comes from the memory.
+  const auto program = std::filesystem::canonical("/proc/self/exe");
+  fleet::FileHashes first(memory);
+  const std::string of_program = first.of(program);
+  first.keep();
+  const std::string kept = read_file(memory);
+  if (kept == "{}\n") GTEST_SKIP() << "this program was built a moment ago";
+  std::string other = kept;
+  other.replace(other.find(of_program), 4, "beef");
+  std::ofstream(memory) << other;
+  EXPECT_EQ(fleet::FileHashes(memory).of(program).substr(0, 4), "beef");
 }
 
 class FleetFile : public testing::Test {

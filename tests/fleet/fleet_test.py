@@ -114,6 +114,17 @@ class Fleets(unittest.TestCase):
         log.write_text("".join(lines[:-1]))
         self.assertIn("1 of 3 robots to do", self.run_fleet().stderr)
 
+    def test_planted_drifts_are_found_and_no_others(self):
+        kinds = {"r1": "payload", "r3": "ripple", "r4": "stribeck"}
+        for k in range(6):
+            small_fleet.make_robot(FXDYN, self.folder, f"r{k}", 500 + k, kinds.get(f"r{k}"))
+        self.fleet('projects = "r*.toml"\n')
+        done = self.run_fleet()
+        self.assertEqual(done.returncode, 0, done.stderr)
+        drifting = {robot["id"]: {f["effect"] for f in robot["findings"] if f["new"] and f["discovered"]}
+                    for robot in self.result()["robots"] if robot["drifts"]}
+        self.assertEqual(drifting, {robot: {kind} for robot, kind in kinds.items()})
+
     def test_a_robot_that_fails_costs_nobody_else(self):
         self.robots("a", "b", "slow", "memory", "silent", "crash", "nothing")
         self.fleet('projects = "*.robot"\n[limits]\ntime_s = 1.5\nmemory_mb = 500\n')
@@ -293,6 +304,29 @@ class Fleets(unittest.TestCase):
         arguments = (self.folder / "slurm_state/arguments").read_text()
         for word in ("--partition=night\n--mem=4G", "--array=0-3", "--array=0-1"):
             self.assertIn(word, arguments)
+
+    def test_a_killed_submitter_costs_nothing(self):
+        self.robots(*(f"r{k}" for k in range(6)))
+        self.fleet()
+        self.assertEqual(self.fake().returncode, 0)
+        expected = (self.folder / "out/fleet.json").read_bytes()
+        shutil.rmtree(self.folder / "out")
+        state = self.folder / "slurm_state"
+        state.mkdir()
+        with subprocess.Popen([FXDYN, "fleet", "fleet.toml", "--out", "out", "--slurm", "--chunk-size", "3", "--program",
+                               FAKE], cwd=self.folder, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                              env={**os.environ, **self.env, "FAKE_SECONDS": "0.3", "FAKE_SLURM": str(state),
+                                   "PATH": f"{HERE / 'fake_slurm'}:{os.environ['PATH']}"}) as submitter:
+            while not list((self.folder / "out/robots").glob("*/result.json")):
+                self.assertIsNone(submitter.poll())
+                time.sleep(0.02)
+            submitter.kill()
+        # its array goes on beside the next one
+        done = self.slurm("--chunk-size", "3", FAKE_SECONDS="0.3")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual((self.folder / "out/fleet.json").read_bytes(), expected)
+        while list(state.glob("runs.*")):
+            time.sleep(0.05)
 
     def test_the_size_of_chunks_comes_from_a_measured_time(self):
         self.robots("a", "b", "c")
