@@ -96,6 +96,17 @@ std::string clusters(const Summary& summary) {
   return section("The same finding on several robots") + table.html();
 }
 
+/// Such as friction that changed by more than it does from session to session.
+std::string notes(const Summary& summary) {
+  Table table({{"robot"}, {"note"}});
+  bool any = false;
+  for (const RobotSummary& robot : summary.robots) {
+    if (!robot.state) continue;
+    for (const std::string& note : robot.state->notes) table.add({{robot.id, "", link_to(robot)}, {note}}), any = true;
+  }
+  return any ? section("Notes of the diagnoses") + table.html() : "";
+}
+
 std::string head(const Summary& summary) {
   std::size_t failed = 0, drifting = 0;
   for (const RobotSummary& robot : summary.robots) {
@@ -124,6 +135,7 @@ std::string html_of(const Summary& summary) {
   body += section("Drifting") + robots_table(summary, true);
   body += clusters(summary);
   body += section("All others, worst first") + robots_table(summary, false);
+  body += notes(summary);
   return document("Fleet", body);
 }
 

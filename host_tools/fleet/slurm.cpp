@@ -98,8 +98,9 @@ class Submitter {
       std::erase_if(missing, [&](const Task& task) { return RobotFolder(directory_, task.member->id).is_ended(); });
       if (missing.empty()) return;
       useless = missing.size() < before ? 0 : useless + 1;
-      if (!has_started()) complain("no task of it has written to DIR: put --out where all nodes see the same folder");
-      if (useless >= options_.useless_rounds) complain("it ended no robot, twice in a row");
+      if (useless >= options_.useless_rounds)
+        complain(has_started() ? "again it ended no robot"
+                               : "no task of it has written to DIR: put --out where all nodes see the same folder");
       fmt::print(stderr, "job {} is gone, {} robots are missing: submitted again\n", job_, missing.size());
     }
   }

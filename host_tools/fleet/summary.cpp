@@ -177,8 +177,9 @@ json to_json(const RobotSummary& robot) {
   out["robot"] = robot.state ? json(robot.state->robot) : json();
   out["worst_relative_error"] = robot.worst_error ? json(*robot.worst_error) : json();
   out["accepted"] = robot.accepted ? json{{"by", robot.accepted->by}, {"at", robot.accepted->at}} : json();
-  out["files"] = json::array();
+  out["files"] = out["notes"] = json::array();
   if (robot.state) {
+    out["notes"] = robot.state->notes;
     for (const std::string& file : robot.state->files)
       out["files"].push_back(fmt::format("robots/{}/{}", robot.id, file));
   }

@@ -102,6 +102,8 @@ class Fleets(unittest.TestCase):
         self.assertFalse(self.robot("well")["drifts"])
         page = (self.folder / "out/fleet.html").read_text()
         self.assertLess(page.index("loaded"), page.index("robots/well/out/diagnosis.json"))
+        self.assertEqual(loaded["notes"], json.loads(
+            (self.folder / "out/robots/loaded/out/diagnosis.json").read_text())["notes"])
         for link in loaded["files"]:
             self.assertTrue((self.folder / "out" / link).is_file(), link)
         # the same bytes from another folder, and none of the work twice

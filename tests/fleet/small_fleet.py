@@ -26,16 +26,16 @@ DRIFTS = {
 }
 
 
-def scenario(seed, friction, logs, extra=""):
+def scenario(seed, friction, logs, extra="", duration_s=10, sample_s=0.005):
     """`friction`: viscous and Coulomb of each joint. `logs`: names; every one is another motion."""
-    text = (f"seed = {seed}\n[sensors]\nencoder_bits = 20\nsample_s = 0.005\ntorque_noise = 0.005\n[robot]\n"
+    text = (f"seed = {seed}\n[sensors]\nencoder_bits = 20\nsample_s = {sample_s}\ntorque_noise = 0.005\n[robot]\n"
             'urdf = "arm.urdf"\nrated_torque = [60, 20]\nacceleration = [8, 8]\n')
     for joint, (viscous, coulomb) in enumerate(friction, 1):
         text += effect("viscous", joint, coefficient=viscous)
         text += effect("coulomb", joint, amplitude=coulomb, width=0.004)
     text += extra
     for k, log in enumerate(logs):
-        text += f'[[log]]\nname = "{log}"\nduration_s = 10\nspeed = 0.4\nseed = {seed + k}\n'
+        text += f'[[log]]\nname = "{log}"\nduration_s = {duration_s}\nspeed = 0.4\nseed = {seed + k}\n'
     return text
 
 
@@ -53,7 +53,7 @@ def simulate(program, folder, name, text):
         truth.unlink()
 
 
-def make_robot(program, folder, name, seed, drift=None):
+def make_robot(program, folder, name, seed, drift=None, **of_logs):
     """NAME.toml and its logs; friction differs from robot to robot and by a few per cent from session to session."""
     draw = random.Random(seed)
     own = [(draw.uniform(0.7, 1.4), draw.uniform(1.0, 2.0)) for _ in range(2)]
@@ -61,7 +61,7 @@ def make_robot(program, folder, name, seed, drift=None):
         friction = [tuple(value * draw.uniform(0.97, 1.03) for value in joint) for joint in own]
         extra = DRIFTS[drift] if drift and session == "today" else ""
         simulate(program, folder, f"{name}_{session}",
-                 scenario(1000 * seed + 100 * k + 1, friction, [f"{name}_{session}_{log}" for log in logs], extra))
+                 scenario(1000 * seed + 100 * k + 1, friction, [f"{name}_{session}_{log}" for log in logs], extra, **of_logs))
     (folder / f"{name}.toml").write_text(project([
         (f"{name}_healthy_a.csv", "baseline"), (f"{name}_healthy_b.csv", "baseline"), (f"{name}_today_a.csv", "train"),
         (f"{name}_today_b.csv", "train"), (f"{name}_today_c.csv", "validate")]))
