@@ -26,11 +26,16 @@ std::string link_to(const RobotSummary& robot) {
                                                     : "";
 }
 
-std::string parameters_of(const FoundEffect& found) {
+/// Beside each what it was in the accepted state.
+std::string parameters_of(const Finding& finding) {
   std::vector<std::string> words;
-  for (const NamedParameter& p : found.parameters)
+  for (const NamedParameter& p : finding.found.parameters) {
     words.push_back(fmt::format("{} {:.3g}{}", p.name, p.value, p.unit == "-" ? "" : " " + p.unit));
-  return fmt::format("{}", fmt::join(words, ", "));
+    for (const NamedParameter& then : finding.before) {
+      if (then.name == p.name) words.back() += fmt::format(", was {:.3g}", then.value);
+    }
+  }
+  return fmt::format("{}", fmt::join(words, "; "));
 }
 
 /// Of what is new, or of the rest.
@@ -38,7 +43,7 @@ std::string findings_of(const RobotSummary& robot, bool is_new) {
   std::vector<std::string> words;
   for (const Finding& f : robot.findings) {
     if (f.is_new != is_new) continue;
-    words.push_back(fmt::format("{}: {} ({}, 10^{:.1f}{})", f.where, words_of(f.found.effect), parameters_of(f.found),
+    words.push_back(fmt::format("{}: {} ({}, 10^{:.1f}{})", f.where, words_of(f.found.effect), parameters_of(f),
                                 f.found.odds,
                                 f.discovered ? (f.found.established ? "" : ", likely") : ", may be chance"));
   }

@@ -25,6 +25,23 @@ bool has(const std::vector<FoundEffect>& effects, const std::string& name) {
   return std::any_of(effects.begin(), effects.end(), [&](const FoundEffect& e) { return e.effect == name; });
 }
 
+std::vector<NamedParameter> parameters_of(const std::vector<FoundEffect>* effects, const std::string& name) {
+  if (effects == nullptr) return {};
+  for (const FoundEffect& found : *effects) {
+    if (found.effect == name) return found.parameters;
+  }
+  return {};
+}
+
+json to_json(const NamedParameter& p, const std::vector<NamedParameter>& before) {
+  json out{{"name", p.name}, {"unit", p.unit}, {"value", p.value}, {"std", p.std ? json(*p.std) : json()}};
+  out["accepted"] = nullptr;
+  for (const NamedParameter& then : before) {
+    if (then.name == p.name) out["accepted"] = then.value;
+  }
+  return out;
+}
+
 bool has_a_gap(Verdict verdict) { return verdict == Verdict::unexplained || verdict == Verdict::partly_explained; }
 
 /// The same joints, or it is another robot.
@@ -44,7 +61,7 @@ void add_findings(RobotSummary& robot, std::size_t joint, const std::string& whe
                   const std::vector<FoundEffect>& today, const std::vector<FoundEffect>* then) {
   for (const FoundEffect& found : today) {
     const bool is_new = then != nullptr ? !has(*then, found.effect) : robot.reference == "baseline";
-    robot.findings.push_back({joint, where, found, is_new, false});
+    robot.findings.push_back({joint, where, found, is_new, false, parameters_of(then, found.effect)});
     robot.strongest_odds = std::max(robot.strongest_odds, found.odds);
   }
   if (then == nullptr) return;
@@ -148,9 +165,7 @@ json to_json(const RobotSummary& robot) {
   const auto joint_of = [](std::size_t joint) { return joint == 0 ? json() : json(joint); };
   for (const Finding& f : robot.findings) {
     json parameters = json::array();
-    for (const NamedParameter& p : f.found.parameters)
-      parameters.push_back(
-          {{"name", p.name}, {"unit", p.unit}, {"value", p.value}, {"std", p.std ? json(*p.std) : json()}});
+    for (const NamedParameter& p : f.found.parameters) parameters.push_back(to_json(p, f.before));
     findings.push_back({{"joint", f.where},
                         {"index", joint_of(f.joint)},
                         {"effect", f.found.effect},

@@ -24,6 +24,9 @@ struct Finding {
   FoundEffect found;
   bool is_new = false;      ///< not there in the accepted state; without one: found against a healthy session
   bool discovered = false;  ///< it passes the fleet's false-discovery rate
+  /// Its parameters in the accepted state; empty: it was not there. What they differ by has no odds: nobody knows how
+  /// much sessions of a healthy robot differ.
+  std::vector<NamedParameter> before{};
 };
 
 /// What is left without a name and was not so in the reference.

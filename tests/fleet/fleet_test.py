@@ -213,7 +213,9 @@ class Fleets(unittest.TestCase):
         self.assertEqual((self.result()["drifting"], self.robot("a")["drifts"]), (1, False))
         self.assertRegex(self.robot("a")["accepted"]["at"], r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$")
         self.assertTrue(self.robot("a")["accepted"]["by"])
-        # by hand the same but for who and when
+        payload = next(f for f in self.robot("a")["findings"] if f["effect"] == "payload")
+        self.assertEqual([p["value"] for p in payload["parameters"]], [p["accepted"] for p in payload["parameters"]])
+        # what was not accepted is as it was
         after = self.result()
         self.assertEqual([r for r in after["robots"] if r["id"] == "b"], [r for r in before["robots"] if r["id"] == "b"])
         # what was accepted and is gone is told
