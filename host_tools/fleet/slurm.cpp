@@ -91,11 +91,12 @@ class Submitter {
       run_tasks(fleet_, {missing.front()}, directory_, run_);
       missing.erase(missing.begin());
     }
+    wait_for_the_one_before(missing);
     for (int useless = 0; !missing.empty();) {
       const std::size_t before = missing.size();
       submit(missing);
       wait_for(missing);
-      std::erase_if(missing, [&](const Task& task) { return RobotFolder(directory_, task.member->id).is_ended(); });
+      drop_ended(missing);
       if (missing.empty()) return;
       useless = missing.size() < before ? 0 : useless + 1;
       if (useless >= options_.useless_rounds)
@@ -106,6 +107,24 @@ class Submitter {
   }
 
  private:
+  void drop_ended(std::vector<Task>& tasks) const {
+    std::erase_if(tasks, [&](const Task& task) { return RobotFolder(directory_, task.member->id).is_ended(); });
+  }
+
+  /// The array of a submitter that was killed may still do the work.
+  void wait_for_the_one_before(std::vector<Task>& missing) {
+    const fs::path file = last_job();
+    if (!fs::exists(file)) return;
+    job_ = read_file(file);
+    if (job_.empty() || is_gone()) return;
+    fmt::print(stderr, "job {} of before goes on: waiting for it, `scancel {}` ends it\n", job_, job_);
+    for (const Task& task : missing) RobotFolder(directory_, task.member->id).forget();
+    wait_for(missing);
+    drop_ended(missing);
+  }
+
+  fs::path last_job() const { return directory_ / "slurm" / "job"; }
+
   void submit(const std::vector<Task>& missing) {
     const double seconds = mean_seconds(fleet_, directory_);
     std::size_t size = options_.chunk_size;
@@ -136,6 +155,7 @@ class Submitter {
     if (!answer.good)
       throw InputError(fmt::format("sbatch refuses: {}: change --slurm-args, or leave out --slurm", answer.text));
     job_ = answer.text.substr(0, answer.text.find(';'));  // "id;cluster"
+    write_file(last_job(), job_);
     fmt::print(stderr, "job {}: {} tasks of up to {} robots\n", job_, chunks_, size);
   }
 

@@ -87,13 +87,12 @@ TEST(FileHashes, RemembersWhatNobodyTouched) {
   EXPECT_EQ(hash(), sha256("abd"));
   std::ofstream(memory) << "half of somethi";
   EXPECT_EQ(hash(), sha256("abd"));
-  // An old file, as of the machine itself: its hash comes from the memory.
-  const auto program = std::filesystem::canonical("/proc/self/exe");
+  // An old file, as of the system: its hash comes from the memory.
+  const auto program = std::filesystem::canonical("/bin/sh");
   fleet::FileHashes first(memory);
   const std::string of_program = first.of(program);
   first.keep();
   const std::string kept = read_file(memory);
-  if (kept == "{}\n") GTEST_SKIP() << "this program was built a moment ago";
   std::string other = kept;
   other.replace(other.find(of_program), 4, "beef");
   std::ofstream(memory) << other;

@@ -325,10 +325,12 @@ class Fleets(unittest.TestCase):
                 self.assertIsNone(submitter.poll())
                 time.sleep(0.02)
             submitter.kill()
-        # its array goes on beside the next one
+        # its array goes on
         done = self.slurm("--chunk-size", "3", FAKE_SECONDS="0.3")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual((self.folder / "out/fleet.json").read_bytes(), expected)
+        self.assertIn("job 1 of before goes on", done.stderr)
+        self.assertEqual(len(list(state.glob("job.*"))), 1)
         while list(state.glob("runs.*")):
             time.sleep(0.05)
 
