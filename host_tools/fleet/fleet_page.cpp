@@ -43,7 +43,7 @@ std::string findings_of(const RobotSummary& robot, bool is_new) {
   std::vector<std::string> words;
   for (const Finding& f : robot.findings) {
     if (f.is_new != is_new) continue;
-    words.push_back(fmt::format("{}: {} ({}, 10^{:.1f}{})", f.where, words_of(f.found.effect), parameters_of(f),
+    words.push_back(fmt::format("{}: {} ({}; odds 10^{:.1f}{})", f.where, words_of(f.found.effect), parameters_of(f),
                                 f.found.odds,
                                 f.discovered ? (f.found.established ? "" : ", likely") : ", may be chance"));
   }

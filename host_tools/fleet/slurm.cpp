@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <sstream>
@@ -164,19 +165,33 @@ class Submitter {
     const HeldSignals signals;
     double since_asked = 0;
     std::size_t shown = 0;
+    auto last = std::chrono::steady_clock::now();
     while (true) {
       const auto ended = static_cast<std::size_t>(std::count_if(missing.begin(), missing.end(), [&](const Task& task) {
         return RobotFolder(directory_, task.member->id).is_ended();
       }));
-      if (ended != shown) fmt::print(stderr, "[{}/{}]\n", ended, missing.size());
+      if (ended != shown) {
+        fmt::print(stderr, "[{}/{}]\n", ended, missing.size());
+        last = std::chrono::steady_clock::now();
+      }
       shown = ended;
       if (ended == missing.size()) return;
       pause(signals, options_.look_s);
+      if (is_stuck(std::chrono::steady_clock::now() - last)) return pause(signals, options_.settle_s);
       since_asked += options_.look_s;
       if (since_asked < options_.ask_s) continue;
       since_asked = 0;
       if (is_gone()) return pause(signals, options_.settle_s);
     }
+  }
+
+  /// Every worker ends a robot within its time limit. A controller that was killed may believe for ever that a task
+  /// runs whose end it has missed.
+  bool is_stuck(std::chrono::duration<double> quiet) const {
+    if (!has_started() || quiet.count() < fleet_.limits.time_s + options_.margin_s) return false;
+    fmt::print(stderr, "job {} has ended no robot for {:.0f} s: cancelled\n", job_, quiet.count());
+    if (!in_path("scancel").empty()) ask({"scancel", job_}, directory_);
+    return true;
   }
 
   void pause(const HeldSignals& signals, double seconds) const {

@@ -27,7 +27,6 @@ SelectTypeParameters=CR_CPU
 PluginDir=$plugins
 MailProg=/bin/true
 ReturnToService=2
-SlurmdTimeout=15
 SlurmdParameters=config_overrides
 StateSaveLocation=$dir/state
 SlurmdSpoolDir=$dir/spool

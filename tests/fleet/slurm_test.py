@@ -81,6 +81,8 @@ def main():
         figures.copies(fxdyn, folder, options.robots)
         subprocess.run([fxdyn, "diagnose", folder / "well.toml", "--out", folder / "results"], check=True,
                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        with open(folder / "fleet.toml", "a") as file:
+            file.write("[limits]\ntime_s = 5\n")  # a second's work; how long a task is believed to run that does not
         env = {"FAKE_RESULTS": str(folder / "results"), "FAKE_SECONDS": "1"}
         here_s, *_ = figures.fleet(fxdyn, folder, *PROGRAM, env=env)
         expected = (folder / "out/fleet.json").read_bytes()
