@@ -25,9 +25,10 @@ namespace fs = std::filesystem;
 fs::path chunk_file(const fs::path& directory, std::size_t chunk) {
   return directory / "chunks" / fmt::format("{}.txt", chunk);
 }
-/// Written by the worker as soon as it runs.
+/// Of a file that the worker writes as soon as it runs.
+constexpr const char* sign_extension = ".started";
 fs::path chunk_sign(const fs::path& directory, std::size_t chunk) {
-  return directory / "chunks" / fmt::format("{}.started", chunk);
+  return directory / "chunks" / fmt::format("{}{}", chunk, sign_extension);
 }
 
 /// Where a shell would find it; empty: nowhere.
@@ -132,6 +133,8 @@ class Submitter {
     if (size == 0) size = seconds > 0 ? static_cast<std::size_t>(std::ceil(options_.chunk_s / seconds)) : 1;
     size = std::max(size, (missing.size() + options_.most_tasks - 1) / options_.most_tasks);
     chunks_ = (missing.size() + size - 1) / size;
+    std::error_code none;
+    fs::remove_all(directory_ / "chunks", none);
     for (std::size_t k = 0; k < chunks_; ++k) {
       std::string ids;
       for (std::size_t i = k * size; i < std::min(missing.size(), (k + 1) * size); ++i) {
@@ -139,8 +142,6 @@ class Submitter {
         ids += missing[i].member->id + "\n";
       }
       write_file(chunk_file(directory_, k), ids);
-      std::error_code none;
-      fs::remove(chunk_sign(directory_, k), none);
     }
     std::error_code error;
     const std::string self = fs::read_symlink("/proc/self/exe", error).string();
@@ -208,8 +209,9 @@ class Submitter {
   }
 
   bool has_started() const {
-    for (std::size_t k = 0; k < chunks_; ++k) {
-      if (fs::exists(chunk_sign(directory_, k))) return true;
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator(directory_ / "chunks", error)) {
+      if (entry.path().extension() == sign_extension) return true;
     }
     return false;
   }
