@@ -34,14 +34,14 @@ def workers(folder):
     return found
 
 
-def killed_run(fxdyn, folder, env, kills, draw):
+def killed_run(fxdyn, folder, env, kills, victims, draw):
     """Kills, then lets it end; what was killed."""
     words = [fxdyn, "fleet", str(folder / "fleet.toml"), "--out", str(folder / "out"), "--slurm", "--chunk-size", "2"]
     start = lambda: subprocess.Popen([*words, *PROGRAM], env={**os.environ, **env}, stdout=subprocess.DEVNULL)
     submitter, done = start(), []
     while len(done) < kills and submitter.poll() is None:
         time.sleep(draw.uniform(0.5, 4))
-        what = draw.choice(["controller", "worker", "submitter"])
+        what = draw.choice(victims)
         if what == "controller":
             subprocess.run([os.environ["SLURM_TEST_CONTROLLER"]], check=True)
         elif what == "submitter":
@@ -66,6 +66,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("fxdyn")
     parser.add_argument("--kills", type=int, default=3)
+    parser.add_argument("--what", nargs="+", default=["controller", "worker", "submitter"], help="is killed")
     parser.add_argument("--robots", type=int, default=12)
     parser.add_argument("--time", action="store_true", help="only the time against processes of this machine")
     options = parser.parse_args()
@@ -92,7 +93,7 @@ def main():
             print(f"{options.robots} projects of a second: {here_s:.1f} s here, {there_s:.1f} s by Slurm: "
                   f"{there_s / here_s:.2f} times")
         else:
-            print("killed:", *killed_run(fxdyn, folder, env, options.kills, random.Random(7)))
+            print("killed:", *killed_run(fxdyn, folder, env, options.kills, options.what, random.Random(7)))
         if (folder / "out/fleet.json").read_bytes() != expected:
             sys.exit("FAILED: other bytes")
         print("the same bytes")
