@@ -44,6 +44,8 @@ Action add_forward(CLI::App& verb);
 Action add_refine(CLI::App& verb);
 Action add_payload(CLI::App& verb);
 Action add_effects(CLI::App& verb);
+Action add_fleet(CLI::App& verb);
+Action add_fleet_worker(CLI::App& verb);
 Action add_doctor(CLI::App& verb);
 
 /// PROJECT and --out, as most verbs have them.

@@ -49,6 +49,10 @@ std::span<const Verb> verbs() {
            "is\n"
            "known (--mass), the gains of the torques: payload.json, torque_gain.toml.",
            "--model out/robot/model.json --log loaded.csv --out out/loaded", add_payload},
+      Verb{"fleet", "Many robots, each in a process of its own: worst first, what drifts: fleet.html, fleet.json.",
+           "fleet.toml --out out/fleet", add_fleet},
+      Verb{"fleet-worker", "A part of a fleet, as a task of a cluster: what `fleet --slurm` submits.",
+           "fleet.toml --out out/fleet --chunk 0 --of 8", add_fleet_worker},
       Verb{"effects", "List the effects that the model knows.", "--json", add_effects},
       Verb{"doctor", "What this machine lacks for which verb, and the command that installs it.", "", add_doctor},
   };

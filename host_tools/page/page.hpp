@@ -14,6 +14,7 @@ std::string escape(std::string_view text);
 struct Cell {
   std::string text;
   const char* kind = "";  ///< CSS classes: n (number), bad, amber, good
+  std::string link = "";  ///< where a click leads; empty: nowhere
 };
 Cell number(double value, int digits = 4);
 Cell percent(double share);
@@ -31,6 +32,8 @@ class Table {
   std::string rows_;
 };
 
+/// A whole page; `body` is HTML.
+std::string document(std::string_view title, std::string_view body);
 std::string paragraph(std::string_view words);
 std::string section(std::string_view title);
 std::string subsection(std::string_view title);

@@ -27,6 +27,16 @@ std::string read_file(const std::filesystem::path& file) {
   return text.str();
 }
 
+namespace {
+
+/// With what helps, where something does.
+std::string why(int cause) {
+  const bool full = cause == ENOSPC || cause == EDQUOT;
+  return fmt::format("{}{}", std::strerror(cause), full ? ": free some space there, or choose another folder" : "");
+}
+
+}  // namespace
+
 void write_file(const std::filesystem::path& file, std::string_view content) {
   std::error_code error;
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), error);
@@ -38,13 +48,14 @@ void write_file(const std::filesystem::path& file, std::string_view content) {
     if (!out) {
       const int cause = errno;
       std::filesystem::remove(temporary, error);
-      throw InputError(fmt::format("{}: can't be written: {}", file.string(), std::strerror(cause)));
+      throw InputError(fmt::format("{}: can't be written: {}", file.string(), why(cause)));
     }
   }
   std::filesystem::rename(temporary, file, error);
   if (error) {
-    std::filesystem::remove(temporary);
-    throw InputError(fmt::format("{}: can't be written: {}", file.string(), error.message()));
+    const int cause = error.value();
+    std::filesystem::remove(temporary, error);
+    throw InputError(fmt::format("{}: can't be written: {}", file.string(), why(cause)));
   }
 }
 

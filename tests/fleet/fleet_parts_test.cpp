@@ -1,0 +1,174 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "host_tools/fleet/file_hashes.hpp"
+#include "host_tools/fleet/fleet_file.hpp"
+#include "host_tools/fleet/summary.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/files.hpp"
+#include "host_tools/support/sha256.hpp"
+#include "host_tools/support/temporary_folder.hpp"
+
+namespace fxdyn {
+namespace {
+
+using fleet::benjamini_hochberg;
+
+std::string sha256(std::string_view text) {
+  Sha256 hash;
+  hash.add(text);
+  return hash.text();
+}
+
+// Examples of NIST (FIPS 180-2, appendix B).
+TEST(Sha256, IsThatOfTheStandardsExamples) {
+  EXPECT_EQ(sha256("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(sha256("abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq"),
+            "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1");
+  EXPECT_EQ(sha256(std::string(1000000, 'a')), "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
+  EXPECT_EQ(sha256(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+}
+
+TEST(Sha256, DoesNotDependOnThePieces) {
+  const std::string text(300, 'x');
+  for (std::size_t cut = 0; cut <= text.size(); cut += 7) {
+    Sha256 hash;
+    hash.add(text.substr(0, cut));
+    hash.add(text.substr(cut));
+    EXPECT_EQ(hash.text(), sha256(text)) << cut;
+  }
+}
+
+// Benjamini and Hochberg 1995, sec. 3.2: 15 p-values of a study, rate 0.05: the first four.
+TEST(FalseDiscovery, IsThatOfThePapersExample) {
+  std::vector<double> p{0.0001, 0.0004, 0.0019, 0.0095, 0.0201, 0.0278, 0.0298, 0.0344,
+                        0.0459, 0.3240, 0.4262, 0.5719, 0.6528, 0.7590, 1.0000};
+  for (double& value : p) value = std::log10(value);
+  std::reverse(p.begin(), p.end());
+  const auto found = benjamini_hochberg(p, 0.05);
+  EXPECT_EQ(found.hypotheses, 15u);
+  EXPECT_EQ(found.discoveries, 4u);
+  EXPECT_NEAR(found.log10_threshold, std::log10(0.0095), 1e-12);
+}
+
+TEST(FalseDiscovery, OfNothingIsNothing) {
+  EXPECT_EQ(benjamini_hochberg({}, 0.05).discoveries, 0u);
+  EXPECT_EQ(benjamini_hochberg({0, 0, -0.5}, 0.05).discoveries, 0u);
+}
+
+// A p that is too large alone may be small enough beside smaller ones.
+TEST(FalseDiscovery, TakesTheLargestRankThatPasses) {
+  EXPECT_EQ(benjamini_hochberg({std::log10(0.04), std::log10(0.045)}, 0.05).discoveries, 2u);
+  EXPECT_EQ(benjamini_hochberg({std::log10(0.04), 0}, 0.05).discoveries, 0u);
+}
+
+TEST(FileHashes, RemembersWhatNobodyTouched) {
+  const TemporaryFolder folder;
+  const auto file = folder.path() / "log.csv", memory = folder.path() / "files.json";
+  const auto write = [&](const std::string& text) { std::ofstream(file) << text; };
+  const auto hash = [&] {
+    fleet::FileHashes hashes(memory);
+    const std::string out = hashes.of(file);
+    hashes.keep();
+    return out;
+  };
+  write("abc");
+  EXPECT_EQ(hash(), sha256("abc"));
+  // Written a moment ago: nothing is remembered yet.
+  EXPECT_EQ(read_file(memory), "{}\n");
+  write("abd");
+  EXPECT_EQ(hash(), sha256("abd"));
+  // What the memory says of a file with another stamp does not count.
+  std::ofstream(memory) << "{\"" + file.string() + "\": [\"1 2 3\", \"wrong\"]}";
+  EXPECT_EQ(hash(), sha256("abd"));
+  std::ofstream(memory) << "half of somethi";
+  EXPECT_EQ(hash(), sha256("abd"));
+  // An old file, as of the system: its hash comes from the memory.
+  const auto program = std::filesystem::canonical("/bin/sh");
+  fleet::FileHashes first(memory);
+  const std::string of_program = first.of(program);
+  first.keep();
+  const std::string kept = read_file(memory);
+  std::string other = kept;
+  other.replace(other.find(of_program), 4, "beef");
+  std::ofstream(memory) << other;
+  EXPECT_EQ(fleet::FileHashes(memory).of(program).substr(0, 4), "beef");
+}
+
+class FleetFile : public testing::Test {
+ protected:
+  void write(const std::string& name, const std::string& text) const {
+    std::filesystem::create_directories((folder_.path() / name).parent_path());
+    std::ofstream(folder_.path() / name) << text;
+  }
+  fleet::Fleet read(const std::string& text) const {
+    write("fleet.toml", text);
+    return fleet::read_fleet(folder_.path() / "fleet.toml");
+  }
+  /// What it complains of.
+  std::string complaint(const std::string& text) const {
+    try {
+      read(text);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(FleetFile, NamesRobotsByWhatThePatternLeavesOpen) {
+  for (const char* cell : {"b", "a"}) write(std::string("cells/") + cell + "/robot.toml", "");
+  write("single/c.toml", "");
+  const auto found = read("projects = [\"cells/*/robot.toml\", \"single/*.toml\"]");
+  ASSERT_EQ(found.members.size(), 3u);
+  EXPECT_EQ(found.members[0].id, "a");
+  EXPECT_EQ(found.members[1].id, "b");
+  EXPECT_EQ(found.members[2].id, "c");
+  EXPECT_EQ(found.members[1].project, folder_.path() / "cells/b/robot.toml");
+  EXPECT_EQ(found.verb, "diagnose");
+}
+
+TEST_F(FleetFile, ATableSaysMoreOfARobotThatThePatternFound) {
+  write("cells/a.toml", "");
+  write("healthy.csv", "");
+  const auto found = read(
+      "projects = \"cells/*.toml\"\n[[robot]]\nid = \"a\"\nbaseline = \"healthy.csv\"\n"
+      "overrides = { diagnose.max_effects = 1 }");
+  ASSERT_EQ(found.members.size(), 1u);
+  EXPECT_EQ(found.members[0].project, folder_.path() / "cells/a.toml");
+  EXPECT_EQ(found.members[0].baseline.front(), folder_.path() / "healthy.csv");
+  EXPECT_NE(found.members[0].overrides.find("max_effects = 1"), std::string::npos);
+}
+
+TEST_F(FleetFile, SaysWhatIsWrongAndWhere) {
+  write("x/a.toml", "");
+  write("y/a.toml", "");
+  write("healthy.csv", "");
+  const auto said = [this](const std::string& text, const std::string& part) {
+    const std::string what = complaint(text);
+    EXPECT_NE(what.find(part), std::string::npos) << what;
+    EXPECT_NE(what.find("fleet.toml:"), std::string::npos) << what;
+  };
+  said("verb = \"diagnose\"", "no robots");
+  said("verb = \"compare\"", "nearest is");
+  said("projects = \"z/*.toml\"", "paths are relative to the fleet file");
+  said("project = \"x/*.toml\"", "nearest is 'projects'");
+  said("projects = \"?/*.toml\"", "two robots have the id 'a'");
+  said("[[robot]]\nid = \"a/b\"\nproject = \"x/a.toml\"", "letters, digits");
+  said("[[robot]]\nproject = \"x/a.toml\"", "key 'id' is missing");
+  said("[[robot]]\nid = \"a\"", "key 'project' is missing");
+  said("[[robot]]\nid = \"a\"\nproject = \"x/a.toml\"\nbaseline = \"gone.csv\"", "healthy session");
+  said(
+      "[[robot]]\nid = \"a\"\nproject = \"x/a.toml\"\nbaseline = \"healthy.csv\"\n"
+      "[[robot]]\nid = \"b\"\nproject = \"y/a.toml\"\nbaseline = \"healthy.csv\"",
+      "its baseline is that of 'a', too");
+  said("[limits]\ntime_s = 0\n[[robot]]\nid = \"a\"\nproject = \"x/a.toml\"", "above 0");
+}
+
+}  // namespace
+}  // namespace fxdyn
