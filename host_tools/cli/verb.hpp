@@ -45,6 +45,8 @@ Action add_refine(CLI::App& verb);
 Action add_payload(CLI::App& verb);
 Action add_effects(CLI::App& verb);
 Action add_doctor(CLI::App& verb);
+Action add_completion(CLI::App& verb);
+Action add_man(CLI::App& verb);
 
 /// PROJECT and --out, as most verbs have them.
 struct ProjectOptions {

@@ -186,8 +186,11 @@ Region in_frequency(const std::vector<const ProcessedLog*>& logs, const std::vec
 std::string place_of(const GapRegion& region, const Joint& joint) {
   const std::string position = joint.position_unit();
   if (region.signal == "direction") return region.to > 0 ? "in positive direction" : "in negative direction";
+  // three digits of the range's length: a range of seconds late in a log has to be told from its beginning
+  const double length = region.to - region.from, largest = std::max(std::fabs(region.from), std::fabs(region.to));
+  const int digits = length > 0 ? 3 + static_cast<int>(std::max(0.0, std::floor(std::log10(largest / length)))) : 3;
   const auto range = [&](const std::string& name, const std::string& unit) {
-    return fmt::format("at {} {:.3g} .. {:.3g} {}", name, region.from, region.to, unit);
+    return fmt::format("at {} {:.{}g} .. {:.{}g} {}", name, region.from, digits, region.to, digits, unit);
   };
   if (region.signal == "q") return range("position", position);
   if (region.signal == "dq") return range("velocity", position + "/s");

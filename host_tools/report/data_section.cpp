@@ -14,14 +14,14 @@ std::string data_section(const ReportInput& input, const json& file) {
   Table logs({{"log"}, {"from [s]", "n"}, {"to [s]", "n"}, {"role"}, {"what it decided"}});
   for (const LogErrors& log : result.logs) {
     logs.add({{log.file},
-              number(log.from_s, 6),
-              number(log.to_s, 6),
+              {seconds(log.from_s, log.to_s - log.from_s), "n"},
+              {seconds(log.to_s, log.to_s - log.from_s), "n"},
               {to_string(log.role)},
               {log.role == Role::train      ? "the parameters"
                : log.role == Role::validate ? "which effects and nodes are kept"
                                             : "nothing: only judged"}});
   }
-  std::string out = section("Data") + logs.html();
+  std::string out = section("Data") + logs.html("Logs and what they decided");
   out += paragraph("Choices were gated on: " + result.gate + ". The errors below are on the " + input.results.role +
                    " logs" +
                    (input.results.role == "test" ? ", which decided nothing."

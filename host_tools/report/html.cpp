@@ -6,6 +6,7 @@
 #include "host_tools/report/report.hpp"
 #include "host_tools/report/results.hpp"
 #include "host_tools/report/section.hpp"
+#include "host_tools/report/style.hpp"
 #include "host_tools/support/files.hpp"
 
 namespace fxdyn {
@@ -15,45 +16,51 @@ using namespace page;
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-constexpr const char* style = R"(
-body { font: 15px/1.45 system-ui, sans-serif; color: #222; margin: 0 auto; max-width: 1080px; padding: 1.5em; }
-h1 { font-size: 1.7em; margin: 0; } h2 { font-size: 1.25em; margin: 2em 0 .4em; border-bottom: 2px solid #e4572e; }
-h3 { font-size: 1em; margin: 1.6em 0 .2em; } p { margin: .4em 0; max-width: 52em; } .quiet { color: #666; }
-table { border-collapse: collapse; margin: .6em 0; font-size: .92em; }
-th, td { padding: .22em .7em; border-bottom: 1px solid #ddd; text-align: left; vertical-align: top; }
-th { background: #f4f4f4; } td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-td.bad { background: #fde5e0; } td.good { background: #e6f4e6; }
-td.amber { background: #fdf0d0; } .split { columns: 2; column-gap: 3em; }
-.split tr { break-inside: avoid; } svg { width: 100%; height: auto; } .scroll { overflow-x: auto; }
-)";
-
 std::string header(const json& model, const MetricsResult& metrics) {
   const json& robot = model.at("robot");
-  std::string out = fmt::format("<h1>{}</h1>\n", escape(text(robot.at("name"))));
   const auto gravity = robot.at("gravity").get<std::vector<double>>();
-  out += fmt::format(
-      "<p class=\"quiet\">project {}, {} moving joints, gravity [{:.4g} {:.4g} {:.4g}] m/s², tick {:.4g} ms, fxdyn "
-      "{}</p>\n",
-      escape(text(model.at("project"))), robot.at("joints").size(), gravity[0], gravity[1], gravity[2],
-      1000 * model.at("tick_s").get<double>(), escape(text(model.at("tool_version"))));
-  out += paragraph(fmt::format(
-      "{} base parameters. Torque is on the joint side of the gearbox, positive along the axis of the joint.",
-      metrics.base_parameters));
-  return out;
+  return fmt::format(
+      "<header><h1>{}</h1>\n<p class=\"quiet\">project {}, {} moving joints, gravity [{:.4g} {:.4g} {:.4g}] m/s², tick "
+      "{:.4g} ms, {} base parameters, fxdyn {}. Torque is on the joint side of the gearbox, positive along the axis of "
+      "the joint.</p></header>\n",
+      escape(text(robot.at("name"))), escape(text(model.at("project"))), robot.at("joints").size(), gravity[0],
+      gravity[1], gravity[2], 1000 * model.at("tick_s").get<double>(), metrics.base_parameters,
+      escape(text(model.at("tool_version"))));
+}
+
+/// What stands between the first <h2 ..> and its end; "" where there is none.
+std::string heading_of(const std::string& content) {
+  const std::size_t open = content.find("<h2"), from = content.find('>', open);
+  const std::size_t to = content.find("</h2>", open);
+  return open == std::string::npos || to == std::string::npos ? "" : content.substr(from + 1, to - from - 1);
+}
+
+/// The sections, each with its name as anchor, and the contents: a link a section.
+std::string contents_and_sections(const ReportInput& input) {
+  std::string links, body;
+  for (const ReportSection& section : report_sections()) {
+    const std::string content = draw_sections(input, {&section, 1});
+    if (content.empty()) continue;
+    body += fmt::format("<section id=\"{}\">\n{}</section>\n", section.name, content);
+    if (const std::string heading = heading_of(content); !heading.empty() && section.name != "overview")
+      links += fmt::format("<li><a href=\"#{}\">{}</a></li>\n", section.name, heading);
+  }
+  return "<nav aria-label=\"Contents\"><ul>\n" + links + "</ul></nav>\n<main id=\"main\">\n" + body + "</main>\n";
 }
 
 }  // namespace
 
-void write_report(const IdentifiedModel& fitted, const std::vector<ProcessedLog>& logs, const fs::path& directory) {
+void write_report(const IdentifiedModel& fitted, const std::vector<ProcessedLog>& logs, const fs::path& directory,
+                  const ReportSettings& settings) {
   const Results results = read_results(directory);
+  const ReportInput input{fitted, to_json(fitted), logs, results, directory, settings};
   std::string page = fmt::format(
-      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n<title>{} - "
-      "fxdyn</title>\n<style>{}</style></head><body>\n",
-      escape(robot_of(fitted).name), style);
-  const ReportInput input{fitted, to_json(fitted), logs, results, directory};
+      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n<meta name=\"viewport\" "
+      "content=\"width=device-width, initial-scale=1\">\n<link rel=\"icon\" href=\"data:,\">\n<title>{} - "
+      "fxdyn</title>\n<style>{}</style></head><body>\n<a class=\"skip\" href=\"#main\">To the content</a>\n",
+      escape(robot_of(fitted).name), report_style);
   page += header(input.model, metrics_of(results["metrics"]));
-  page += draw_sections(input, report_sections());
-  page += "</body></html>\n";
+  page += contents_and_sections(input) + "</body></html>\n";
   write_file(directory / "report.html", page);
 }
 

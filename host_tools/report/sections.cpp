@@ -5,6 +5,7 @@
 // A line a section, in the order of the page: name; result file without .json, "" where model and logs are enough; what
 // the result has to belong to (Belongs in results.hpp), else it is left out; whether it is drawn without its result.
 #define FXDYN_REPORT_SECTIONS(SECTION)              \
+  SECTION(overview, "", anything, true)             \
   SECTION(data, "metrics", anything, false)         \
   SECTION(error, "metrics", anything, false)        \
   SECTION(diagnosis, "diagnosis", diagnosis, false) \
