@@ -110,7 +110,7 @@ std::string compact(std::string_view svg) {
 std::string figure(std::string_view svg, std::string_view caption) {
   const std::string words = escape(caption);
   std::string picture = compact(svg);
-  for (const char* key : {" xmlns=\"", " xmlns:xlink=\""}) {  // of a file of its own; HTML needs none
+  for (const char* key : {"xmlns=\"", "xmlns:xlink=\""}) {  // of a file of its own; HTML needs none
     const std::size_t at = picture.find(key),
                       end = picture.find('"', at == std::string::npos ? at : at + std::strlen(key));
     if (at < picture.find('>') && end != std::string::npos) picture.erase(at, end + 1 - at);

@@ -2,7 +2,6 @@
 
 #include "host_tools/effects/model_parts.hpp"
 #include "host_tools/page/page.hpp"
-#include "host_tools/regression/metrics_result.hpp"
 #include "host_tools/report/report.hpp"
 #include "host_tools/report/results.hpp"
 #include "host_tools/report/section.hpp"
@@ -16,7 +15,7 @@ using namespace page;
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-std::string header(const json& model, const MetricsResult& metrics) {
+std::string header(const json& model) {
   const json& robot = model.at("robot");
   const auto gravity = robot.at("gravity").get<std::vector<double>>();
   return fmt::format(
@@ -24,7 +23,7 @@ std::string header(const json& model, const MetricsResult& metrics) {
       "{:.4g} ms, {} base parameters, fxdyn {}. Torque is on the joint side of the gearbox, positive along the axis of "
       "the joint.</p></header>\n",
       escape(text(robot.at("name"))), escape(text(model.at("project"))), robot.at("joints").size(), gravity[0],
-      gravity[1], gravity[2], 1000 * model.at("tick_s").get<double>(), metrics.base_parameters,
+      gravity[1], gravity[2], 1000 * model.at("tick_s").get<double>(), model.at("base_parameters").size(),
       escape(text(model.at("tool_version"))));
 }
 
@@ -59,7 +58,7 @@ void write_report(const IdentifiedModel& fitted, const std::vector<ProcessedLog>
       "content=\"width=device-width, initial-scale=1\">\n<link rel=\"icon\" href=\"data:,\">\n<title>{} - "
       "fxdyn</title>\n<style>{}</style></head><body>\n<a class=\"skip\" href=\"#main\">To the content</a>\n",
       escape(robot_of(fitted).name), report_style);
-  page += header(input.model, metrics_of(results["metrics"]));
+  page += header(input.model);
   page += contents_and_sections(input) + "</body></html>\n";
   write_file(directory / "report.html", page);
 }

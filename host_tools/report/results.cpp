@@ -18,7 +18,14 @@ namespace {
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-json read_json(const fs::path& file) { return fs::exists(file) ? json::parse(read_file(file)) : json(); }
+/// Null where it is missing or no JSON.
+json read_json(const fs::path& file) {
+  if (!fs::exists(file)) return {};
+  json content = json::parse(read_file(file), nullptr, false);
+  return content.is_discarded() ? json() : content;
+}
+
+bool is_unreadable(const fs::path& file) { return fs::exists(file) && !json::accept(read_file(file)); }
 
 /// Null where the file is missing or of other tables than the model's.
 json read_of_tables(const fs::path& file, const json& model) {
@@ -99,6 +106,7 @@ Results read_results(const fs::path& directory) {
     const std::string name(section.needs.name);
     if (name.empty() || results.files.contains(name)) continue;
     results.files[name] = read_result(section.needs, directory, model, results.stale);
+    if (is_unreadable(directory / (name + ".json"))) results.unreadable.push_back(name + ".json");
   }
   if (const json& metrics = results["metrics"]; !metrics.is_null()) results.role = shown_role(metrics_of(metrics).logs);
   return results;

@@ -6,6 +6,7 @@
 // the result has to belong to (Belongs in results.hpp), else it is left out; whether it is drawn without its result.
 #define FXDYN_REPORT_SECTIONS(SECTION)              \
   SECTION(overview, "", anything, true)             \
+  SECTION(left_out, "", anything, true)             \
   SECTION(data, "metrics", anything, false)         \
   SECTION(error, "metrics", anything, false)        \
   SECTION(diagnosis, "diagnosis", diagnosis, false) \
@@ -13,7 +14,6 @@
   SECTION(comparison, "compare", inputs, false)     \
   SECTION(efficiency, "efficiency", inputs, false)  \
   SECTION(vibration, "vibration", inputs, false)    \
-  SECTION(left_out, "", anything, true)             \
   SECTION(effects, "", anything, true)              \
   SECTION(base, "", anything, true)                 \
   SECTION(fixed_point, "export", tables, true)      \

@@ -174,6 +174,20 @@ TEST(Pages, NamesWithMarkupAndOfTwoHundredCharactersDoNoHarm) {
   hostile.hand_over(page, false);
 }
 
+TEST(Pages, AHalfWrittenResultIsLeftOutAndSaid) {
+  const Case puma("half");
+  puma.page();
+  const fs::path out = test::folder() / "half";
+  write_file(out / "replay.json", read_file(out / "replay.json").substr(0, 40));
+  write_file(out / "diagnosis.json", "");
+  write_report(puma.model, puma.logs, out);
+  const std::string page = read_file(out / "report.html");
+  for (const char* part :
+       {"replay.json can't be read", "diagnosis.json can't be read", "Not replayed with these tables"})
+    EXPECT_NE(page.find(part), std::string::npos) << part;
+  EXPECT_EQ(page.find("<section id=\"diagnosis\">"), std::string::npos);
+}
+
 TEST(Pages, OneJointAndFortyJointsAreDrawn) {
   Robot one = read_urdf(test::puma560), forty = one;
   one.joints.resize(1);

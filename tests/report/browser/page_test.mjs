@@ -161,6 +161,7 @@ async function checkPage(browser, blank, directory, file, expected) {
   await checkStructure(page, name);
   if (expected.first_screen) await checkFirstScreen(page, name, expected.joints);
   if (expected.plots) await checkPlots(page, blank, name);
+  const start = Date.now();
   let pages = 0;
   for (const scheme of ['light', 'dark']) {
     await page.emulateMediaFeatures([{name: 'prefers-color-scheme', value: scheme}]);
@@ -170,7 +171,7 @@ async function checkPage(browser, blank, directory, file, expected) {
     if (scheme === 'light') pages = await checkPaper(page, name);
   }
   await page.close();
-  console.log(`${name}: ${pages} pages on paper`);
+  console.log(`${name}: ${pages} pages on paper, ${((Date.now() - start) / 1000).toFixed(1)} s`);
 }
 
 const directory = resolve(process.argv[2]);

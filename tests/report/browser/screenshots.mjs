@@ -1,5 +1,5 @@
 // screenshots.mjs REPORT.html DIR: the page as people see it: desktop.png, dark.png (first screen at 1280 x 800), phone.png
-// (390 px wide, the first 2000 px), paper.pdf. Packages: as run.sh installs them.
+// (390 px wide, the first 2000 px), paper.pdf. screenshots.sh calls it.
 import {mkdirSync, writeFileSync} from 'node:fs';
 import {join, resolve} from 'node:path';
 import {pathToFileURL} from 'node:url';
