@@ -51,7 +51,29 @@ std::string brings_in_words(const JointAnswer& answer) {
                      100 * (*answer.left / *answer.before - 1));
 }
 
-std::string next_in_words(const JointAnswer& answer, const Known& known, const std::string& experiment) {
+std::vector<std::string> split(const std::string& all) {
+  constexpr std::string_view between = "; ";
+  std::vector<std::string> parts;
+  for (std::size_t from = 0; from < all.size();) {
+    const std::size_t end = std::min(all.find(between, from), all.size());
+    parts.push_back(all.substr(from, end - from));
+    from = end + between.size();
+  }
+  return parts;
+}
+
+/// What diagnosis proposes for a joint (from 1): of "a or b at joint 3: constant speeds" what follows the colon.
+std::string experiment_for(const std::string& all, std::size_t joint) {
+  const std::string at = fmt::format("at joint {}: ", joint), more = fmt::format("record more of joint {} ", joint);
+  std::string out;
+  for (const std::string& part : split(all)) {
+    if (const std::size_t found = part.find(at); found != std::string::npos) return part.substr(found + at.size());
+    if (part.starts_with(more)) out = "record more motion there";
+  }
+  return out;
+}
+
+std::string next_in_words(const JointAnswer& answer, const Known& known, const std::string& experiments) {
   if (known.diagnosis == nullptr && answer.mood != Mood::calm) return "Run fxdyn diagnose.";
   if (known.diagnosis != nullptr && known.diagnosis->verdict == Verdict::not_excited)
     return "Record motion that moves it.";
@@ -62,9 +84,8 @@ std::string next_in_words(const JointAnswer& answer, const Known& known, const s
       return "The test logs disagree: train with a log like the robot's work.";
     case Mood::red: {
       const std::string& where = known.diagnosis->where.sentence;
-      const std::string next = known.diagnosis->undecided.empty() || experiment.empty()
-                                   ? "Record slower and faster motion there, or see its plots."
-                                   : capital(experiment) + ".";
+      const std::string experiment = experiment_for(experiments, known.diagnosis->index);
+      const std::string next = experiment.empty() ? "Look at its plots." : capital(experiment) + ".";
       return where.empty() ? next : capital(where) + ". " + next;
     }
     case Mood::unknown:
@@ -135,6 +156,17 @@ const char* in_words(Mood mood) {
       break;
   }
   return "not known";
+}
+
+std::string experiments_for_the_robot(const std::string& all) {
+  std::string out;
+  for (const std::string& part : split(all)) {
+    const std::size_t joint = part.find("joint ");
+    const bool of_one =
+        joint != std::string::npos && joint + 6 < part.size() && part[joint + 6] >= '0' && part[joint + 6] <= '9';
+    if (!of_one) out += (out.empty() ? "" : "; ") + part;
+  }
+  return out;
 }
 
 std::optional<double> JointAnswer::share() const {

@@ -34,6 +34,9 @@ struct JointAnswer {
 /// One a joint of the model.
 std::vector<JointAnswer> joint_answers(const ReportInput& input);
 
+/// The experiments that diagnosis proposes ("a; b; .."), without those for a single joint.
+std::string experiments_for_the_robot(const std::string& all);
+
 /// RMSE at most `[report] good_enough` of the joint's rated torque; false where that is not known.
 bool is_good_enough(const ReportInput& input, std::size_t joint, double rmse);
 

@@ -82,7 +82,8 @@ std::string overview_section(const ReportInput& input, const json&) {
                      " logs, which decided something, and so optimistic.");
   out += "<div class=\"overview\">\n<figure>" + robot_sketch(robot_of(input.fitted), answers) +
          "</figure>\n<div class=\"answers\">\n" + joint_list(answers) + robot_effects(diagnosed);
-  const std::string next = diagnosed.is_null() ? "" : diagnosis_of(diagnosed).next_experiment;
+  const std::string next =
+      diagnosed.is_null() ? "" : experiments_for_the_robot(diagnosis_of(diagnosed).next_experiment);
   if (!next.empty()) out += "<p><strong>To learn more:</strong> " + escape(next) + ".</p>\n";
   return out + "<p id=\"drive\"><strong>The drive:</strong> " + escape(drive_line(input.results)) +
          ".</p>\n</div></div>\n";

@@ -32,6 +32,9 @@ struct Page {
     for (JointFit& joint : model.joints) joint.rated_torque = 20;
     results.role = "test";
     results.files["diagnosis"] = test::diagnosis();
+    results.files["diagnosis"]["next_experiment"] =
+        "record more of joint 2 where the gap sits (dq from 0 to 1); presliding or lugre at joint 2: slow reversals; "
+        "stribeck at joint 12: creeping; payload: the same motions recorded without it";
   }
   /// Metrics with this error of every joint on the test logs, in two stages.
   void set_errors(const std::array<double, 4>& friction, const std::array<double, 4>& diagnosed) {
@@ -103,6 +106,7 @@ TEST(JointAnswers, SayWhatWasFoundWhatItBringsAndWhatToDoNext) {
   EXPECT_EQ(*answers[0].share(), 0.02);
   EXPECT_EQ(answers[1].found, "Presliding or lugre (these logs do not tell which) found");
   EXPECT_NE(answers[1].next.find("90 % of the gap is in negative direction"), std::string::npos) << answers[1].next;
+  EXPECT_TRUE(answers[1].next.ends_with("Slow reversals.")) << answers[1].next;
   EXPECT_EQ(answers[2].found, "Nothing is missing");
   EXPECT_EQ(answers[3].found, "The logs hardly move it");
   EXPECT_EQ(answers[3].next, "Record motion that moves it.");
@@ -115,7 +119,7 @@ TEST(Overview, HasEveryJointTheSketchAndTheDrive) {
   const std::string html = page.section();
   for (const char* part : {"id=\"joint-4\"", "2 of 4 joints are good", "structure is left: 1", "class=\"disc bad\"",
                            "no tables yet: run fxdyn export", "Left: 4.5 % of rated", "payload mass 2 ± 0.1 kg",
-                           "would separate stribeck from presliding"})
+                           "To learn more:</strong> payload: the same motions recorded without it.</p>"})
     EXPECT_NE(html.find(part), std::string::npos) << part << " not in " << html;
   EXPECT_EQ(html.find("<b>elbow"), std::string::npos);
   page.set_errors({1.9, 0.9, 0.1, 3}, {0.04, 0.09, 0.1, 0.1});

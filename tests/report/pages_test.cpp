@@ -72,6 +72,10 @@ struct Case {
     json out = test::diagnosis();
     const json kinds = out.at("joints");
     out["joints"] = json::array();
+    std::string& next = out["next_experiment"].get_ref<std::string&>();
+    for (std::size_t j = 1; j <= model.robot.size(); ++j)
+      next += fmt::format(
+          "; presliding or lugre at joint {}: slow reversals of a few milliradians, and of a few degrees", j);
     for (std::size_t j = 0; j < model.robot.size(); ++j) {
       json joint = kinds.at(j % kinds.size());
       joint["joint"] = model.robot.joints[j].name;
