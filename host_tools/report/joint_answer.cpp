@@ -32,7 +32,8 @@ std::string found_in_words(const Known& known) {
   if (joint.verdict == Verdict::not_excited) return "The logs hardly move it";
   std::vector<std::string> names;
   for (const NamedEffect& effect : joint.effects) {
-    if (effect.established) names.push_back(effect.effect);
+    const bool again = std::find(names.begin(), names.end(), effect.effect) != names.end();  // two ripples
+    if (effect.established && !again) names.push_back(effect.effect);
   }
   for (const auto& set : joint.undecided) names.push_back(words::either(set) + " (these logs do not tell which)");
   std::string out = names.empty() ? "nothing" : words::list(names);
@@ -198,6 +199,8 @@ std::vector<JointAnswer> joint_answers(const ReportInput& input) {
     if (j < moving || metrics.is_null()) set_errors(answer, input, j, known);
     answer.mood = mood_of(answer, known, input.settings.good_enough);
     answer.noise_only = known.diagnosis != nullptr && !has_structure(known);
+    const bool noisy = answer.mood == Mood::calm && answer.share().value_or(0) > input.settings.good_enough;
+    answer.word = noisy ? "noise is left" : in_words(answer.mood);
     answer.found = found_in_words(known);
     answer.brings = brings_in_words(answer);
     answer.next = next_in_words(answer, known, diagnosis.next_experiment);

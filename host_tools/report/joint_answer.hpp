@@ -26,6 +26,7 @@ struct JointAnswer {
   Mood mood = Mood::unknown;
   bool noise_only = false;  ///< diagnosis says that what is left has no structure
   bool test_logs_disagree = false;
+  std::string word{};                     ///< of its mood; "noise is left" where that is more than good_enough
   std::string found{}, brings{}, next{};  ///< sentences
   /// Of rated torque; none: not known.
   std::optional<double> share() const;

@@ -58,7 +58,7 @@ std::string joint_list(const std::vector<JointAnswer>& answers) {
     out += fmt::format(
         "<li id=\"joint-{0}\"><span class=\"mark {1}\" aria-hidden=\"true\">{0}</span><span><strong>{2}</strong> "
         "<span class=\"word {1}\">{3}</span><br>{4}</span></li>\n",
-        j + 1, kind, escape(answer.name), in_words(answer.mood), escape(sentence(answer)));
+        j + 1, kind, escape(answer.name), answer.word, escape(sentence(answer)));
   }
   return out + "</ol>\n";
 }

@@ -66,6 +66,8 @@ TEST(JointAnswers, ColourFollowsWhatIsLeftOfRatedTorqueThenStructureThenTheTestL
   auto answers = page.answers();
   ASSERT_EQ(answers.size(), 4U);
   EXPECT_EQ(answers[0].mood, Mood::calm) << "above good_enough, but what is left is noise";
+  EXPECT_EQ(answers[0].word, "noise is left");
+  EXPECT_EQ(answers[2].word, "good");
   EXPECT_EQ(answers[1].mood, Mood::red);
   EXPECT_EQ(answers[2].mood, Mood::calm);
   EXPECT_EQ(answers[3].mood, Mood::unknown);
