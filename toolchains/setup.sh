@@ -19,9 +19,13 @@ packages=(
   # a second compiler, its linker, its checks, the sources' format
   clang-14 lld-14 libclang-rt-14-dev clang-format-14 clang-tidy-14
   # tests
+  chromium nodejs
   libgtest-dev libunicorn-dev librapidcheck-dev libbenchmark-dev liborocos-kdl-dev libmujoco-dev libpagmo-dev python3 llvm-14
   # spelling of the pages, their site, the reference of the headers
   aspell aspell-en mkdocs mkdocs-material doxygen
 )
+
+# Node.js from elsewhere has its own npm, beside which Debian's can't be installed.
+command -v npm >/dev/null || packages+=(npm)
 
 "$(dirname "$0")/install.sh" "${packages[@]}"

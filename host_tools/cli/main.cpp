@@ -4,6 +4,7 @@
 #include <map>
 #include <new>
 
+#include "host_tools/cli/shell_files.hpp"
 #include "host_tools/cli/verb.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/heap.hpp"
@@ -34,6 +35,19 @@ std::vector<std::string> words_of(int argc, char** argv) {
   return words;
 }
 
+/// One line: what is wrong, and a command that would work.
+void complain_of_usage(const CLI::App& app, const CLI::ParseError& error, const std::vector<std::string>& words) {
+  // What is missing is missing because of the word that is misspelt.
+  const auto unknown = app.remaining(true);
+  const std::string word = unknown.empty() ? "" : unknown.front(), works = cli::command_that_works(app, words, word);
+  const bool option = word.starts_with("-"), no_verb = app.get_subcommands().empty();
+  const std::string wrong =
+      word.empty()
+          ? error.what()
+          : fmt::format("'{}' {}", word, option ? "is no option here" : (no_verb ? "is no verb" : "was not expected"));
+  fmt::print(stderr, "fxdyn: {}: {}\n", one_line(wrong), one_line(fmt::format("as in `{}`", works)));
+}
+
 int run(int argc, char** argv) {
   CLI::App app{
       "fxdyn: from a robot's measured log to torque feedforward on its drive controllers.\n"
@@ -41,9 +55,6 @@ int run(int argc, char** argv) {
       "fxdyn"};
   app.set_version_flag("--version", version);
   app.require_subcommand(1);
-  app.failure_message([](const CLI::App*, const CLI::Error& error) {
-    return fmt::format("fxdyn: {}: see fxdyn VERB --help\n", error.what());
-  });
   std::map<const CLI::App*, cli::Action> actions;
   for (const cli::Verb& verb : cli::verbs()) {
     CLI::App* options =
@@ -54,15 +65,9 @@ int run(int argc, char** argv) {
   try {
     app.parse(words_of(argc, argv));
   } catch (const CLI::ParseError& error) {
-    // What is missing is missing because of the word that is misspelt.
-    const auto unknown = app.remaining(true);
-    if (error.get_exit_code() != 0 && !unknown.empty()) {
-      const bool option = unknown.front().starts_with("-"), no_verb = app.get_subcommands().empty();
-      fmt::print(stderr, "fxdyn: '{}' {}: see fxdyn {}--help\n", unknown.front(),
-                 option ? "is no option here" : (no_verb ? "is no verb" : "was not expected"), no_verb ? "" : "VERB ");
-      return 2;
-    }
-    return app.exit(error) == 0 ? 0 : 2;
+    if (error.get_exit_code() == 0) return app.exit(error);
+    complain_of_usage(app, error, {argv + 1, argv + argc});
+    return 2;
   }
   actions.at(app.get_subcommands().front())();
   return 0;

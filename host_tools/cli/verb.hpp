@@ -47,6 +47,8 @@ Action add_effects(CLI::App& verb);
 Action add_fleet(CLI::App& verb);
 Action add_fleet_worker(CLI::App& verb);
 Action add_doctor(CLI::App& verb);
+Action add_completion(CLI::App& verb);
+Action add_man(CLI::App& verb);
 
 /// PROJECT and --out, as most verbs have them.
 struct ProjectOptions {

@@ -55,6 +55,9 @@ std::span<const Verb> verbs() {
            "fleet.toml --out out/fleet --chunk 0 --of 8", add_fleet_worker},
       Verb{"effects", "List the effects that the model knows.", "--json", add_effects},
       Verb{"doctor", "What this machine lacks for which verb, and the command that installs it.", "", add_doctor},
+      Verb{"completion", "What bash or zsh needs to complete verbs, options and file names, to standard output.",
+           "bash > ~/.local/share/bash-completion/completions/fxdyn", add_completion},
+      Verb{"man", "The manual page of fxdyn or of a verb, to standard output.", "run | man -l -", add_man},
   };
   return all;
 }

@@ -141,7 +141,7 @@ std::string html_of(const Summary& summary) {
   body += clusters(summary);
   body += section("All others, worst first") + robots_table(summary, false);
   body += notes(summary);
-  return document("Fleet", body);
+  return document("Fleet", "<main id=\"main\">\n" + body + "</main>\n");
 }
 
 }  // namespace fxdyn::fleet

@@ -2,22 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "host_tools/page/style.hpp"
+
 namespace fxdyn::page {
-namespace {
-
-constexpr const char* style = R"(
-body { font: 15px/1.45 system-ui, sans-serif; color: #222; margin: 0 auto; max-width: 1080px; padding: 1.5em; }
-h1 { font-size: 1.7em; margin: 0; } h2 { font-size: 1.25em; margin: 2em 0 .4em; border-bottom: 2px solid #e4572e; }
-h3 { font-size: 1em; margin: 1.6em 0 .2em; } p { margin: .4em 0; max-width: 52em; } .quiet { color: #666; }
-table { border-collapse: collapse; margin: .6em 0; font-size: .92em; }
-th, td { padding: .22em .7em; border-bottom: 1px solid #ddd; text-align: left; vertical-align: top; }
-th { background: #f4f4f4; } td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-td.bad { background: #fde5e0; } td.good { background: #e6f4e6; }
-td.amber { background: #fdf0d0; } .split { columns: 2; column-gap: 3em; }
-.split tr { break-inside: avoid; } svg { width: 100%; height: auto; } .scroll { overflow-x: auto; }
-)";
-
-}  // namespace
 
 std::string escape(std::string_view text) {
   std::string out;
@@ -45,22 +36,105 @@ std::string escape(std::string_view text) {
 Cell number(double value, int digits) { return {fmt::format("{:.{}g}", value, digits), "n"}; }
 Cell percent(double share) { return {fmt::format("{:.2f} %", 100 * share), "n"}; }
 
-void Table::row(const char* tag, const std::vector<Cell>& cells) {
+Table::Table(const std::vector<Cell>& header) {
+  for (const Cell& cell : header) {
+    labels_.push_back(escape(cell.text));
+    head_ += fmt::format("<th scope=\"col\" class=\"{}\">{}</th>", cell.kind, labels_.back());
+  }
+}
+
+void Table::add(const std::vector<Cell>& cells) {
   rows_ += "<tr>";
-  for (const Cell& cell : cells) {
-    std::string text = escape(cell.text);
-    if (!cell.link.empty()) text = fmt::format("<a href=\"{}\">{}</a>", escape(cell.link), text);
-    rows_ += fmt::format("<{0} class=\"{1}\">{2}</{0}>", tag, cell.kind, text);
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    std::string words = escape(cells[i].text);
+    if (!cells[i].link.empty()) words = fmt::format("<a href=\"{}\">{}</a>", escape(cells[i].link), words);
+    if (i == 0 && !words.empty())
+      rows_ += fmt::format("<th scope=\"row\" class=\"{}\">{}</th>", cells[i].kind, words);
+    else
+      rows_ += fmt::format("<td data-label=\"{}\" class=\"{}\">{}</td>", i < labels_.size() ? labels_[i] : "",
+                           cells[i].kind, words);
   }
   rows_ += "</tr>\n";
 }
 
 std::string document(std::string_view title, std::string_view body) {
   return fmt::format(
-      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n<title>{} - "
-      "fxdyn</title>\n<style>{}</style></head><body>\n{}</body></html>\n",
+      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n<meta name=\"viewport\" "
+      "content=\"width=device-width, initial-scale=1\">\n<link rel=\"icon\" href=\"data:,\">\n<title>{} - "
+      "fxdyn</title>\n<style>{}</style></head><body>\n<a class=\"skip\" href=\"#main\">To the "
+      "content</a>\n{}</body></html>\n",
       escape(title), style, body);
 }
+
+std::string Table::bare_html(std::string_view caption) const {
+  const std::string named = caption.empty() ? "" : "<caption>" + escape(caption) + "</caption>\n";
+  return "<table>\n" + named + "<thead><tr>" + head_ + "</tr></thead>\n<tbody>\n" + rows_ + "</tbody></table>";
+}
+
+std::string Table::html(std::string_view caption) const {
+  return fmt::format("<div class=\"scroll\" tabindex=\"0\" role=\"group\" aria-label=\"{}\">{}</div>\n",
+                     caption.empty() ? "table" : escape(caption), bare_html(caption));
+}
+
+namespace {
+
+/// How gnuplot begins most groups; in a page it is the class k.
+constexpr std::string_view usual_group =
+    "<g fill=\"none\" color=\"black\" stroke=\"currentColor\" stroke-width=\"1.00\" stroke-linecap=\"butt\" "
+    "stroke-linejoin=\"miter\">";
+
+/// The same picture in fewer bytes: without blanks that begin lines and groups with nothing in them.
+std::string compact(std::string_view svg) {
+  constexpr const char* blanks = " \t\r\n";
+  std::string out;
+  for (std::size_t i = 0; i < svg.size(); ++i) {
+    const std::string_view rest = svg.substr(i);
+    if (rest.starts_with(usual_group)) {
+      out += "<g class=\"k\">";
+      i += usual_group.size() - 1;
+    } else if (rest.starts_with("</g>")) {
+      out.erase(out.find_last_not_of(blanks) + 1);
+      const std::size_t tag = out.rfind('<');
+      const bool empty = tag != std::string::npos && out.back() == '>' && out.compare(tag, 2, "<g") == 0;
+      if (empty)
+        out.erase(tag);
+      else
+        out += "</g>";
+      i += 3;
+    } else if (svg[i] == '\n') {
+      out += '\n';
+      i = std::min(svg.size(), svg.find_first_not_of(blanks, i)) - 1;
+    } else {
+      out += svg[i];
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string figure(std::string_view svg, std::string_view caption) {
+  const std::string words = escape(caption);
+  std::string picture = compact(svg);
+  for (const char* key : {"xmlns=\"", "xmlns:xlink=\""}) {  // of a file of its own; HTML needs none
+    const std::size_t at = picture.find(key),
+                      end = picture.find('"', at == std::string::npos ? at : at + std::strlen(key));
+    if (at < picture.find('>') && end != std::string::npos) picture.erase(at, end + 1 - at);
+  }
+  const std::size_t open = picture.find('>');
+  if (picture.starts_with("<svg") && open != std::string::npos) {
+    picture.insert(open + 1, "<title>" + words + "</title>");
+    picture.insert(4, " class=\"plot\" role=\"img\"");
+  }
+  return "<figure><figcaption>" + words + "</figcaption>\n" + picture + "</figure>\n";
+}
+
+std::string figures(const std::vector<std::string>& all) {
+  std::string out;
+  for (const std::string& one : all) out += one;
+  return out.empty() ? out : "<div class=\"figures\">\n" + out + "</div>\n";
+}
+
 std::string paragraph(std::string_view words) { return "<p>" + escape(words) + "</p>\n"; }
 std::string section(std::string_view title) { return "<h2>" + escape(title) + "</h2>\n"; }
 std::string subsection(std::string_view title) { return "<h3>" + escape(title) + "</h3>\n"; }

@@ -204,8 +204,9 @@ std::vector<std::string> pictures(const fs::path& directory, std::size_t count) 
 
 std::vector<std::string> draw(const std::vector<TorquePlot>& plots) {
   if (plots.empty()) return {};
-  // Three curves a plot, about 15 bytes a point: the page stays below 4 MB.
-  const auto points = std::clamp<Eigen::Index>(4'000'000 / (45 * static_cast<Eigen::Index>(plots.size())), 100, 2000);
+  // Three curves a plot, about 15 bytes a point, beside 10 kB of frame a plot: a page of six joints and seven logs
+  // stays below 2 MB.
+  const auto points = std::clamp<Eigen::Index>(700'000 / (45 * static_cast<Eigen::Index>(plots.size())), 100, 1000);
   const TemporaryFolder directory;
   std::string script = settings;
   for (std::size_t i = 0; i < plots.size(); ++i) {
@@ -251,7 +252,7 @@ std::string draw(const std::vector<Panel>& panels, const std::vector<std::string
 
 std::string draw(const std::vector<Chart>& charts, int columns) {
   constexpr int row_height = 300;
-  constexpr Eigen::Index chart_points = 1500;
+  constexpr Eigen::Index chart_points = 600;
   const int rows = (static_cast<int>(charts.size()) + columns - 1) / columns;
   const TemporaryFolder directory;
   std::string script = settings;

@@ -12,7 +12,7 @@ struct TorquePlot {
   std::string unit;                        ///< "N*m" or "N"
 };
 
-/// Each plot as an <svg> element, drawn by one run of gnuplot. Curves have at most 2000 points, fewer where many plots
+/// Each plot as an <svg> element, drawn by one run of gnuplot. Curves have at most 1000 points, fewer where many plots
 /// would make the page heavy; the extremes of what is left out are kept.
 /// Where gnuplot is missing or fails, a picture that says so, and a note on stderr.
 std::vector<std::string> draw(const std::vector<TorquePlot>& plots);

@@ -325,7 +325,7 @@ void Pipeline::report() {
   std::vector<ProcessedLog> shown = logs(Role::test);
   if (shown.empty()) shown = logs(Role::validate);
   if (shown.empty()) shown = logs(Role::train);
-  write_report(model, shown, directory_);
+  write_report(model, shown, directory_, project_.report);
   progress_.step();
   progress_.done();
   if (refused) throw DataError(*refused);

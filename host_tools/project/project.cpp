@@ -99,6 +99,7 @@ class ProjectReader {
       set(project_.compare.paper, table->find("paper"), as_boolean);
       table->finish();
     }
+    if (auto table = root.table("report")) read_report(*table);
     const auto logs = root.find("log");
     root.finish();
     if (logs) {
@@ -362,6 +363,14 @@ class ProjectReader {
     if (std::fabs(samples - std::round(samples)) > 1e-6 * samples) {
       table.place().fail(
           fmt::format("period_s of {} s is no multiple of step_s, {} s", excite.period_s, excite.step_s));
+    }
+    table.finish();
+  }
+
+  void read_report(Table& table) {
+    if (const auto share = table.find("good_enough")) {
+      project_.report.good_enough = share->positive();
+      if (project_.report.good_enough > 1) share->place().fail("expected a share of rated torque, at most 1");
     }
     table.finish();
   }

@@ -83,6 +83,12 @@ struct LimitSettings {
   std::optional<std::array<Eigen::Vector3d, 2>> box;  ///< lowest and highest corner, base frame [m]
 };
 
+/// How the report judges.
+struct ReportSettings {
+  /// RMSE as a share of rated torque up to which a joint is drawn calm: a choice, not a measurement.
+  double good_enough = 0.01;
+};
+
 /// How `fxdyn excite` plans its trajectories, see docs/guide/excite.md.
 struct ExciteSettings {
   double period_s = 10;
@@ -111,6 +117,7 @@ struct Project {
   ExciteSettings excite;
   CompareSettings compare;
   TargetSettings target;
+  ReportSettings report;
   bool has_role(Role role) const;
 };
 

@@ -43,7 +43,7 @@ std::string base_section(const ReportInput& input, const nlohmann::json&) {
          paragraph(
              "Torques, masses, inertias and friction scale with torque_gain, errors as a share of a joint's own torque "
              "do not; a log alone can't tell the gains, a known mass can (fxdyn payload --mass).") +
-         "<div class=\"split\">" + table.bare_html() + "</div>\n";
+         "<div class=\"split\">" + table.html("Base parameters") + "</div>\n";
 }
 
 }  // namespace fxdyn

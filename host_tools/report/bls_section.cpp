@@ -5,6 +5,7 @@
 
 #include "host_tools/page/page.hpp"
 #include "host_tools/regression/metrics_result.hpp"
+#include "host_tools/report/joint_answer.hpp"
 #include "host_tools/report/section.hpp"
 
 namespace fxdyn {
@@ -54,7 +55,7 @@ std::string choice_table(const std::vector<TrainedJoint>& training) {
                {fmt::format("{}", joint.evaluations), "n"}});
   }
   if (!any) return {};
-  return subsection("What the search settled on") + table.html() +
+  return subsection("What the search settled on") + table.html("Search, joint by joint") +
          paragraph(
              "By the particle swarm (pso) or the grid, whether it was kept or not. Distances are how far the joint "
              "moves "
@@ -97,7 +98,7 @@ std::string bls_section(const ReportInput& input, const nlohmann::json& file) {
   for (std::size_t j = 0; j < training.size(); ++j) {
     const TrainedJoint& joint = training[j];
     const auto shown = shown_errors(result.stages, role_of(role), j);
-    const bool disagree = shown && shown->second > shown->first;
+    const bool disagree = shown && shown->second > shown->first && !is_good_enough(input, j, shown->second);
     const double without = joint.held_out_without, with = joint.held_out_with;
     const bool kept = joint.kept, found = joint.choice.has_value();
     table.add({{joint.joint},
@@ -114,12 +115,12 @@ std::string bls_section(const ReportInput& input, const nlohmann::json& file) {
                shown ? number(shown->first) : Cell{"-", "n"},
                shown ? number(shown->second) : Cell{"-", "n"}});
   }
-  return out + table.html() +
+  return out + table.html("With and without the BLS") +
          paragraph(
              "Held-out RMSE on the gate data (see Data), not on the test logs. It is kept where that falls by at least "
-             "5 % (20 % where blocks of one log judge), for the model as it is exported, too. Amber: kept, and worse "
-             "on the logs "
-             "beside it. Where it is not kept the joint stays as diagnosed. Physical inputs are velocity and three "
+             "5 % (20 % where blocks of one log judge), for the model as it is exported, too. Amber: kept, worse "
+             "on the logs beside it, and what is left is not good enough. Where it is not kept the joint stays as "
+             "diagnosed. Physical inputs are velocity and three "
              "presliding states; "
              "extended ones add load, angle and acceleration; the state has no memory.") +
          choice_table(training);

@@ -47,7 +47,7 @@ std::string paper_table(const std::vector<MethodResult>& methods) {
                  number(row.time_s, 4)});
     }
   }
-  return subsection("Beside the paper's Table 2") + table.html() +
+  return subsection("Beside the paper's Table 2") + table.html("The paper's figures and ours") +
          paragraph(
              "RMSE is the mean over the joints in N m; the paper gives no unit, no robot and no test data, defines "
              "neither its smoothness nor what its time is of. BLS-PSO is the paper's, on q, dq, ddq. Eq. 8 has viscous "
@@ -81,7 +81,7 @@ std::string comparison_section(const ReportInput& input, const json& result) {
     row.push_back(method.fixed_error ? Cell{fmt::format("{:.1e}", *method.fixed_error), "n"} : Cell{"-", "n"});
     table.add(row);
   }
-  out += table.html();
+  out += table.html("Errors, share of rated torque");
   out += paragraph(
       "RMSE of each joint as a share of its rated torque. Smoothness: how much the torque changes from sample to "
       "sample "
@@ -96,11 +96,11 @@ std::string comparison_section(const ReportInput& input, const json& result) {
       row.push_back({fmt::format("{:.3g}, {:.3g}", method.rmse[j], method.peak[j]), "n"});
     absolute.add(row);
   }
-  out += absolute.html() + paragraph("RMSE of each joint, and its largest error at any sample.");
+  out += absolute.html("Errors in N*m or N") + paragraph("RMSE of each joint, and its largest error at any sample.");
   if (comparison.paper) out += paper_table(methods);
   for (const ComparisonPlot& plot : comparison_plots) {
     const std::filesystem::path file = input.directory / "plots" / plot.file;
-    if (std::filesystem::exists(file)) out += subsection(plot.title) + read_file(file);
+    if (std::filesystem::exists(file)) out += figure(read_file(file), plot.title);
   }
   return out;
 }

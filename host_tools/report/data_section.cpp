@@ -23,7 +23,7 @@ std::string data_section(const ReportInput& input, const json& file) {
                : log.role == Role::validate ? "which effects and nodes are kept"
                                             : "nothing: only judged"}});
   }
-  std::string out = section("Data") + logs.html();
+  std::string out = section("Data") + logs.html("Logs and what they decided");
   out += paragraph("Choices were gated on: " + result.gate + ". The errors below are on the " + input.results.role +
                    " logs" +
                    (input.results.role == "test" ? ", which decided nothing."

@@ -6,6 +6,7 @@
 
 #include "host_tools/page/page.hpp"
 #include "host_tools/report/diagnosis_words.hpp"
+#include "host_tools/report/joint_answer.hpp"
 #include "host_tools/report/section.hpp"
 #include "host_tools/support/files.hpp"
 #include "host_tools/support/time_text.hpp"
@@ -40,10 +41,10 @@ std::string what_it_means(const DiagnosisResult& diagnosis) {
   return "Not excited: the motion in the logs can't tell.";
 }
 
-std::string figures(const DiagnosisResult& diagnosis) {
+std::string gaps_on(const DiagnosisResult& diagnosis) {
   std::string out;
   if (const std::string those = words::not_borne_out(diagnosis); !those.empty())
-    out += paragraph("The test logs disagree (amber): with what was found the error rises at " + those + ".");
+    out += paragraph("The test logs disagree: with what was found the error rises at " + those + ".");
   if (const std::string on = words::figures_on(diagnosis); !on.empty()) out += paragraph("Gaps on " + on + ".");
   const std::string hidden = words::list(diagnosis.not_identifiable);
   if (!hidden.empty()) out += paragraph("Not identifiable on the robot as a whole: " + hidden + ".");
@@ -52,13 +53,7 @@ std::string figures(const DiagnosisResult& diagnosis) {
 
 Cell n(const std::string& text) { return {text, "n"}; }
 
-const char* colour_of(const JointDiagnosis& joint) {
-  if (joint.verdict == Verdict::unexplained) return "bad";
-  if (!joint.carries_over.value_or(true)) return "amber";
-  return joint.verdict == Verdict::nothing_missing || joint.verdict == Verdict::explained ? "good" : "";
-}
-
-std::string joint_table(const std::vector<JointDiagnosis>& joints) {
+std::string joint_table(const std::vector<JointDiagnosis>& joints, const std::vector<JointAnswer>& answers) {
   Table table({{"joint"},
                {"unit"},
                {"verdict"},
@@ -76,7 +71,7 @@ std::string joint_table(const std::vector<JointDiagnosis>& joints) {
       found_where += (found_where.empty() ? "" : "; ") + words::either(set) + " is there";
     table.add({{joint.joint},
                {joint.unit},
-               {words::verdict(joint.verdict), colour_of(joint)},
+               {words::verdict(joint.verdict), css_class(answers.at(joint.index - 1).mood)},
                n(words::figure(joint.gap_before)),
                n(words::figure(joint.gap_after)),
                n(words::figure(joint.gate_before)),
@@ -86,12 +81,12 @@ std::string joint_table(const std::vector<JointDiagnosis>& joints) {
                {found_where},
                {words::list(joint.not_identifiable)}});
   }
-  return table.html() +
+  return table.html("What is there and what is left, joint by joint") +
          paragraph(
              "The gap is the RMS of measured minus model torque on held-out logs, both filtered alike, noise not "
-             "subtracted. Gate: the same on the data that accepted the names. Amber: it falls there, and rises on the "
-             "test "
-             "logs. Noise floor: what of the gap after has no structure, on the data that accepted the names: no "
+             "subtracted. Gate: the same on the data that accepted the names. Colours as on the first screen. Amber: "
+             "the test logs disagree. Noise floor: what of the gap after has no structure, on the data that accepted "
+             "the names: no "
              "model could explain it. Left unexplained: the share of the gap's power above the noise that no finding "
              "explains, with its 95 % interval. Not identifiable: effects that this motion could not show.");
 }
@@ -123,7 +118,7 @@ std::string effect_table(const DiagnosisResult& diagnosis) {
     add(seen.empty() ? "robot" : "robot, seen on " + seen, effect);
   }
   if (!any) return "";
-  return subsection("Effects found") + table.html() +
+  return subsection("Effects found") + table.html("Effects, their certainty and their parameters") +
          paragraph(
              "± is one standard deviation. Established: 1000 to 1 against nothing and against the closest rival, on "
              "data "
@@ -149,7 +144,7 @@ std::string evidence_section(const HeldOutEvidence& evidence) {
     files += fmt::format("{}{} ({}, {} .. {} s)", files.empty() ? "" : ", ", log.file, to_string(log.role),
                          time_text(log.from_s), time_text(log.to_s));
   }
-  out += table.html();
+  out += table.html("Errors before and after diagnosis");
   out += paragraph(
       "RMS of measured minus model torque over these logs, before and after what diagnosis found, and after as the "
       "firmware computes it. White noise: as under Error.");
@@ -178,7 +173,7 @@ std::string forward_section(const PlayedForward& forward) {
                n(words::figure(joint.torque_after)),
                {joint.torque_unit}});
   }
-  std::string out = subsection("Forward: the recorded motion in closed loop") + table.html();
+  std::string out = subsection("Forward: the recorded motion in closed loop") + table.html("Errors in closed loop");
   out += paragraph(fmt::format(
       "{} s of {} played through the simulator with the model before and after as the robot. The recorded torque is "
       "fed "
@@ -194,24 +189,25 @@ std::string forward_section(const PlayedForward& forward) {
 }
 
 std::string pictures(const std::vector<JointDiagnosis>& joints, const fs::path& directory) {
-  std::string out;
+  std::vector<std::string> all;
   for (const JointDiagnosis& joint : joints) {
     const fs::path file = diagnosis_plot(directory, joint.index - 1);
     if (!fs::exists(file)) continue;
-    out += subsection(joint.joint + ": residual before and after") + read_file(file);
+    all.push_back(figure(read_file(file), joint.joint + ": residual before and after"));
   }
-  if (out.empty()) return out;
-  return out + paragraph(
-                   "Against velocity and position: all held-out logs, thin lines the samples, thick lines their mean. "
-                   "Time and spectrum: the log in which the model gained most.");
+  if (all.empty()) return "";
+  return subsection("Residuals") + figures(all) +
+         paragraph(
+             "Against velocity and position: all held-out logs, thin lines the samples, thick lines their mean. "
+             "Time and spectrum: the log in which the model gained most.");
 }
 
 }  // namespace
 
 std::string diagnosis_section(const ReportInput& input, const nlohmann::json& file) {
   const DiagnosisResult diagnosis = diagnosis_of(file);
-  std::string out = section("Diagnosis") + paragraph(what_it_means(diagnosis)) + figures(diagnosis) +
-                    joint_table(diagnosis.joints) + effect_table(diagnosis);
+  std::string out = section("Diagnosis") + paragraph(what_it_means(diagnosis)) + gaps_on(diagnosis) +
+                    joint_table(diagnosis.joints, joint_answers(input)) + effect_table(diagnosis);
   if (diagnosis.evidence) {
     out += evidence_section(*diagnosis.evidence);
     if (diagnosis.evidence->forward) out += forward_section(*diagnosis.evidence->forward);

@@ -38,7 +38,7 @@ std::string effects_section(const ReportInput& input, const nlohmann::json&) {
                  {in_words(parameter_values(effect, fit, joint.type == JointType::prismatic))}});
     }
   }
-  std::string out = section("Effects") + table.html();
+  std::string out = section("Effects") + table.html("Effects in the model");
   out += paragraph(
       "± is one standard deviation; parameters without it were searched, not estimated. Next to a kept BLS the "
       "coefficients of friction are no longer physical values of their own: both share the same torque.");

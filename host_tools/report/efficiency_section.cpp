@@ -36,7 +36,7 @@ std::string efficiency_section(const ReportInput&, const json& file) {
       chart.curves.push_back(
           {vector(points.first), vector(points.second), colours[chart.curves.size() % 6], 1.6, title});
     }
-    return draw({chart}, 1);
+    return figure(draw({chart}, 1), "Test error over " + x_label);
   };
   out += paragraph("Half of the seconds fast motion, half slow.");
   out += draw_curves(efficiency.curve, &EfficiencyPoint::seconds, false, "seconds of train data");

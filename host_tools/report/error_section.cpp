@@ -1,12 +1,11 @@
 #include <fmt/format.h>
 
-#include <cmath>
-#include <optional>
-
 #include "host_tools/effects/model_parts.hpp"
 #include "host_tools/page/page.hpp"
 #include "host_tools/regression/metrics_result.hpp"
+#include "host_tools/report/joint_answer.hpp"
 #include "host_tools/report/section.hpp"
+#include "host_tools/report/stage_figures.hpp"
 
 namespace fxdyn {
 
@@ -14,47 +13,11 @@ using namespace page;
 
 namespace {
 
-/// times the least error; a stage that is so near is as good; as what a name may raise a joint's error by
-/// (GateOptions::worse)
-constexpr double as_good = 1.02;
-
-/// Errors of the stages at one joint.
-struct StageFigures {
-  std::vector<PooledError> shown;             ///< on the logs that are shown
-  std::vector<std::optional<double>> judged;  ///< on what judges; none: not known
-  std::size_t exported = 0;                   ///< the stage that the joint has in model.json
-};
-
-/// Error of a stage on what judges; none: not known.
-std::optional<double> judged_error(const GateErrors& errors, const std::string& stage) {
-  if (stage == "friction") return errors.friction;
-  const double error = stage == "diagnosed" ? errors.diagnosed : stage == "bls" ? errors.bls : NAN;
-  return std::isfinite(error) ? std::optional(error) : std::nullopt;
-}
-
-StageFigures figures_of(const MetricsResult& result, Role role, std::size_t joint) {
-  StageFigures out;
-  const std::vector<StageErrors>& stages = result.stages;
-  const GateErrors* judged = joint < result.gate_errors.size() ? &result.gate_errors[joint] : nullptr;
-  out.exported = stages.size() - 1;
-  for (std::size_t s = 0; s < stages.size(); ++s) {
-    const std::string& name = stages[s].stage;
-    out.shown.push_back(pooled_error(stages[s].logs, role, joint));
-    out.judged.push_back(judged != nullptr ? judged_error(*judged, name) : std::nullopt);
-    if (judged != nullptr && judged->exported == name) out.exported = s;
-  }
-  return out;
-}
-
-/// Green where no other stage is better than the exported one, on the logs that are shown and on what judges.
-const char* colour_of(const StageFigures& figures) {
-  const std::size_t own = figures.exported;
-  for (std::size_t s = 0; s < figures.shown.size(); ++s) {
-    if (figures.shown[own].rmse > as_good * figures.shown[s].rmse) return "n amber";
-    if (figures.judged[own] && figures.judged[s] && *figures.judged[own] > as_good * *figures.judged[s])
-      return "n amber";
-  }
-  return "n good";
+/// Green where what is left is good enough, or no other stage is better than the exported one: on the logs that are
+/// shown and on what judges.
+const char* colour_of(const ReportInput& input, std::size_t joint, const StageFigures& figures) {
+  if (!figures.another_is_better_on_shown() && !figures.another_is_better_on_judging()) return "n good";
+  return is_good_enough(input, joint, figures.shown[figures.exported].rmse) ? "n good" : "n amber";
 }
 
 }  // namespace
@@ -70,7 +33,7 @@ std::string error_section(const ReportInput& input, const nlohmann::json& file) 
   const std::vector<Joint>& joints = robot_of(input.fitted).joints;
   for (std::size_t j = 0; j < joints.size(); ++j) {
     const double rated = joints_of(input.fitted)[j].rated_torque;
-    const StageFigures figures = figures_of(result, role, j);
+    const StageFigures figures = stage_figures(result, role, j);
     for (std::size_t s = 0; s < stages.size(); ++s) {
       const bool first = s == 0, last = s + 1 == stages.size();
       const PooledError& error = figures.shown[s];
@@ -79,13 +42,14 @@ std::string error_section(const ReportInput& input, const nlohmann::json& file) 
                  first ? number(rated) : Cell{},
                  {stage_title(stages[s]) + (s == figures.exported ? ": exported" : "")},
                  figures.judged[s] ? number(*figures.judged[s]) : Cell{"-", "n"},
-                 {fmt::format("{:.4g}", error.rmse), s == figures.exported ? colour_of(figures) : "n"},
+                 {fmt::format("{:.4g}", error.rmse), s == figures.exported ? colour_of(input, j, figures) : "n"},
                  percent(error.relative()),
                  percent(error.rmse / rated),
                  last ? number(error.noise_floor, 3) : Cell{}});
     }
   }
-  std::string out = section(fmt::format("Error on the {} logs", input.results.role)) + table.html();
+  std::string out =
+      section(fmt::format("Error on the {} logs", input.results.role)) + table.html("Errors of the stages");
   out += paragraph(
       "RMSE between measured and predicted torque, both filtered alike, over all logs of the role. Of RMS torque: 100 "
       "% "
@@ -94,8 +58,8 @@ std::string error_section(const ReportInput& input, const nlohmann::json& file) 
       "in it (see the noise floor under Diagnosis).");
   out += paragraph(
       "Gate: the same on the data that judge (see Data), which decide what is exported. Green: the exported stage, "
-      "where "
-      "no other is better by 2 %, there and on these logs. Amber: one is. Where a joint keeps no BLS its last stage is "
+      "where no other is better by 2 %, there and on these logs, or where what is left is good enough. Amber: neither. "
+      "Where a joint keeps no BLS its last stage is "
       "the diagnosed one.");
   Table per_log(
       {{"log"}, {"joint"}, {"unit"}, {"RMSE", "n"}, {"of RMS torque", "n"}, {"unfiltered RMSE", "n"}, {"bias", "n"}});
@@ -112,7 +76,7 @@ std::string error_section(const ReportInput& input, const nlohmann::json& file) 
                    number(errors.bias, 2)});
     }
   }
-  return out + "<h3>The final model, log by log</h3>\n" + per_log.html() +
+  return out + "<h3>The final model, log by log</h3>\n" + per_log.html("Errors, log by log") +
          paragraph(
              "Unfiltered RMSE: the same against the measured torque as it was recorded, with the noise that the filter "
              "takes away: it can't fall below that noise. Bias: mean of measured minus predicted torque, which a wrong "

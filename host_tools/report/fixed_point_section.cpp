@@ -30,7 +30,7 @@ std::string limits(const IdentifiedModel& model) {
                with_unit(fit.ddq_limit, length + "/s^2"),
                with_unit(fit.tau_limit, joint.torque_unit())});
   }
-  return "<h3>Limits</h3>\n" + table.html() +
+  return "<h3>Limits</h3>\n" + table.html("Limits of each joint") +
          paragraph(
              "Inputs are clamped to them. From the project file; else from the URDF where the logs come near them; "
              "else 1.2 "
@@ -63,7 +63,7 @@ std::string fixed_point_section(const ReportInput& input, const json& file) {
                 number(joint.attained_torque, 4),
                 number(joint.proven_torque, 4)});
   }
-  out += errors.html();
+  out += errors.html("Fixed point against double");
   out += paragraph(
       "Observed on the train and validate logs, on disturbed copies of them with states far beyond the limits, on "
       "random "
@@ -81,7 +81,7 @@ std::string fixed_point_section(const ReportInput& input, const json& file) {
                  number(std::ldexp(1.0, -bits), 3),
                  {fmt::format("±{:.4g}", std::ldexp(1.0, width - 1 - bits)), "n"}});
   }
-  return out + limits(input.fitted) + "<h3>Formats</h3>\n" + formats.html() +
+  return out + limits(input.fitted) + "<h3>Formats</h3>\n" + formats.html("Formats of numbers") +
          paragraph(
              "How each kind of number is stored: an integer of so many bits, of which the fractional ones come after "
              "the "

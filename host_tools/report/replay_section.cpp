@@ -41,7 +41,7 @@ std::string replay_section(const ReportInput&, const nlohmann::json& file) {
                {fmt::format("{:.0f}", log.mean), "n"},
                {fmt::format("{:.2g}", largest), "n"}});
   }
-  return out + table.html() +
+  return out + table.html("Streams played on the firmware") +
          paragraph(
              "Different: ticks in which a torque is not the host's bit for bit. Saturations: numbers that left their "
              "format and were held at its end; perturbed streams are made to do that. Instructions are counted by QEMU "

@@ -20,7 +20,14 @@ namespace {
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-json read_json(const fs::path& file) { return fs::exists(file) ? json::parse(read_file(file)) : json(); }
+/// Null where it is missing or no JSON.
+json read_json(const fs::path& file) {
+  if (!fs::exists(file)) return {};
+  json content = json::parse(read_file(file), nullptr, false);
+  return content.is_discarded() ? json() : content;
+}
+
+bool is_unreadable(const fs::path& file) { return fs::exists(file) && !json::accept(read_file(file)); }
 
 /// The model in DIR; none: no model.json.
 using Model = std::optional<ModelIdentity>;
@@ -101,6 +108,7 @@ Results read_results(const fs::path& directory) {
     const std::string name(section.needs.name);
     if (name.empty() || results.files.contains(name)) continue;
     results.files[name] = read_result(section.needs, directory, model, results.stale);
+    if (is_unreadable(directory / (name + ".json"))) results.unreadable.push_back(name + ".json");
   }
   if (const json& metrics = results["metrics"]; !metrics.is_null()) results.role = shown_role(metrics_of(metrics).logs);
   return results;

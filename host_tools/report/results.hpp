@@ -30,8 +30,9 @@ struct ResultFile {
 /// What the stages left in DIR, as far as it belongs together.
 struct Results {
   std::map<std::string, nlohmann::json, std::less<>> files;
-  std::vector<std::string> stale;  ///< verbs whose results are left out because they belong to something else
-  std::string role;                ///< of the logs that a reader wants to see: test, else validate, else train
+  std::vector<std::string> stale;       ///< verbs whose results are left out because they belong to something else
+  std::vector<std::string> unreadable;  ///< files that are no JSON, as one that was half written; left out too
+  std::string role;                     ///< of the logs that a reader wants to see: test, else validate, else train
   /// Null where it is missing or left out.
   const nlohmann::json& operator[](std::string_view name) const;
 };

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "host_tools/effects/forward.hpp"
+#include "host_tools/project/project.hpp"
 #include "host_tools/regression/dataset.hpp"
 #include "host_tools/report/results.hpp"
 
@@ -18,6 +19,8 @@ struct ReportInput {
   const std::vector<ProcessedLog>& logs;   ///< to draw: the test logs, else validate, else train
   const Results& results;                  ///< all result files that a section needs
   const std::filesystem::path& directory;  ///< where the results are
+  const ReportSettings& settings = default_settings;
+  static inline const ReportSettings default_settings{};
 };
 
 /// A part of report.html. One more: a file NAME_section.cpp with its function, and a line in sections.cpp

@@ -5,6 +5,8 @@
 // A line a section, in the order of the page: name; result file without .json, "" where model and logs are enough; what
 // the result has to belong to (Belongs in results.hpp), else it is left out; whether it is drawn without its result.
 #define FXDYN_REPORT_SECTIONS(SECTION)              \
+  SECTION(overview, "", anything, true)             \
+  SECTION(left_out, "", anything, true)             \
   SECTION(data, "metrics", anything, false)         \
   SECTION(error, "metrics", anything, false)        \
   SECTION(diagnosis, "diagnosis", diagnosis, false) \
@@ -12,7 +14,6 @@
   SECTION(comparison, "compare", inputs, false)     \
   SECTION(efficiency, "efficiency", inputs, false)  \
   SECTION(vibration, "vibration", inputs, false)    \
-  SECTION(left_out, "", anything, true)             \
   SECTION(effects, "", anything, true)              \
   SECTION(base, "", anything, true)                 \
   SECTION(fixed_point, "export", tables, true)      \

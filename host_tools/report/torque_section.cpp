@@ -33,8 +33,9 @@ std::string torque_section(const ReportInput& input, const json&) {
   const std::vector<std::string> pictures = draw(plots);
   std::string out = section("Torque, measured and predicted") +
                     paragraph("Both filtered at the torque cut-off; the residual beneath.");
-  for (std::size_t i = 0; i < pictures.size(); ++i) out += "<h3>" + escape(titles[i]) + "</h3>\n" + pictures[i] + "\n";
-  return out;
+  std::vector<std::string> all;
+  for (std::size_t i = 0; i < pictures.size(); ++i) all.push_back(figure(pictures[i], titles[i]));
+  return out + figures(all);
 }
 
 }  // namespace fxdyn

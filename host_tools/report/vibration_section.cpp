@@ -36,7 +36,7 @@ std::string paths(const std::vector<VibrationMethod>& methods) {
     any = true;
   }
   if (!any) return {};
-  return subsection("Paths that take longer") + table.html() +
+  return subsection("Paths that take longer") + table.html("Delays of the paths") +
          paragraph(
              "Shaped: the links' path convolved with impulses that leave the model's modes at rest. It starts and ends "
              "where it did. Where it turns between two stops it is cut short. Slower: the same path in the same longer "
@@ -81,7 +81,7 @@ std::string vibration_section(const ReportInput&, const nlohmann::json& file) {
                  move.still_s ? milliseconds(*move.still_s) : none,
                  number(move.roughness, 2)});
     }
-    out += subsection(std::string("Moves: ") + kind) + table.html();
+    out += subsection(std::string("Moves: ") + kind) + table.html(std::string("Figures of moves: ") + kind);
   }
   Table ratios({{"feedforward"},
                 {"computed in"},
@@ -107,7 +107,8 @@ std::string vibration_section(const ReportInput&, const nlohmann::json& file) {
                 ratio("rigid", "tracking_motor"),
                 ratio("rigid", "tracking_link")});
   }
-  out += subsection("All moves, against the PD alone and the rigid body") + ratios.html() + paths(vibration.methods);
+  out += subsection("All moves, against the PD alone and the rigid body") + ratios.html("Ratios") +
+         paths(vibration.methods);
   return out + paragraph(
                    "Motor, link: RMS of the position error while it moves, the motor's against what it was asked for, "
                    "the link's against the links' reference. With the motors' reference they are asked to be ahead by "

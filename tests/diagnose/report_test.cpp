@@ -90,7 +90,7 @@ TEST(DiagnosisReport, IsInTheReportWithPlotsAndTheReportSurvivesWithoutIt) {
         "Gaps on test logs", "as a whole: gravity_tilt", "slow reversals of joint 1",
         "shoulder: residual before and after"})
     EXPECT_NE(page.find(part), std::string::npos) << part;
-  EXPECT_EQ(count(page, "residual before and after"), 2U);
+  EXPECT_EQ(count(page, "residual before and after</figcaption>"), 2U);
   EXPECT_NE(summary_table(run.out).find("diagnosis: unexplained"), std::string::npos);
 }
 

@@ -77,6 +77,7 @@ INSTANTIATE_TEST_SUITE_P(
             robot + log + "[[log]]\nfile = \"copy.csv\"\nrole = \"validate\"\n",
             {":6:", "overlaps the log in line 3", "same content under another name"}},
         Bad{"time_unit", robot + log + "time_unit = \"nsec\"\n", {":6:", "unknown unit of time 'nsec'", "'ns'"}},
+        Bad{"good_enough", robot + "[report]\ngood_enough = 1.5\n" + log, {":4:", "share of rated torque"}},
         Bad{"accept_error", robot + "[target]\naccept_error = 5\n" + log, {":4:", "share of rated torque"}},
         Bad{"torque_gain", robot + log + "torque_gain = [1]\n", {":6:", "has 1 values, expected 2"}},
         Bad{"method",
@@ -166,6 +167,8 @@ board = "stm32g474"
 tick_s = 0.001
 accept_error = 0.02
 joints = "all"
+[report]
+good_enough = 0.03
 )");
   const Project project = read_project(file);
   EXPECT_EQ(project.robot.size(), 2U);
@@ -214,6 +217,7 @@ joints = "all"
   EXPECT_EQ(pso.ridge, (std::array{1e-3, 1e-2}));
   EXPECT_EQ(project.target.board, "stm32g474");
   EXPECT_EQ(project.target.accept_error, 0.02);
+  EXPECT_EQ(project.report.good_enough, 0.03);
   EXPECT_EQ(project.logs[0].format.time_unit_s, 1e-6);
   EXPECT_EQ(project.logs[1].format.time_unit_s, 1e-9);  // the default of [signals]
 }
