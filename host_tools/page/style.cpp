@@ -54,8 +54,8 @@ td.bad { background: var(--bad); } td.good { background: var(--good); } td.amber
 }
 @media print {
   @page { size: A4; margin: 12mm; }
-  body { font-size: 8.5pt; line-height: 1.3; max-width: none; padding: 0; } nav, .skip { display: none; }
-  h2 { margin-top: 1em; } h2, h3, figcaption, caption { break-after: avoid; } h3 { margin-top: .7em; }
+  body { font-size: 8pt; line-height: 1.25; max-width: none; padding: 0; } nav, .skip { display: none; }
+  p { max-width: none; } h2 { margin-top: 1em; } h2, h3, figcaption, caption { break-after: avoid; } h3 { margin-top: .7em; }
   .scroll { overflow: visible; } table { font-size: 6.6pt; width: 100%; margin: .3em 0; }
   th, td { padding: .12em .35em; min-width: 3.4em; } tbody th { min-width: 4.6em; } td.n { white-space: normal; } thead th { overflow-wrap: anywhere; }
   tr, figure, ol.joints li { break-inside: avoid; } thead { display: table-header-group; }
