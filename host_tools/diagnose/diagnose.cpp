@@ -229,13 +229,9 @@ class Diagnoser {
     if (const auto fault = likely_recording_fault(nominal, logs_, outcome)) throw DataError(fault->complaint);
   }
   std::size_t joints() const { return project_.robot.size(); }
-  /// On the logs that judge, by more than a name may raise the error.
   bool is_worse_anywhere(const IdentifiedModel& before, const IdentifiedModel& after) const {
-    const VectorXd of_before = plain_error(before, logs_), of_after = plain_error(after, logs_);
-    for (Index j = 0; j < of_after.size(); ++j) {
-      if (is_worse(options().gate, of_before, of_after, j)) return true;
-    }
-    return false;
+    const std::vector<bool> harmed = harmed_joints(options().gate, before, after, logs_);
+    return std::find(harmed.begin(), harmed.end(), true) != harmed.end();
   }
   const Options& options() const { return models_.options; }
   std::vector<VectorXd> plain() const { return std::vector<VectorXd>(joints(), VectorXd::Zero(1)); }

@@ -291,10 +291,13 @@ std::size_t weakest(const Gate& gate, const Outcome& outcome, const VectorXd& be
 
 }  // namespace
 
-VectorXd plain_error(const IdentifiedModel& model, const std::vector<SessionLog>& logs) {
+namespace {
+
+/// Squares of the filtered error on today's logs that fit, or on those that judge only.
+VectorXd squares_of(const IdentifiedModel& model, const std::vector<SessionLog>& logs, bool fitted) {
   std::vector<VectorXd> squares(logs.size());
   parallel_for(logs.size(), [&](std::size_t l) {
-    if (logs[l].fits) return;
+    if (logs[l].fits != fitted || logs[l].healthy) return;
     const ProcessedLog& log = logs[l].log;
     const MatrixXd error = log.filter_columns(log.tau - predict(model, log));
     squares[l] = error.middleRows(log.first, log.last - log.first).colwise().squaredNorm().transpose();
@@ -304,6 +307,22 @@ VectorXd plain_error(const IdentifiedModel& model, const std::vector<SessionLog>
     if (square.size() > 0) sum = sum.size() > 0 ? VectorXd(sum + square) : square;
   }
   return sum;
+}
+
+}  // namespace
+
+VectorXd plain_error(const IdentifiedModel& model, const std::vector<SessionLog>& logs) {
+  return squares_of(model, logs, false);
+}
+
+std::vector<bool> harmed_joints(const GateOptions& options, const IdentifiedModel& before, const IdentifiedModel& after,
+                                const std::vector<SessionLog>& logs) {
+  const bool validated = std::any_of(logs.begin(), logs.end(), [](const SessionLog& log) { return !log.fits; });
+  const VectorXd of_before = squares_of(before, logs, !validated), of_after = squares_of(after, logs, !validated);
+  const double most = validated ? options.worse : options.worse_fitted;
+  std::vector<bool> out;
+  for (Index j = 0; j < of_after.size(); ++j) out.push_back(of_after[j] > most * most * of_before[j]);
+  return out;
 }
 
 bool is_worse(const GateOptions& options, const VectorXd& before, const VectorXd& after, Index joint) {
@@ -388,11 +407,11 @@ Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<Se
 
 std::optional<EffectId> harmful_finding(const Outcome& outcome, const IdentifiedModel& before,
                                         const IdentifiedModel& after, const std::vector<SessionLog>& logs) {
-  const VectorXd of_before = plain_error(before, logs), of_after = plain_error(after, logs);
-  for (Index j = 0; j < of_after.size(); ++j) {
-    if (!is_worse(outcome.models.options.gate, of_before, of_after, j)) continue;
+  const std::vector<bool> harmed = harmed_joints(outcome.models.options.gate, before, after, logs);
+  for (std::size_t j = 0; j < harmed.size(); ++j) {
+    if (!harmed[j]) continue;
     const auto rank = [&](const Finding& f) {
-      const int distance = f.id.body ? 1 : static_cast<Index>(f.id.joint) == j ? 0 : 2;
+      const int distance = f.id.body ? 1 : f.id.joint == j ? 0 : 2;
       return std::pair(distance, f.score);
     };
     const auto first = std::min_element(outcome.found.begin(), outcome.found.end(),

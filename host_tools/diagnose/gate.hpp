@@ -61,6 +61,12 @@ Eigen::VectorXd plain_error(const IdentifiedModel& model, const std::vector<Sess
 bool is_worse(const GateOptions& options, const Eigen::VectorXd& before, const Eigen::VectorXd& after,
               Eigen::Index joint);
 
+/// By joint: whether a model errs more there than the one before. On the validate logs by more than a name may raise
+/// the error; where there are none, on the train logs by more than a fit of them can: blocks judge fits that are
+/// linear, and so none that lost its way (a shape without a hold, two columns that are nearly one).
+std::vector<bool> harmed_joints(const GateOptions& options, const IdentifiedModel& before, const IdentifiedModel& after,
+                                const std::vector<SessionLog>& logs);
+
 /// Judges each fold by a fit of the others; time constants of drift are chosen by that, and names that do not hold are
 /// taken out of the outcome one by one: those that bring nothing; those at joints whose plain error on the validate
 /// logs is larger than that of `nominal` (rows near standstill, of which the search believes little, count there too),
@@ -70,9 +76,8 @@ bool is_worse(const GateOptions& options, const Eigen::VectorXd& before, const E
 Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs,
           const std::vector<bool>& still);
 
-/// Where a model errs more than the one before at a joint, on the validate logs, by more than a name may raise it: the
-/// finding there with the least score, else one on the robot, else one at another joint. None: it does not, or nothing
-/// was found.
+/// Where a model errs more than the one before at a joint (harmed_joints()): the finding there with the least score,
+/// else one on the robot, else one at another joint. None: it does not, or nothing was found.
 std::optional<EffectId> harmful_finding(const Outcome& outcome, const IdentifiedModel& before,
                                         const IdentifiedModel& after, const std::vector<SessionLog>& logs);
 /// Takes a finding out of the outcome and fits what is left again.

@@ -129,6 +129,9 @@ struct GateOptions {
   double least_share_in_structure = 0.02;
   /// times the plain error before; a name may raise it so far; hand
   double worse = 1.02;
+  /// times the plain error before, on train logs, where no others judge; what is worse is no fit of them; hand: names
+  /// are fitted to whitened rows, which may cost some of the error in the whole band
+  double worse_fitted = 1.1;
   /// share of the gap above the noise; what a name closes; hand: more than is left. Likewise of what a free curve of
   /// its variable closes in its place
   double least_closure = 0.5;

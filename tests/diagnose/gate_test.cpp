@@ -163,6 +163,19 @@ TEST_F(NamesWithoutValidation, GoWhereTheyRaiseItMoreThanTheyMay) {
   EXPECT_TRUE(pass(outcome_, nominal_, logs_, still_).groups.empty());
 }
 
+TEST_F(NamesWithoutValidation, GoWhereTheWholeModelNoLongerFitsTheTrainLogs) {
+  EXPECT_FALSE(harmful_finding(outcome_, nominal_, outcome_.models.current, logs_));
+  IdentifiedModel lost = outcome_.models.current;
+  lost.joints[1].effects.back().linear = {-0.5, -0.2};
+  const std::optional<EffectId> gone = harmful_finding(outcome_, nominal_, lost, logs_);
+  ASSERT_TRUE(gone);
+  EXPECT_EQ(gone->joint, 1U);
+  // What validate logs bear out counts, whatever the train logs say.
+  logs_[1].fits = false;
+  EXPECT_EQ(harmed_joints(outcome_.models.options.gate, nominal_, outcome_.models.current, logs_),
+            std::vector<bool>(6, false));
+}
+
 /// A large ripple and, beside it at the same joint, one with half a percent of its power.
 class ASmallNameBesideALargeOne : public testing::Test {
  protected:
