@@ -192,8 +192,8 @@ struct ReportOptions {
   double upright = 1e-3;
   /// share of the gap less share of the samples; a region that is listed beside the first; hand
   double least_contrast = 0.15;
-  /// chance; an error that has nothing to do with the motion makes as clear a region of any signal; theory: the clearest
-  /// of 49 errors, each shifted in time against the motion (time: the same spectrum, stationary)
+  /// chance; an error that has nothing to do with the motion makes as clear a region of any signal; theory: the
+  /// clearest of 49 errors, each shifted in time against the motion (time: the same spectrum, stationary)
   double region_chance = 0.02;
   /// share of the evidence; by which another joint's position has to be clearer than the joint's own motion, which it
   /// follows on a planned motion; hand

@@ -59,7 +59,8 @@ DiagnosisResult example() {
   moving.carries_over = false;
   moving.closure = 0.83;
   moving.left = GapLeft{0.2, 0.1, 0.3};
-  moving.where = {"61 % of the gap is slow", {{"q", 2, -0.05, 0.05, 0.61, 0.08, ""}, {"t", 0, 3, 3.1, {}, {}, "b.csv"}}};
+  moving.where = {"61 % of the gap is slow",
+                  {{"q", 2, -0.05, 0.05, 0.61, 0.08, ""}, {"t", 0, 3, 3.1, {}, {}, "b.csv"}}};
   moving.effects = {stribeck, bends};
   moving.undecided = {{"presliding", "lugre"}};
   moving.not_identifiable = {"spring"};
