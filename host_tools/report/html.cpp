@@ -2,6 +2,7 @@
 
 #include "host_tools/effects/model_parts.hpp"
 #include "host_tools/page/page.hpp"
+#include "host_tools/regression/metrics_result.hpp"
 #include "host_tools/report/report.hpp"
 #include "host_tools/report/results.hpp"
 #include "host_tools/report/section.hpp"

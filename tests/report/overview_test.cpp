@@ -47,7 +47,7 @@ struct Page {
     }
     results.files["metrics"] = to_json(metrics);
   }
-  ReportInput input() const { return {model, to_json(model), logs, results, directory, settings}; }
+  ReportInput input() const { return {model, logs, results, directory, settings}; }
   std::vector<JointAnswer> answers() const { return joint_answers(input()); }
   std::string section() const {
     const auto sections = report_sections();
