@@ -31,7 +31,8 @@ Action add_excite(CLI::App& verb) {
                 "no project: the trajectory of the paper's Table 1, as printed and corrected")
       ->excludes(project);
   verb.add_option("--after", options->after,
-                  "results of `diagnose`: plan 10 to 20 s of motion that decide what it left open");
+                  "results of `diagnose`: plan one or two motions that decide what it left open")
+      ->needs(project);
   verb.add_option("--out", options->out, "directory for the results")->required();
   return [options] {
     if (!options->paper && options->project.empty())

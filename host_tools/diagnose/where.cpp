@@ -55,6 +55,8 @@ class Classes {
     }
   }
 
+  double from() const { return from_; }
+
   /// The interval with the largest share of the power beyond its share of the samples.
   Region clearest(const VectorXd& power, double whole, double samples) const {
     Region best;
@@ -137,6 +139,8 @@ std::vector<Region> in_motion(const Samples& samples, double chance) {
     Region region = classes.back().clearest(samples.power, whole, count);
     region.signal = signal.name;
     region.joint = signal.joint;
+    // The slowest class has all that is slower, too.
+    if (signal.name == "speed" && region.from <= classes.back().from()) region.from = 0;
     regions.push_back(region);
   }
   double by_chance = 0;
@@ -191,19 +195,30 @@ Samples samples_of(const std::vector<const ProcessedLog*>& logs, std::size_t joi
   return out;
 }
 
+/// The largest length up to `rows` without prime factors beyond 5, which the transform is slow with: at most a few per
+/// cent are left over.
+Index quick_length(Index rows) {
+  for (Index length = rows; length > 1; --length) {
+    Index rest = length;
+    for (const Index prime : {2, 3, 5}) {
+      while (rest % prime == 0) rest /= prime;
+    }
+    if (rest == 1) return length;
+  }
+  return 1;
+}
+
 /// An error of the same spectrum in each log, and the same everywhere: its lines with phases drawn at random.
 VectorXd stationary(const Samples& samples, Random& random) {
   VectorXd out(samples.error.size());
   Eigen::FFT<double> fft;
   for (std::size_t l = 0; l < samples.first.size(); ++l) {
     const Index first = samples.first[l], rows = samples.rows(l);
-    // The transform is slow where a length has large prime factors.
-    Index length = 1;
-    while (2 * length <= rows) length *= 2;
+    const Index length = quick_length(rows);
     std::vector<double> x(samples.error.data() + first, samples.error.data() + first + length);
     std::vector<std::complex<double>> lines;
     fft.fwd(lines, x);
-    for (std::size_t k = 1; k < lines.size() / 2; ++k) {
+    for (std::size_t k = 1; 2 * k < lines.size(); ++k) {
       lines[k] = std::polar(std::abs(lines[k]), random.uniform(0, 2 * std::numbers::pi));
       lines[lines.size() - k] = std::conj(lines[k]);
     }
@@ -276,8 +291,13 @@ GapPlace where(const Robot& robot, std::size_t index, const std::vector<const Pr
   std::vector<Region> regions = in_motion(samples, options.region_chance);
   for (Region& region : regions) {
     // All of one sign, not the edge of an interval.
-    if (region.signal == "direction") (region.to > 0 ? region.from : region.to) = 0;
+    // Rows at rest may have come along.
+    if (region.signal == "direction")
+      region = {
+          region.signal,  0,         region.from < -0.5 ? -1.0 : 0.0, region.from < -0.5 ? 0.0 : 1.0, region.share,
+          region.of_time, region.log};
   }
+  std::erase_if(regions, [&](const Region& r) { return r.contrast() < options.least_contrast; });
   // What another joint's position explains, its own motion may explain as well: the joint's own is told first.
   std::sort(regions.begin(), regions.end(), [&](const Region& a, const Region& b) {
     const auto rank = [&](const Region& r) { return r.evidence() * (r.joint > 0 ? 1 - options.other_joint : 1); };
@@ -287,9 +307,10 @@ GapPlace where(const Robot& robot, std::size_t index, const std::vector<const Pr
   if (regions.empty()) regions = in_time(logs, samples, options.region_chance);
   if (regions.empty() || regions.front().contrast() < options.least_contrast)
     regions = {in_frequency(logs, error, noise)};
+  std::erase_if(regions, [&](const Region& r) { return r.contrast() < options.least_contrast; });
   GapPlace out;
   for (const Region& region : regions) {
-    if (out.regions.size() >= most_regions || region.contrast() < options.least_contrast) break;
+    if (out.regions.size() >= most_regions) break;
     out.regions.push_back(
         {region.signal, region.joint, region.from, region.to, std::min(1.0, region.share), region.of_time, region.log});
   }

@@ -25,8 +25,10 @@ std::string between(const GapRegion& region, const std::string& unit) {
 /// A log's first or last seconds, where the interval begins or ends within a class of 24 of its end; else a time of its
 /// clock.
 std::string words_of_time(const GapRegion& region, const std::vector<const ProcessedLog*>& logs) {
-  const auto found =
-      std::find_if(logs.begin(), logs.end(), [&](const ProcessedLog* log) { return log->name == region.log; });
+  const auto found = std::find_if(logs.begin(), logs.end(), [&](const ProcessedLog* log) {
+    // Two windows of one file are two logs of one name.
+    return log->name == region.log && log->t[log->first] <= region.from && region.from <= log->t[log->last - 1];
+  });
   const ProcessedLog& log = found == logs.end() ? *logs.front() : **found;
   const std::string of = region.log.empty() ? "" : " of " + region.log;
   const double first = log.t[log.first], last = log.t[log.last - 1], near_s = (last - first) / 24;
@@ -60,9 +62,9 @@ std::string words_of(const GapRegion& region, const Robot& robot, std::size_t jo
                        between(region, robot.joints[region.joint - 1].position_unit()));
   if (region.signal == "q") return between(region, position);
   const std::string velocity = position + "/s";
-  // The slowest class of 24 begins within itself; an interval of the velocity around zero is one of slow motion.
+  // An interval of the velocity around zero is one of slow motion, too.
   const bool around_zero = std::min(-region.from, region.to) > 0.5 * std::max(-region.from, region.to);
-  if ((region.signal == "speed" && region.from < region.to / 24) || (region.signal == "dq" && around_zero))
+  if ((region.signal == "speed" && region.from <= 0) || (region.signal == "dq" && around_zero))
     return words_of_speed(std::max(-region.from, region.to), joint, velocity, logs);
   if (region.signal == "dq") return "at velocities " + between(region, velocity);
   if (region.signal == "speed") return "at speeds " + between(region, velocity);
@@ -74,7 +76,7 @@ std::string words_of(const GapRegion& region, const Robot& robot, std::size_t jo
 
 std::string sentence_of(const std::vector<GapRegion>& regions, const Robot& robot, std::size_t joint,
                         const std::vector<const ProcessedLog*>& logs) {
-  if (regions.empty()) return "the gap is the same everywhere in these logs";
+  if (regions.empty()) return {};
   const GapRegion& first = regions.front();
   std::string out =
       fmt::format("{:.0f} % of the gap is {}", 100 * *first.share_of_gap, words_of(first, robot, joint, logs));

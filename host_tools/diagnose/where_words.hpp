@@ -16,7 +16,7 @@ std::string words_of(const GapRegion& region, const Robot& robot, std::size_t jo
                      const std::vector<const ProcessedLog*>& logs);
 
 /// The clearest region and its shares: "83 % of the gap is between 0.85 and 1.05 rad, in 12 % of the time". Where there
-/// is none: that the gap is the same everywhere.
+/// is none: nothing.
 std::string sentence_of(const std::vector<GapRegion>& regions, const Robot& robot, std::size_t joint,
                         const std::vector<const ProcessedLog*>& logs);
 

@@ -30,10 +30,9 @@ constexpr double step_s = 0.01;  ///< of motions that are only judged
 /// Of a violation, as a share of what all questions are worth: no optimum lies beyond a limit.
 constexpr double penalty = 10;
 
-/// What a motion shows: information on all columns, and seconds within the places.
+/// What a motion shows: information on all columns, and seconds within the parts of each place (a row each).
 struct Shown {
-  MatrixXd gram;
-  VectorXd seconds;
+  MatrixXd gram, seconds;
 };
 
 class NextPlanner {
@@ -65,7 +64,7 @@ class NextPlanner {
     }
     progress_.done();
     if (!questions_.effects.empty()) out_.odds = odds(so_far.gram);
-    out_.seconds = so_far.seconds;
+    out_.seconds = covered(so_far);
     out_.usual = usual(out_.trajectories.size());
     return std::move(out_);
   }
@@ -100,9 +99,9 @@ class NextPlanner {
       candidates_.push_back(own);
       if (!q.rival.empty()) {
         for (const auto& shape :
-             typical_shapes(q.rival, own.joint, model_.robot, fast, {columns.torque()}, {columns.structural()})) {
+             typical_shapes(q.rival, q.rival_joint, model_.robot, fast, {columns.torque()}, {columns.structural()})) {
           of.rivals.push_back(candidates_.size());
-          candidates_.push_back({q.rival, own.joint, shape});
+          candidates_.push_back({q.rival, q.rival_joint, shape});
         }
       }
       columns_.push_back(std::move(of));
@@ -134,7 +133,7 @@ class NextPlanner {
 
   Shown nothing() const {
     const Index size = blocks_.back().first + blocks_.back().count;
-    return {MatrixXd::Zero(size, size), VectorXd::Zero(static_cast<Index>(questions_.places.size()))};
+    return {MatrixXd::Zero(size, size), MatrixXd::Zero(static_cast<Index>(questions_.places.size()), options_.parts)};
   }
   static Shown sum(const Shown& a, const Shown& b) { return {a.gram + b.gram, a.seconds + b.seconds}; }
 
@@ -142,22 +141,45 @@ class NextPlanner {
     Shown out = nothing();
     if (!questions_.effects.empty())
       out.gram = Information(model_, {motion}, noise_, model_.filter.torque_cutoff_hz, candidates_).gram;
-    for (std::size_t i = 0; i < questions_.places.size(); ++i) {
-      const PlaceQuestion& place = questions_.places[i];
-      const auto j = static_cast<Index>(place.joint);
-      for (Index k = 0; k < motion.q.rows(); ++k) {
-        const double value = place.signal == "q"    ? motion.q(k, j)
-                             : place.signal == "dq" ? motion.dq(k, j)
-                                                    : std::fabs(motion.dq(k, j));
-        if (value >= place.from && value <= place.to) out.seconds[static_cast<Index>(i)] += motion.step_s;
-      }
-    }
+    for (std::size_t i = 0; i < questions_.places.size(); ++i)
+      visit(motion, questions_.places[i], out.seconds.row(static_cast<Index>(i)));
     return out;
+  }
+
+  /// Adds the seconds that a moving joint is in each part of a place.
+  void visit(const Motion& motion, const PlaceQuestion& place, Eigen::Ref<Eigen::RowVectorXd> seconds) const {
+    const auto j = static_cast<Index>(place.of_joint);
+    const VectorXd values = place.signal == "q"       ? motion.q.col(j)
+                            : place.signal == "dq"    ? motion.dq.col(j)
+                            : place.signal == "ddq"   ? motion.ddq.col(j)
+                            : place.signal == "speed" ? VectorXd(motion.dq.col(j).cwiseAbs())
+                                                      : VectorXd(motion.dq.col(j).cwiseSign());
+    const double standing = options_.standing * feasible_.check().limits().velocity[j];
+    for (Index k = 0; k < values.size(); ++k) {
+      const double part = (values[k] - place.from) / (place.to - place.from) * static_cast<double>(options_.parts);
+      if (std::fabs(motion.dq(k, j)) < standing || !(part >= 0) || part > static_cast<double>(options_.parts)) continue;
+      // The direction has one value in its interval.
+      const Index first = place.signal == "direction" ? 0 : std::min(static_cast<Index>(part), options_.parts - 1);
+      const Index last = place.signal == "direction" ? options_.parts - 1 : first;
+      for (Index p = first; p <= last; ++p) seconds[p] += motion.step_s / static_cast<double>(last - first + 1);
+    }
+  }
+
+  /// Seconds within each place, in no part more than its share.
+  VectorXd covered(const Shown& shown) const {
+    return shown.seconds.cwiseMin(options_.enough_s / static_cast<double>(options_.parts)).rowwise().sum();
   }
 
   /// log10 of the odds that each question would be decided with.
   VectorXd odds(const MatrixXd& gram) const {
-    const MatrixXd left = information_left(gram, gram(nominal_, Eigen::all), gram(nominal_, nominal_));
+    MatrixXd nuisance = gram(nominal_, nominal_);
+    if (questions_.known_base) {
+      const Index base = blocks_.front().first, friction = nuisance.rows() - base;
+      nuisance.topLeftCorner(base, base) +=
+          information_left(nuisance.topLeftCorner(base, base), nuisance.bottomLeftCorner(friction, base),
+                           nuisance.bottomRightCorner(friction, friction));
+    }
+    const MatrixXd left = information_left(gram, gram(nominal_, Eigen::all), nuisance);
     VectorXd out(static_cast<Index>(columns_.size()));
     for (std::size_t i = 0; i < columns_.size(); ++i) {
       const auto own = here(columns_[i].effect);
@@ -184,16 +206,23 @@ class NextPlanner {
       for (const Draw& one : draws_) most = most.cwiseMax(odds(one.shown.gram));
     }
     for (const double odds : most) out_.hopeless.push_back(odds < options_.hopeless);
-    asked_ = questions_.places.size() +
-             static_cast<std::size_t>(std::count(out_.hopeless.begin(), out_.hopeless.end(), false));
+    VectorXd longest = VectorXd::Zero(static_cast<Index>(questions_.places.size()));
+    for (const Draw& one : draws_) longest = longest.cwiseMax(covered(one.shown));
+    for (const double seconds : longest) out_.hopeless_places.push_back(seconds <= 0);
+    for (const auto* hopeless : {&out_.hopeless, &out_.hopeless_places})
+      asked_ += static_cast<std::size_t>(std::count(hopeless->begin(), hopeless->end(), false));
   }
 
   bool is_decided(const Shown& shown) const {
-    const VectorXd reached = odds(shown.gram);
+    const VectorXd reached = questions_.effects.empty() ? VectorXd() : odds(shown.gram);
     for (std::size_t i = 0; i < out_.hopeless.size(); ++i) {
       if (!out_.hopeless[i] && reached[static_cast<Index>(i)] < options_.enough) return false;
     }
-    return questions_.places.empty() || shown.seconds.minCoeff() >= options_.enough_s;
+    const VectorXd seconds = covered(shown);
+    for (std::size_t i = 0; i < out_.hopeless_places.size(); ++i) {
+      if (!out_.hopeless_places[i] && seconds[static_cast<Index>(i)] < options_.enough_s) return false;
+    }
+    return true;
   }
 
   /// Mean over the questions of how far each is decided, 0 .. 1; the root makes the first odds worth most. Beyond what
@@ -208,7 +237,7 @@ class NextPlanner {
         if (!out_.hopeless[i]) sum += std::sqrt(std::min(one, 1.0)) + beyond * std::log1p(one);
       }
     }
-    sum += (shown.seconds / options_.enough_s).cwiseMin(1.0).sum();
+    sum += covered(shown).sum() / options_.enough_s;
     return sum / static_cast<double>(asked_);
   }
 
@@ -226,6 +255,7 @@ class NextPlanner {
 
   Draw search(const Shown& so_far, std::size_t m) {
     std::vector<double> worths;
+    worths.reserve(draws_.size());
     for (const Draw& one : draws_) worths.push_back(worth(sum(so_far, one.shown)));
     const auto at = std::max_element(worths.begin(), worths.end());
     Draw best = draws_[static_cast<std::size_t>(at - worths.begin())];
@@ -274,6 +304,7 @@ class NextPlanner {
     VectorXd out(all.front().size());
     for (Index i = 0; i < out.size(); ++i) {
       std::vector<double> values;
+      values.reserve(all.size());
       for (const VectorXd& one : all) values.push_back(one[i]);
       std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
       out[i] = values[values.size() / 2];

@@ -19,22 +19,27 @@ struct EffectQuestion {
   EffectCandidate effect;        ///< with the shape that was found, or a typical one
   Eigen::VectorXd coefficients;  ///< of its columns, as found; empty: such that its torque is `share` of rated (RMS)
   double share = 0;              ///< of the rated torque
-  std::string rival;             ///< another effect at the same joint, or on the robot; empty: nothing
+  std::string rival;             ///< another effect; empty: nothing
+  std::size_t rival_joint = 0;   ///< from 0; no meaning for effects on the body
   std::optional<double> odds_so_far;  ///< log10, of the logs that were diagnosed
   std::string why;                    ///< likely, undecided, not_identifiable
 };
 
 /// A joint that no effect explains, and where its gap sits.
 struct PlaceQuestion {
-  std::size_t joint = 0;  ///< from 0
-  std::string signal;     ///< q, dq, speed
+  std::size_t joint = 0;     ///< from 0
+  std::size_t of_joint = 0;  ///< whose motion it is; the joint's own, or another one's position
+  std::string signal;        ///< q, dq, speed, ddq, direction
   double from = 0, to = 0;
 };
 
 struct OpenQuestions {
   std::vector<EffectQuestion> effects;
   std::vector<PlaceQuestion> places;
-  bool empty() const { return effects.empty() && places.empty(); }
+  std::vector<std::string> unplanned;  ///< open, but nothing that motion can be planned for: sentences
+  bool known_base =
+      false;  ///< a healthy session of the same motions tells the base parameters, its friction fitted apart
+  bool empty() const { return effects.empty() && places.empty() && unplanned.empty(); }
 };
 
 struct NextMotionOptions {
@@ -42,8 +47,12 @@ struct NextMotionOptions {
   double enough = 6;
   /// log10 odds that no drawn motion reaches: motion alone does not decide it; hand
   double hopeless = 0.1;
-  /// s; motion within a place beyond which more is worth nothing; some ten independent samples at 1 Hz
+  /// s; motion within a place beyond which more is worth nothing, the same in each part of it; some ten independent
+  /// samples at 1 Hz
   double enough_s = 5;
+  Eigen::Index parts = 5;  ///< of a place
+  /// share of the joint's velocity limit; below it the joint stands, and shows one point of its place; hand
+  double standing = 1e-3;
   std::size_t draws = 24;        ///< random motions of each kind, to choose from
   int generations = 12;          ///< of the search about the best one
   std::size_t most_motions = 2;  ///< of period_s each
@@ -52,10 +61,11 @@ struct NextMotionOptions {
 /// What the planned motions decide.
 struct NextMotions {
   std::vector<PlannedTrajectory> trajectories;
-  Eigen::VectorXd odds;        ///< expected log10 odds of each effect question, of these motions alone
-  Eigen::VectorXd usual;       ///< the same of the random motion in the middle, of as many seconds
-  std::vector<bool> hopeless;  ///< no motion decides this question: nothing is planned for it
-  Eigen::VectorXd seconds;     ///< within each place
+  Eigen::VectorXd odds;               ///< expected log10 odds of each effect question, of these motions alone
+  Eigen::VectorXd usual;              ///< the same of the random motion in the middle, of as many seconds
+  std::vector<bool> hopeless;         ///< no drawn motion shows this question: nothing is planned for it
+  std::vector<bool> hopeless_places;  ///< no drawn motion comes there
+  Eigen::VectorXd seconds;  ///< within each place, at most options.enough_s / options.parts in each part of it
   std::vector<std::string> notes;
 };
 

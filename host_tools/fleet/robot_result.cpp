@@ -61,6 +61,7 @@ std::vector<FoundEffect> found_effects_of(const json& file) {
 
 std::vector<FoundEffect> found_in(const std::vector<NamedEffect>& effects) {
   std::vector<FoundEffect> out;
+  out.reserve(effects.size());
   for (const NamedEffect& e : effects) out.push_back({e.effect, e.established, e.odds_nothing, e.parameters});
   return out;
 }

@@ -65,11 +65,11 @@ std::vector<std::string> split(const std::string& all) {
 
 /// What diagnosis proposes for a joint (from 1): of "a or b at joint 3: constant speeds" what follows the colon.
 std::string experiment_for(const std::string& all, std::size_t joint) {
-  const std::string at = fmt::format("at joint {}: ", joint), more = fmt::format("record more of joint {} ", joint);
+  const std::string at = fmt::format("at joint {}: ", joint), more = fmt::format("record more of joint {}", joint);
   std::string out;
   for (const std::string& part : split(all)) {
     if (const std::size_t found = part.find(at); found != std::string::npos) return part.substr(found + at.size());
-    if (part.starts_with(more)) out = "record more motion there";
+    if (part == more || part.starts_with(more + ",")) out = "record more motion there";
   }
   return out;
 }

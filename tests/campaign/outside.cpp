@@ -93,7 +93,7 @@ std::optional<Place> place_of(const Outside& o) {
   Constants constants(o);
   if (o.effect == "tight_spot") {
     const Spot spot = spot_of(o, constants.random);
-    return Place{"q", spot.centre - spot.width, spot.centre + spot.width};  // 84 % of its power
+    return Place{"q", spot.centre - spot.width, spot.centre + spot.width};  // 95 % of its power
   }
   if (o.effect == "end_stop") return Place{"q", stop_of(o, constants.random), o.high};
   return {};

@@ -66,5 +66,5 @@ refused() {
   [ ! -e refused/excite.json ] || fail "written: $*"
 }
 refused 'missing; --after takes the --out of' before.toml --after nowhere
-refused "is of the project 'after.toml', not of 'before.toml'" before.toml --after after
+refused "is of the project 'after.toml', or of another robot, not of 'before.toml'" before.toml --after after
 echo passed

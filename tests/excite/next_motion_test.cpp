@@ -23,7 +23,7 @@ class NextMotion : public testing::Test {
     return plan_next(project_, model_, questions, Eigen::Vector2d(0.3, 0.1), "/nonexistent", progress, options_);
   }
   static EffectQuestion viscous_or(const std::string& rival, double coefficient) {
-    return {{"viscous_quadratic", 1, {}}, Eigen::VectorXd::Constant(1, coefficient), 0, rival, {}, "likely"};
+    return {{"viscous_quadratic", 1, {}}, Eigen::VectorXd::Constant(1, coefficient), 0, rival, 1, {}, "likely"};
   }
 
   Project project_ =
@@ -57,21 +57,40 @@ TEST_F(NextMotion, IsBetterThanTheUsualOne) {
 }
 
 TEST_F(NextMotion, PlansNothingForWhatMotionDoesNotDecide) {
-  const NextMotions next = plan({{{{"payload", 0, {}}, {}, 0.01, "", {}, "not_identifiable"}}, {}});
+  const NextMotions next = plan({{{{"payload", 0, {}}, {}, 0.01, "", 0, {}, "not_identifiable"}}, {}});
   EXPECT_TRUE(next.hopeless[0]);
   EXPECT_TRUE(next.trajectories.empty());
 }
 
 TEST_F(NextMotion, StaysWhereTheGapSits) {
-  const PlaceQuestion place{1, "speed", 0, 0.05};
+  const PlaceQuestion place{1, 1, "q", 0.2, 0.4};
   const NextMotions next = plan({{}, {place}});
   ASSERT_FALSE(next.trajectories.empty());
-  double seconds = 0;
+  // All of the interval, not one point of it.
+  double lowest = 1, highest = 0;
   for (const PlannedTrajectory& one : next.trajectories) {
-    for (Eigen::Index k = 0; k < one.dq.rows(); ++k) seconds += std::fabs(one.dq(k, 1)) <= 0.05 ? one.step_s : 0;
+    for (const double q : one.q.col(1)) {
+      if (q < 0.2 || q > 0.4) continue;
+      lowest = std::min(lowest, q);
+      highest = std::max(highest, q);
+    }
   }
-  EXPECT_NEAR(seconds, next.seconds[0], 0.1);
-  EXPECT_GE(seconds, options_.enough_s);
+  EXPECT_LT(lowest, 0.22);
+  EXPECT_GT(highest, 0.38);
+  EXPECT_GT(next.seconds[0], 0.6 * options_.enough_s);
+}
+
+TEST_F(NextMotion, SaysSoWhereNoMotionComes) {
+  const NextMotions next = plan({{}, {{1, 1, "q", 90, 91}}});
+  EXPECT_TRUE(next.hopeless_places[0]);
+  EXPECT_TRUE(next.trajectories.empty());
+}
+
+TEST_F(NextMotion, AHealthySessionTellsALoadFromTheLastLink) {
+  OpenQuestions questions{{{{"payload", 0, {}}, {}, 0.05, "", 0, {}, "likely"}}, {}};
+  EXPECT_TRUE(plan(questions).hopeless[0]);
+  questions.known_base = true;
+  EXPECT_FALSE(plan(questions).hopeless[0]);
 }
 
 }  // namespace

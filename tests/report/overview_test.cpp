@@ -33,7 +33,7 @@ struct Page {
     results.role = "test";
     results.files["diagnosis"] = test::diagnosis();
     results.files["diagnosis"]["next_experiment"] =
-        "record more of joint 2 where the gap sits (dq from 0 to 1); presliding or lugre at joint 2: slow reversals; "
+        "record more of joint 2, at reversals, below 0.1 rad/s; presliding or lugre at joint 2: slow reversals; "
         "stribeck at joint 12: creeping; payload: the same motions recorded without it";
   }
   /// Metrics with this error of every joint on the test logs, in two stages.

@@ -112,7 +112,7 @@ struct Case {
     const fs::path out = test::folder() / name;
     write_file(out / "metrics.json", to_json(metrics()).dump());
     write_file(out / "diagnosis.json", diagnosis().dump());
-    write_file(out / "model.json", json{{"tables_crc", 0}}.dump());
+    write_file(out / "model.json", json{{"tables_crc", 0}, {"project_hash", ""}, {"logs", json::array()}}.dump());
     write_file(out / "replay.json", to_json(replay()).dump());
     const std::string plot = logs.empty() ? "" : diagnosis_picture();
     for (std::size_t j = 0; j < model.robot.size() && !plot.empty(); ++j) write_file(diagnosis_plot(out, j), plot);
