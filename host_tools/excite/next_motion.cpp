@@ -147,7 +147,8 @@ class NextPlanner {
   }
 
   /// Adds the seconds that a moving joint is in each part of a place.
-  void visit(const Motion& motion, const PlaceQuestion& place, Eigen::Ref<Eigen::RowVectorXd> seconds) const {
+  void visit(const Motion& motion, const PlaceQuestion& place,
+             Eigen::Ref<Eigen::RowVectorXd, 0, Eigen::InnerStride<>> seconds) const {
     const auto j = static_cast<Index>(place.of_joint);
     const VectorXd values = place.signal == "q"       ? motion.q.col(j)
                             : place.signal == "dq"    ? motion.dq.col(j)

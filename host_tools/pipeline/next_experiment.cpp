@@ -44,7 +44,7 @@ class Questions {
     const EffectInfo* info = find_effect(named.effect);
     if (named.established || info == nullptr) return;
     EffectQuestion question{
-        {named.effect, joint, values_of(info->shape, named.parameters)}, {}, asked_share, "", {}, "likely"};
+        {named.effect, joint, values_of(info->shape, named.parameters)}, {}, asked_share, "", joint, {}, "likely"};
     // The columns of a load are mass and first moments, not its parameters.
     if (info->acts_on != ActsOn::body) question.coefficients = vector_of(values_of(info->linear, named.parameters));
     if (!question.coefficients.allFinite() || question.coefficients.isZero()) question.coefficients.resize(0);
