@@ -52,5 +52,5 @@ ctest --test-dir build/host --parallel "$jobs" --output-on-failure --no-tests=er
 build host-asan unit_tests
 step "unit tests with sanitizers"
 # Not the command line's tests from end to end, whole projects, or the page in a browser: minutes each here, of code that the others run.
-ctest --test-dir build/host-asan --parallel "$jobs" --output-on-failure --no-tests=error -L '^unit$' -E '_cli$|^report_browser$'
+ctest --test-dir build/host-asan --parallel "$jobs" --output-on-failure --no-tests=error -L '^unit$' -E '_cli$|^report_browser$|^findings_short$'
 printf '\ndone in %d s\n' "$SECONDS"

@@ -18,6 +18,8 @@ packages=(
   binutils-aarch64-linux-gnu openocd libunicorn-dev libcapstone-dev
   # a second compiler, its linker, its checks, the sources' format
   clang-14 lld-14 libclang-rt-14-dev clang-format-14 clang-tidy-14
+  # sanitizers: of Clang 14, templates with consteval calls do not compile
+  clang-16 libclang-rt-16-dev
   # tests
   chromium nodejs
   libgtest-dev libunicorn-dev librapidcheck-dev libbenchmark-dev liborocos-kdl-dev libmujoco-dev libpagmo-dev python3 llvm-14

@@ -165,9 +165,9 @@ class Keeper {
 };
 
 /// Rows of all joints, as they are filled log by log.
-class Rows {
+class RowsOfJoints {
  public:
-  Rows(const LogColumns& columns, const std::vector<Unknown>& unknowns, const Blocks& blocks)
+  RowsOfJoints(const LogColumns& columns, const std::vector<Unknown>& unknowns, const Blocks& blocks)
       : columns_(columns), unknowns_(unknowns), blocks_(blocks), rows_(columns.joints()) {
     for (std::size_t j = 0; j < rows_.size(); ++j) {
       rows_[j].column = felt_columns(columns, unknowns, j);
@@ -244,7 +244,7 @@ class Rows {
 
 std::vector<JointRows> design_matrix(const LogColumns& columns, const std::vector<Unknown>& unknowns,
                                      const Blocks& blocks) {
-  Rows rows(columns, unknowns, blocks);
+  RowsOfJoints rows(columns, unknowns, blocks);
   parallel_for(blocks.of_log.size(), [&](std::size_t l) { rows.fill(l); });
   return rows.finish();
 }

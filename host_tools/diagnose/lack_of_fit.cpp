@@ -18,9 +18,9 @@ using Eigen::VectorXd;
 /// A numeric choice: draws from which mean and variance of noise's statistics are taken.
 constexpr int draws = 64;
 /// Eigenvalue of a Gram matrix of columns of size 1: a direction with less is rounding of the others.
-constexpr double dependent = 1e-4;
+constexpr double dependent_direction = 1e-4;
 /// A numeric floor under the residual's variance, of that at the start: data without noise.
-constexpr double noise_free = 1e-12, nothing_left = 1e-10;
+constexpr double noise_free = 1e-12, no_variance_left = 1e-10;
 /// Noise's share of a direction at most, so that the rest can be divided by.
 constexpr double most_expected = 0.95;
 
@@ -90,7 +90,7 @@ class Projection {
                                                         scale);
     std::vector<Index> kept;
     for (Index i = 0; i < of.count; ++i) {
-      if (eigen.eigenvalues()[i] > dependent) kept.push_back(i);
+      if (eigen.eigenvalues()[i] > dependent_direction) kept.push_back(i);
     }
     basis_ = eigen.eigenvectors()(Eigen::all, kept) * eigen.eigenvalues()(kept).cwiseSqrt().cwiseInverse().asDiagonal();
   }
@@ -181,7 +181,7 @@ LackOfFit lack_of_fit(const Linearised& problem, std::size_t joint, const Linear
   const auto k = static_cast<Index>(joint);
   const double w = fit.rows[k] / std::max(fit.square[k], noise_free * fit.rows[k] / problem.solver().weights()[k]);
   const VectorXd residual = problem.solver().residual(joint, fit);
-  if (fit.square[k] * problem.solver().weights()[k] < nothing_left * fit.rows[k]) return out;
+  if (fit.square[k] * problem.solver().weights()[k] < no_variance_left * fit.rows[k]) return out;
   const Background* background = problem.background(joint);
   const Products today = products(problem, joint, fit, w, residual, all_features, false);
   // Fitted on its own: what today's structure does to common parameters is not the healthy session's.

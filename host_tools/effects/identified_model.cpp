@@ -363,6 +363,7 @@ const Robot& robot_of(const IdentifiedModel& model) { return model.robot; }
 const std::vector<JointFit>& joints_of(const IdentifiedModel& model) { return model.joints; }
 const std::vector<EffectFit>& body_of(const IdentifiedModel& model) { return model.body; }
 const std::vector<BaseParameter>& base_of(const IdentifiedModel& model) { return model.base; }
+const std::vector<LinkInertia<Real>>& inertia_of(const IdentifiedModel& model) { return model.inertia; }
 const FilterFit& filter_of(const IdentifiedModel& model) { return model.filter; }
 const std::string& project_of(const IdentifiedModel& model) { return model.project; }
 double tick_of(const IdentifiedModel& model) { return model.tick_s; }

@@ -18,6 +18,7 @@ const Robot& robot_of(const IdentifiedModel& model);
 const std::vector<JointFit>& joints_of(const IdentifiedModel& model);
 const std::vector<EffectFit>& body_of(const IdentifiedModel& model);
 const std::vector<BaseParameter>& base_of(const IdentifiedModel& model);
+const std::vector<LinkInertia<Real>>& inertia_of(const IdentifiedModel& model);  ///< representative, DH frames
 const FilterFit& filter_of(const IdentifiedModel& model);
 const std::string& project_of(const IdentifiedModel& model);  ///< its name
 double tick_of(const IdentifiedModel& model);                 ///< [s]

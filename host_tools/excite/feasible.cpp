@@ -4,7 +4,6 @@
 
 #include <limits>
 
-#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/excite/evolution.hpp"
 #include "host_tools/excite/motions.hpp"
 #include "host_tools/support/error.hpp"
@@ -21,18 +20,11 @@ constexpr std::size_t wanted_poses = 150;  ///< to start from and to dwell at
 constexpr int population = 16;             ///< of the search for a first pose
 constexpr int most_shrinks = 100;          ///< each by 2 %
 
-LimitCheck make_check(const Project& project, const std::filesystem::path& directory, std::vector<std::string>& notes) {
-  MotionLimits limits = motion_limits(project);
-  notes.insert(notes.end(), limits.notes.begin(), limits.notes.end());
-  auto model = torque_model(project, directory, notes);
-  return {project.robot, std::move(limits), std::move(model), project.excite.margin};
-}
-
 }  // namespace
 
 FeasibleMotions::FeasibleMotions(const Project& project, const std::filesystem::path& directory,
                                  std::vector<std::string>& notes)
-    : project_(project), check_(make_check(project, directory, notes)) {
+    : project_(project), check_(limit_check(project, directory, notes)) {
   find_poses();
 }
 

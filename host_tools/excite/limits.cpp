@@ -282,4 +282,22 @@ std::vector<Usage> LimitCheck::usage(const std::vector<Motion>& motions) const {
   return out;
 }
 
+LimitCheck limit_check(const Project& project, const std::filesystem::path& directory,
+                       std::vector<std::string>& notes) {
+  MotionLimits limits = motion_limits(project);
+  notes.insert(notes.end(), limits.notes.begin(), limits.notes.end());
+  auto model = torque_model(project, directory, notes);
+  return {project.robot, std::move(limits), std::move(model), project.excite.margin};
+}
+
+Eigen::VectorXd sign_widths(const Project& project, const std::filesystem::path& directory) {
+  Eigen::VectorXd widths =
+      Eigen::VectorXd::Constant(static_cast<Eigen::Index>(project.robot.size()), JointFit{}.sign_width);
+  if (const auto file = directory / "model.json"; std::filesystem::exists(file)) {
+    const IdentifiedModel model = read_model(file);
+    for (Eigen::Index j = 0; j < widths.size(); ++j) widths[j] = model.joints[static_cast<std::size_t>(j)].sign_width;
+  }
+  return widths;
+}
+
 }  // namespace fxdyn

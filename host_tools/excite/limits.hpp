@@ -82,4 +82,10 @@ class LimitCheck {
 std::optional<IdentifiedModel> torque_model(const Project& project, const std::filesystem::path& directory,
                                             std::vector<std::string>& notes);
 
+/// The check of a project's motions, its margin and the model from torque_model(). @param notes gets what was assumed
+LimitCheck limit_check(const Project& project, const std::filesystem::path& directory, std::vector<std::string>& notes);
+
+/// Widths of the joints' sign of velocity: of directory/model.json, else the usual one [rad/s | m/s].
+Eigen::VectorXd sign_widths(const Project& project, const std::filesystem::path& directory);
+
 }  // namespace fxdyn

@@ -9,7 +9,7 @@
 #include <numeric>
 
 #include "host_tools/effects/effects.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/excite/effect_information.hpp"
 #include "host_tools/excite/evolution.hpp"
 #include "host_tools/excite/feasible.hpp"
@@ -47,7 +47,7 @@ class NextPlanner {
         progress_(progress),
         feasible_(project, directory, out_.notes) {
     // White noise that leaves as much below the cut-off.
-    noise_ = noise * std::sqrt(0.5 / step_s / std::min(0.5 / step_s, model.filter.torque_cutoff_hz));
+    noise_ = noise * std::sqrt(0.5 / step_s / std::min(0.5 / step_s, filter_of(model).torque_cutoff_hz));
     for (const SeriesKind& kind : kinds) coordinates_.emplace_back(feasible_.check(), kind, project.excite);
     choose_candidates();
   }
@@ -94,19 +94,19 @@ class NextPlanner {
       EffectCandidate own = q.effect;
       if (own.shape.empty())
         own.shape =
-            typical_shapes(own.effect, own.joint, model_.robot, fast, {columns.torque()}, {columns.structural()})
+            typical_shapes(own.effect, own.joint, robot_of(model_), fast, {columns.torque()}, {columns.structural()})
                 .front();
       candidates_.push_back(own);
       if (!q.rival.empty()) {
-        for (const auto& shape :
-             typical_shapes(q.rival, q.rival_joint, model_.robot, fast, {columns.torque()}, {columns.structural()})) {
+        for (const auto& shape : typical_shapes(q.rival, q.rival_joint, robot_of(model_), fast, {columns.torque()},
+                                                {columns.structural()})) {
           of.rivals.push_back(candidates_.size());
           candidates_.push_back({q.rival, q.rival_joint, shape});
         }
       }
       columns_.push_back(std::move(of));
     }
-    const Information of_fast(model_, fast, noise_, model_.filter.torque_cutoff_hz, candidates_);
+    const Information of_fast(model_, fast, noise_, filter_of(model_).torque_cutoff_hz, candidates_);
     nominal_blocks_ = of_fast.nominal_blocks;
     blocks_ = of_fast.blocks;
     nominal_ = columns_from(0, of_fast.base);
@@ -126,7 +126,7 @@ class NextPlanner {
     double most = 0;
     for (std::size_t j = 0; j < block.raw.size(); ++j) {
       if (block.raw[j].size() == 0) continue;
-      most = std::max(most, std::sqrt(block.raw[j](0, 0)) / model_.joints[j].rated_torque);
+      most = std::max(most, std::sqrt(block.raw[j](0, 0)) / joints_of(model_)[j].rated_torque);
     }
     return most > 0 ? VectorXd(theta * q.share / most) : theta;
   }
@@ -140,7 +140,7 @@ class NextPlanner {
   Shown show(const Motion& motion) const {
     Shown out = nothing();
     if (!questions_.effects.empty())
-      out.gram = Information(model_, {motion}, noise_, model_.filter.torque_cutoff_hz, candidates_).gram;
+      out.gram = Information(model_, {motion}, noise_, filter_of(model_).torque_cutoff_hz, candidates_).gram;
     for (std::size_t i = 0; i < questions_.places.size(); ++i)
       visit(motion, questions_.places[i], out.seconds.row(static_cast<Index>(i)));
     return out;

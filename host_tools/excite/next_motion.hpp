@@ -36,7 +36,7 @@ struct PlaceQuestion {
 struct OpenQuestions {
   std::vector<EffectQuestion> effects;
   std::vector<PlaceQuestion> places;
-  std::vector<std::string> unplanned;  ///< open, but nothing that motion can be planned for: sentences
+  std::vector<std::string> unplanned{};  ///< open, but nothing that motion can be planned for: sentences
   bool known_base =
       false;  ///< a healthy session of the same motions tells the base parameters, its friction fitted apart
   bool empty() const { return effects.empty() && places.empty() && unplanned.empty(); }

@@ -8,7 +8,6 @@
 #include <limits>
 #include <numeric>
 
-#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/excite/evolution.hpp"
 #include "host_tools/excite/feasible.hpp"
 #include "host_tools/excite/pose_walk.hpp"
@@ -83,15 +82,6 @@ class Planner {
   }
 
  private:
-  static VectorXd sign_widths(const Project& project, const std::filesystem::path& directory) {
-    VectorXd widths = VectorXd::Constant(static_cast<Index>(project.robot.size()), JointFit{}.sign_width);
-    if (const auto file = directory / "model.json"; std::filesystem::exists(file)) {
-      const IdentifiedModel model = read_model(file);
-      for (Index j = 0; j < widths.size(); ++j) widths[j] = model.joints[static_cast<std::size_t>(j)].sign_width;
-    }
-    return widths;
-  }
-
   struct Draw {
     VectorXd x;
     MatrixXd information;

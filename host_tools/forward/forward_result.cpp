@@ -6,6 +6,7 @@
 
 #include "host_tools/forward/forward.hpp"
 #include "host_tools/signals/log.hpp"
+#include "host_tools/support/json_number.hpp"
 
 namespace fxdyn {
 namespace {
@@ -15,11 +16,6 @@ using nlohmann::json;
 
 std::optional<double> rmse_of(const ForwardRun& run, Index joint) {
   return run.why_failed.empty() ? std::optional(run.rmse[joint]) : std::nullopt;
-}
-
-json or_null(const std::optional<double>& value) { return value ? json(*value) : json(nullptr); }
-std::optional<double> or_none(const json& value) {
-  return value.is_null() ? std::nullopt : std::optional(value.get<double>());
 }
 
 std::string in_table(const std::optional<double>& value) { return value ? fmt::format("{:.4g}", *value) : "failed"; }
@@ -64,8 +60,8 @@ json to_json(const ForwardResult& result) {
 ForwardResult forward_of(const json& file) {
   ForwardResult out{file.at("log"), file.at("given"), file.at("simulated_s"), {}, {}, {}};
   for (const json& joint : file.at("joints")) {
-    out.joints.push_back({joint.at("joint"), joint.at("unit"), joint.at("range"), or_none(joint.at("open_rmse")),
-                          or_none(joint.at("closed_rmse"))});
+    out.joints.push_back({joint.at("joint"), joint.at("unit"), joint.at("range"), optional_of(joint.at("open_rmse")),
+                          optional_of(joint.at("closed_rmse"))});
   }
   if (const auto failed = file.find("failed"); failed != file.end()) {
     out.why_open_failed = failed->value("open", "");

@@ -30,7 +30,7 @@ Index column_of(std::string_view effect) {
 const Index coulomb = column_of(dry_friction_effect().name), viscous = column_of(viscous_friction_effect().name),
             rotor = column_of(rotor_effect().name);
 
-struct Estimate {
+struct OwnEstimate {
   double value = 0, std = 0;
 };
 
@@ -45,11 +45,11 @@ Eigen::RowVectorXd own_row(double sign_width, double dq, double ddq) {
   return row;
 }
 
-/// Rows of all joints over a few hundred samples, the columns' gravity part apart.
-class Rows {
+/// OwnRows of all joints over a few hundred samples, the columns' gravity part apart.
+class OwnRows {
  public:
-  Rows(const Robot& robot, const std::vector<ProcessedLog>& logs, const std::vector<JointFit>& joints,
-       const PlausibleOptions& options)
+  OwnRows(const Robot& robot, const std::vector<ProcessedLog>& logs, const std::vector<JointFit>& joints,
+          const PlausibleOptions& options)
       : options_(options), n_(static_cast<Index>(robot.size())) {
     const DhChain chain = to_dh(robot);
     base_ = find_base(chain);
@@ -151,7 +151,7 @@ class Rows {
   }
 
   /// M_jj, mean over the poses, and the share of poses where it is negative.
-  Estimate inertia(const Fit& fit, Index j, double& share_negative) const {
+  OwnEstimate inertia(const Fit& fit, Index j, double& share_negative) const {
     const auto joint = static_cast<std::size_t>(j);
     const auto nb = own_inertia_[joint].cols();
     VectorXd row = VectorXd::Zero(fit.solution.size());
@@ -163,7 +163,7 @@ class Rows {
     return estimate(fit, row);
   }
   /// Coulomb and viscous friction at the RMS of the velocity.
-  Estimate friction(const Fit& fit, Index j) const {
+  OwnEstimate friction(const Fit& fit, Index j) const {
     const auto joint = static_cast<std::size_t>(j);
     const Index at = fit.solution.size() - own * (n_ - j);
     VectorXd row = VectorXd::Zero(fit.solution.size());
@@ -172,7 +172,7 @@ class Rows {
     return estimate(fit, row);
   }
   /// Largest gravity torque.
-  Estimate gravity(const Fit& fit, Index j) const {
+  OwnEstimate gravity(const Fit& fit, Index j) const {
     const auto joint = static_cast<std::size_t>(j);
     const Index nb = gravity_[joint].cols();
     const VectorXd all = (gravity_[joint] * fit.solution.head(nb)).cwiseAbs();
@@ -180,7 +180,7 @@ class Rows {
     all.maxCoeff(&where);
     VectorXd row = VectorXd::Zero(fit.solution.size());
     row.head(nb) = gravity_[joint].row(where);
-    const Estimate signed_one = estimate(fit, row);
+    const OwnEstimate signed_one = estimate(fit, row);
     return {std::fabs(signed_one.value), signed_one.std};
   }
   /// Largest gravity torque of bodies pi.
@@ -208,7 +208,7 @@ class Rows {
     x << solution.head(nb), solution.segment(nb + own * j, own);
     return x;
   }
-  static Estimate estimate(const Fit& fit, const VectorXd& row) {
+  static OwnEstimate estimate(const Fit& fit, const VectorXd& row) {
     return {row.dot(fit.solution), std::sqrt(std::max(0.0, row.dot(fit.covariance * row)))};
   }
 
@@ -226,15 +226,15 @@ class Rows {
 };
 
 /// Flips one joint's torque after the other while that explains all joints far better.
-Rows::Fit best_signs(const Rows& rows, double up, Index joints) {
-  Rows::Fit best = rows.fit(up, VectorXd::Ones(joints));
+OwnRows::Fit best_signs(const OwnRows& rows, double up, Index joints) {
+  OwnRows::Fit best = rows.fit(up, VectorXd::Ones(joints));
   for (;;) {
-    Rows::Fit next = best;
+    OwnRows::Fit next = best;
     for (Index j = 0; j < joints; ++j) {
       if (best.signs[j] < 0) continue;
       VectorXd signs = best.signs;
       signs[j] = -1;
-      Rows::Fit candidate = rows.fit(up, signs);
+      OwnRows::Fit candidate = rows.fit(up, signs);
       if (candidate.score < next.score) next = std::move(candidate);
     }
     if (!(next.score < best.score - rows.options().flip)) return best;
@@ -267,7 +267,7 @@ std::string title(const Robot& robot, std::size_t joint) {
   return fmt::format("joint {} ({})", joint + 1, robot.joints[joint].name);
 }
 
-void check_units(const Robot& robot, const Rows& rows, const Rows::Fit& fit, std::vector<Suspicion>& out) {
+void check_units(const Robot& robot, const OwnRows& rows, const OwnRows::Fit& fit, std::vector<Suspicion>& out) {
   const PlausibleOptions& options = rows.options();
   const double reach = reach_of(robot, 0);
   const double strength = robot.gravity.norm();
@@ -276,11 +276,12 @@ void check_units(const Robot& robot, const Rows& rows, const Rows::Fit& fit, std
     const double arm = std::max(reach_of(robot, j), options.shortest);
     if (robot.joints[j].type != JointType::revolute || reach_of(robot, j) < options.least_reach * reach) continue;
     double ignored = 0;
-    const Estimate inertia = rows.inertia(fit, static_cast<Index>(j), ignored);
-    const Estimate gravity = rows.gravity(fit, static_cast<Index>(j));
-    for (const Estimate& e :
-         {Estimate{inertia.value / (arm * arm), inertia.std / (arm * arm)},
-          strength > 0 ? Estimate{gravity.value / (strength * arm), gravity.std / (strength * arm)} : Estimate{}}) {
+    const OwnEstimate inertia = rows.inertia(fit, static_cast<Index>(j), ignored);
+    const OwnEstimate gravity = rows.gravity(fit, static_cast<Index>(j));
+    for (const OwnEstimate& e :
+         {OwnEstimate{inertia.value / (arm * arm), inertia.std / (arm * arm)},
+          strength > 0 ? OwnEstimate{gravity.value / (strength * arm), gravity.std / (strength * arm)}
+                       : OwnEstimate{}}) {
       if (e.value > mass) mass = e.value, mass_std = e.std;
     }
   }
@@ -304,12 +305,12 @@ void check_units(const Robot& robot, const Rows& rows, const Rows::Fit& fit, std
 }
 
 /// One joint's torque in other units than the others': with it scaled, all fit together.
-void check_one_unit(const Robot& robot, const Rows& rows, const Rows::Fit& fit, std::vector<Suspicion>& out) {
+void check_one_unit(const Robot& robot, const OwnRows& rows, const OwnRows::Fit& fit, std::vector<Suspicion>& out) {
   const double needed = fit.score - rows.options().unit;
   struct Scaled {
     std::size_t joint;
     double times;
-    Rows::Fit fit;
+    OwnRows::Fit fit;
   };
   std::vector<Scaled> all;
   double best = needed;
@@ -342,7 +343,7 @@ void check_one_unit(const Robot& robot, const Rows& rows, const Rows::Fit& fit, 
                              one.times < 1 ? "large" : "small")});
 }
 
-void check_against_urdf(const Robot& robot, const Rows& rows, const Rows::Fit& fit, std::vector<Suspicion>& out) {
+void check_against_urdf(const Robot& robot, const OwnRows& rows, const OwnRows::Fit& fit, std::vector<Suspicion>& out) {
   const PlausibleOptions& options = rows.options();
   const DhChain chain = to_dh(robot);
   const auto n = static_cast<Index>(robot.size());
@@ -357,7 +358,7 @@ void check_against_urdf(const Robot& robot, const Rows& rows, const Rows::Fit& f
   for (Index j = 0; j < n; ++j) given[j] = rows.gravity_of(pi, j);
   for (Index j = 0; j < n; ++j) {
     if (!(given[j] > options.least_gravity * given.maxCoeff()) || robot.gravity.norm() == 0) continue;
-    const Estimate found = rows.gravity(fit, j);
+    const OwnEstimate found = rows.gravity(fit, j);
     const double ratio = found.value / given[j], spread = options.sure * found.std / given[j];
     if (ratio - spread < options.other_gravity && ratio + spread > 1 / options.other_gravity) continue;
     out.push_back(
@@ -372,10 +373,10 @@ void check_against_urdf(const Robot& robot, const Rows& rows, const Rows::Fit& f
 std::vector<Suspicion> check_plausible(const Robot& robot, const std::vector<ProcessedLog>& logs,
                                        const std::vector<JointFit>& joints, const PlausibleOptions& options) {
   const auto n = static_cast<Index>(robot.size());
-  const Rows rows(robot, logs, joints, options);
+  const OwnRows rows(robot, logs, joints, options);
   if (!rows.enough()) return {};
-  Rows::Fit fit = best_signs(rows, 1, n);
-  if (Rows::Fit other = best_signs(rows, -1, n); other.score < fit.score - options.flip) fit = std::move(other);
+  OwnRows::Fit fit = best_signs(rows, 1, n);
+  if (OwnRows::Fit other = best_signs(rows, -1, n); other.score < fit.score - options.flip) fit = std::move(other);
 
   // The other joints can't decide which of two opposite signs all have: inertia and friction can.
   VectorXd signs = fit.signs;
@@ -384,8 +385,8 @@ std::vector<Suspicion> check_plausible(const Robot& robot, const std::vector<Pro
   for (Index j = 0; j < n; ++j) {
     if (rows.is_left_out(j)) continue;
     double share = 0;
-    const Estimate inertia = rows.inertia(fit, j, share);
-    const Estimate friction = rows.friction(fit, j);
+    const OwnEstimate inertia = rows.inertia(fit, j, share);
+    const OwnEstimate friction = rows.friction(fit, j);
     const auto at = static_cast<std::size_t>(j);
     const bool revolute = robot.joints[at].type == JointType::revolute;
     const bool heavy = std::fabs(inertia.value) > options.sure * inertia.std;
@@ -436,7 +437,7 @@ std::vector<Suspicion> check_plausible(const Robot& robot, const std::vector<Pro
     }
   }
   const bool signs_differ = (signs - fit.signs).norm() > 0;
-  const Rows::Fit final_fit = signs_differ ? rows.fit(fit.up, signs) : std::move(fit);
+  const OwnRows::Fit final_fit = signs_differ ? rows.fit(fit.up, signs) : std::move(fit);
   if (n > 1) check_one_unit(robot, rows, final_fit, out);
   check_units(robot, rows, final_fit, out);
   check_against_urdf(robot, rows, final_fit, out);

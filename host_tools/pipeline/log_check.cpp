@@ -6,7 +6,7 @@
 
 #include "host_tools/check/arrangement_search.hpp"
 #include "host_tools/check/check.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/pipeline/one_log.hpp"
 #include "host_tools/regression/metrics.hpp"
 #include "host_tools/regression/pseudo_inertia.hpp"
@@ -20,11 +20,12 @@ namespace fs = std::filesystem;
 
 /// The robot with the model's bodies, where they are some: a fit without `physical` may have none.
 Robot with_bodies(const IdentifiedModel& model) {
-  Robot robot = model.robot;
+  Robot robot = robot_of(model);
   const DhChain chain = to_dh(robot);
   for (std::size_t i = 0; i < robot.size(); ++i) {
-    const Eigen::LLT<Eigen::Matrix4d> body(pseudo_inertia(model.inertia[i]));
-    if (body.info() == Eigen::Success) robot.joints[i].inertial = to_inertial(model.inertia[i], chain.urdf_in_dh[i]);
+    const Eigen::LLT<Eigen::Matrix4d> body(pseudo_inertia(inertia_of(model)[i]));
+    if (body.info() == Eigen::Success)
+      robot.joints[i].inertial = to_inertial(inertia_of(model)[i], chain.urdf_in_dh[i]);
   }
   return robot;
 }
@@ -39,7 +40,7 @@ bool is_explained(const ProcessedLog& log, const Eigen::MatrixXd& torque, const 
 void check_columns_of(const IdentifiedModel& model, const fs::path& file, const ProcessedLog& log) {
   Project project;
   project.robot = with_bodies(model);
-  project.signals.torque_lead_s = model.filter.torque_lead_s;
+  project.signals.torque_lead_s = filter_of(model).torque_lead_s;
   const ArrangementOptions options;
   std::vector<ProcessedLog> logs{log};
   logs.front().role = Role::train;
@@ -65,9 +66,9 @@ std::vector<std::string> check_log_for(const IdentifiedModel& model, const fs::p
                                        const Eigen::MatrixXd& torque, const LogCheckOptions& options) {
   if (log.tau.size() > 0 && !is_explained(log, torque, options)) check_columns_of(model, file, log);
   std::vector<std::string> notes;
-  for (std::size_t j = 0; j < model.joints.size(); ++j) {
-    const JointFit& fit = model.joints[j];
-    const Joint& joint = model.robot.joints[j];
+  for (std::size_t j = 0; j < joints_of(model).size(); ++j) {
+    const JointFit& fit = joints_of(model)[j];
+    const Joint& joint = robot_of(model).joints[j];
     const auto q = log.q.col(static_cast<Index>(j));
     const double allowed = options.beyond * (fit.q_upper - fit.q_lower);
     if (q.minCoeff() >= fit.q_lower - allowed && q.maxCoeff() <= fit.q_upper + allowed) continue;

@@ -5,6 +5,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "host_tools/support/json_number.hpp"
+
 namespace fxdyn {
 
 std::vector<JointMetrics> judge(const ProcessedLog& log, const Eigen::MatrixXd& torque) {
@@ -70,18 +72,14 @@ nlohmann::json to_json(const std::vector<StageErrors>& stages) {
 
 namespace {
 
-/// JSON has no NaN: it is written as null.
-double number(const nlohmann::json& value) {
-  return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>();
-}
-
 LogErrors read_log_errors(const nlohmann::json& json) {
   LogErrors out{json.at("file"), role_of(json.at("role").get<std::string>()), json.at("from_s"), json.at("to_s"), {}};
   for (const nlohmann::json& joint : json.at("joints")) {
-    out.joints.push_back({joint.at("joint"),
-                          joint.at("unit"),
-                          {number(joint.at("rmse")), number(joint.at("relative")), number(joint.at("rmse_raw")),
-                           number(joint.at("noise_floor")), number(joint.at("bias"))}});
+    out.joints.push_back(
+        {joint.at("joint"),
+         joint.at("unit"),
+         {number_of(joint.at("rmse")), number_of(joint.at("relative")), number_of(joint.at("rmse_raw")),
+          number_of(joint.at("noise_floor")), number_of(joint.at("bias"))}});
   }
   return out;
 }

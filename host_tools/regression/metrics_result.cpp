@@ -5,16 +5,12 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/regression/physical.hpp"
+#include "host_tools/support/json_number.hpp"
 
 namespace fxdyn {
 namespace {
 
 using nlohmann::json;
-
-/// JSON has no NaN: it is written as null.
-double number(const json& value) {
-  return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>();
-}
 
 json figure_json(const BodyFigure& figure, const char* unit) {
   return {{"value", figure.value},
@@ -22,7 +18,7 @@ json figure_json(const BodyFigure& figure, const char* unit) {
           {"data_share", figure.data_share},
           {"determined", figure.data_share >= determined_share}};
 }
-BodyFigure figure_of(const json& file) { return {number(file.at("value")), number(file.at("data_share"))}; }
+BodyFigure figure_of(const json& file) { return {number_of(file.at("value")), number_of(file.at("data_share"))}; }
 
 json figures_json(const std::array<BodyFigure, 3>& figures, const char* unit) {
   return {figure_json(figures[0], unit), figure_json(figures[1], unit), figure_json(figures[2], unit)};
@@ -60,7 +56,7 @@ PhysicalResult physical_of(const json& file) {
                          figure_of(link.at("mass")),
                          figures_of(link.at("centre")),
                          figures_of(link.at("first_moment")),
-                         number(link.at("smallest_eigenvalue")),
+                         number_of(link.at("smallest_eigenvalue")),
                          {}});
     if (!link.contains("urdf")) continue;
     const json& urdf = link.at("urdf");
@@ -84,9 +80,9 @@ void add_fit(const FitResult& fit, json& out) {
 }
 
 FitResult fit_of(const json& file) {
-  FitResult out{file.at("method"), number(file.at("condition_number")), {}, {}, {}, {}};
+  FitResult out{file.at("method"), number_of(file.at("condition_number")), {}, {}, {}, {}};
   for (const json& one : file.at("weak_parameters"))
-    out.weak.push_back({one.at("parameter"), number(one.at("share_of_rated")), one.at("joint_to_move")});
+    out.weak.push_back({one.at("parameter"), number_of(one.at("share_of_rated")), one.at("joint_to_move")});
   out.saturated_rows = file.at("saturated_rows").get<std::vector<std::int64_t>>();
   if (file.contains("physical")) out.physical = physical_of(file.at("physical"));
   if (!file.contains("recursive")) return out;
@@ -122,10 +118,10 @@ std::optional<TrainedJoint::Choice> choice_of(const json& file) {
   out.windows = file.at("windows");
   out.activation = file.at("activation");
   out.inputs = file.at("inputs");
-  out.ridge = number(file.at("ridge"));
-  out.scale = number(file.at("scale"));
-  out.reference_velocity = number(file.at("reference_velocity"));
-  out.value = number(file.at("J"));
+  out.ridge = number_of(file.at("ridge"));
+  out.scale = number_of(file.at("scale"));
+  out.reference_velocity = number_of(file.at("reference_velocity"));
+  out.value = number_of(file.at("J"));
   out.distances = if_there<std::vector<double>>(file, "distances");
   out.stribeck_velocity = if_there<double>(file, "stribeck_velocity");
   out.share = if_there<double>(file, "share");
@@ -151,8 +147,8 @@ json training_json(const std::vector<TrainedJoint>& joints) {
 std::vector<TrainedJoint> training_of(const json& file) {
   std::vector<TrainedJoint> out;
   for (const json& joint : file) {
-    out.push_back({joint.at("joint"), joint.at("unit"), number(joint.at("held_out_without")),
-                   number(joint.at("held_out_with")), joint.at("kept"), joint.at("evaluations"),
+    out.push_back({joint.at("joint"), joint.at("unit"), number_of(joint.at("held_out_without")),
+                   number_of(joint.at("held_out_with")), joint.at("kept"), joint.at("evaluations"),
                    choice_of(joint.at("choice"))});
   }
   return out;
@@ -180,9 +176,8 @@ std::vector<GateErrors> gate_errors_of(const json& file) {
   std::vector<GateErrors> out;
   for (const json& joint : file) {
     const json& friction = joint.at("friction");
-    out.push_back({joint.at("joint"), joint.at("unit"),
-                   friction.is_null() ? std::nullopt : std::optional(number(friction)), number(joint.at("diagnosed")),
-                   number(joint.at("bls")), joint.at("exported")});
+    out.push_back({joint.at("joint"), joint.at("unit"), optional_of(friction), number_of(joint.at("diagnosed")),
+                   number_of(joint.at("bls")), joint.at("exported")});
   }
   return out;
 }

@@ -4,15 +4,12 @@
 
 #include <cmath>
 
+#include "host_tools/support/json_number.hpp"
+
 namespace fxdyn {
 namespace {
 
 using nlohmann::json;
-
-json or_null(const std::optional<double>& value) { return value ? json(*value) : json(nullptr); }
-std::optional<double> or_none(const json& value) {
-  return value.is_null() ? std::nullopt : std::optional(value.get<double>());
-}
 
 MethodResult method_of(const json& file) {
   MethodResult out;
@@ -23,9 +20,9 @@ MethodResult method_of(const json& file) {
   out.mean_percent_rated = file.at("mean_percent_rated");
   out.smoothness = file.at("smoothness");
   out.macs_per_tick = file.at("macs_per_tick");
-  out.train_s = or_none(file.at("train_s"));
+  out.train_s = optional_of(file.at("train_s"));
   out.predict_us = file.at("predict_us");
-  out.fixed_error = or_none(file.at("fixed_error"));
+  out.fixed_error = optional_of(file.at("fixed_error"));
   return out;
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "host_tools/support/error.hpp"
+#include "host_tools/support/json_number.hpp"
 
 namespace fxdyn {
 namespace {
@@ -23,14 +24,6 @@ constexpr std::array<std::pair<Verdict, std::string_view>, 5> verdict_names{
 
 constexpr const char* schema = "fxdyn.diagnosis/2";
 
-json or_null(const std::optional<double>& value) { return value ? json(*value) : json(nullptr); }
-std::optional<double> optional_of(const json& value) {
-  return value.is_null() ? std::nullopt : std::optional(value.get<double>());
-}
-/// What is no number is null in a file.
-double number_of(const json& value) {
-  return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>();
-}
 std::vector<std::string> strings_of(const json& list) { return list.get<std::vector<std::string>>(); }
 
 json to_json(const GapRegion& region) {

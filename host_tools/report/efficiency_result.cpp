@@ -1,5 +1,7 @@
 #include "host_tools/report/efficiency_result.hpp"
 
+#include "host_tools/support/json_number.hpp"
+
 namespace fxdyn {
 namespace {
 
@@ -7,7 +9,7 @@ using nlohmann::json;
 
 json to_json(const EfficiencyPoint& point) {
   json errors;
-  for (const auto& [method, error] : point.percent_rated) errors[method] = error ? json(*error) : json();
+  for (const auto& [method, error] : point.percent_rated) errors[method] = or_null(error);
   json out{{"seconds", point.seconds}, {"slow_share", point.slow_share}, {"percent_rated", errors}};
   if (!point.failed.empty()) out["failed"] = point.failed;
   return out;
@@ -15,8 +17,7 @@ json to_json(const EfficiencyPoint& point) {
 
 EfficiencyPoint point_of(const json& file) {
   EfficiencyPoint out{.seconds = file.at("seconds"), .slow_share = file.at("slow_share")};
-  for (const auto& [method, error] : file.at("percent_rated").items())
-    out.percent_rated[method] = error.is_null() ? std::nullopt : std::optional(error.get<double>());
+  for (const auto& [method, error] : file.at("percent_rated").items()) out.percent_rated[method] = optional_of(error);
   out.failed = file.value("failed", "");
   return out;
 }

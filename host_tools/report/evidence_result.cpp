@@ -2,15 +2,12 @@
 
 #include <nlohmann/json.hpp>
 
+#include "host_tools/support/json_number.hpp"
+
 namespace fxdyn {
 namespace {
 
 using nlohmann::json;
-
-json or_null(const std::optional<double>& value) { return value ? json(*value) : json(nullptr); }
-std::optional<double> optional_of(const json& value) {
-  return value.is_null() ? std::nullopt : std::optional(value.get<double>());
-}
 
 json to_json(const PlayedForward& played) {
   json joints = json::array();

@@ -76,7 +76,7 @@ MatrixXd derive(const Eigen::Ref<const MatrixXd>& columns, double step_s, Index 
 
 }  // namespace
 
-ZeroPhaseFilter::ZeroPhaseFilter(double cutoff_hz, double step_s, int order) : cutoff_hz_(cutoff_hz), step_s_(step_s) {
+ZeroPhaseFilter::ZeroPhaseFilter(double cutoff_hz, double step_s, int order) : cutoff_hz_(cutoff_hz) {
   if (!(cutoff_hz > 0) || order < 1 || cutoff_hz >= 0.95 * 0.5 / step_s) return;
   // Bilinear transform, the cut-off kept by prewarping: analog pole p gives the discrete pole (1 + p) / (1 - p).
   const double warped = std::tan(std::numbers::pi * cutoff_hz * step_s);

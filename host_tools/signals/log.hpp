@@ -107,7 +107,6 @@ class ZeroPhaseFilter {
   void apply_to(double* side_by_side, Eigen::Index samples) const;
 
   double cutoff_hz_;
-  double step_s_;
   std::vector<Section> sections_;
 };
 

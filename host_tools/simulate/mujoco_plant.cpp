@@ -64,7 +64,7 @@ bool depends_on_load(const IdentifiedModel& plant) {
 class ControlledRobot {
  public:
   ControlledRobot(const IdentifiedModel& plant, const Reference& reference, double step_s, double age_s)
-      : plant_(plant), forces_(plant), robot_(plant, {.step_s = step_s}), age_s_(age_s) {
+      : forces_(plant), robot_(plant, {.step_s = step_s}), age_s_(age_s) {
     const Index n = reference.q.cols();
     now_.q = reference.q.row(0);
     now_.dq = reference.dq.row(0);
@@ -139,7 +139,6 @@ class ControlledRobot {
     }
   }
 
-  const IdentifiedModel& plant_;
   DriveForces forces_;
   MujocoModel robot_;
   double age_s_;

@@ -218,7 +218,9 @@ std::string project_toml(const Case& wanted, const std::vector<std::pair<std::st
 Session measured_session(const Case& wanted, const Ground& ground) {
   Session session = healthy_session(wanted);
   session.effects = ground.background;
-  for (const auto& [joint, fit] : ground.effects) {
+  for (const auto& effect : ground.effects) {
+    const auto& joint = effect.first;
+    const auto& fit = effect.second;
     const auto same = std::find_if(session.effects.begin(), session.effects.end(), [&](const auto& there) {
       return there.first == joint && there.second.effect == fit.effect && there.second.shape == fit.shape;
     });

@@ -301,10 +301,11 @@ std::vector<Figure> figures(const std::vector<json>& results) {
                     fmt::format(">= {:.2f}", goal), value, closures.size(), value >= goal});
   }
   for (const auto& [size, goal] : {std::pair{0.006, 0.75}, std::pair{0.02, 0.90}}) {
-    list.push_back(at_least(fmt::format("pairs, both named, {:g} %", 100 * size),
-                            rate(
-                                results, [size](const json& r) { return in(r, "pair") && share(r) == size; }, "both"),
-                            goal));
+    list.push_back(
+        at_least(fmt::format("pairs, both named, {:g} %", 100 * size),
+                 rate(
+                     results, [size = size](const json& r) { return in(r, "pair") && share(r) == size; }, "both"),
+                 goal));
   }
   list.push_back(
       at_least("no baseline, detectable: top-1",
@@ -391,9 +392,9 @@ std::string write_up(const std::vector<json>& results, const std::string& comman
                                                                 {"controlled", "Moved by a controller"},
                                                                 {"dual_encoder", "Link encoders"}};
   for (const auto& [group, title] : groups) {
-    const Filter of_group = [&](const json& r) { return in(r, group); };
+    const Filter of_group = [&, group = group](const json& r) { return in(r, group); };
     if (where(results, of_group).empty()) continue;
-    const Filter with_effect = [&](const json& r) { return in(r, group) && first_effect(r) != nullptr; };
+    const Filter with_effect = [&, group = group](const json& r) { return in(r, group) && first_effect(r) != nullptr; };
     text += fmt::format("\n## {}\n\n{}\n{}", title, summary_line(results, with_effect), confusion(results, of_group));
   }
   text +=

@@ -60,7 +60,7 @@ struct Case {
     out.training.emplace();
     for (const Joint& joint : model.robot.joints) {
       TrainedJoint trained{joint.name, joint.torque_unit(), 0.5, 0.45, true, 7, {}};
-      trained.choice.emplace().nodes = 12;
+      trained.choice = TrainedJoint::Choice{.nodes = 12};
       out.training->push_back(trained);
       out.gate_errors.push_back({joint.name, joint.torque_unit(), 1.5, 0.5, 0.45, "bls"});
     }

@@ -160,7 +160,7 @@ TEST(BlsSection, ABlsThatTheTestLogsDoNotLikeIsKeptInAmber) {
   result.training.emplace();
   for (const double with : {0.5, 1.05}) {
     TrainedJoint joint{"j", "N*m", 1.5 * with, with, true, 7, {}};
-    joint.choice.emplace().nodes = 12;
+    joint.choice = TrainedJoint::Choice{.nodes = 12};
     result.training->push_back(joint);
   }
   const std::string page = section_page("bls", result);
