@@ -53,7 +53,7 @@ json made_from(const Project& project, const fs::path& directory, bool of_model)
 bool is_unchanged(const json& made_from, const fs::path& directory) {
   if (!made_from.is_object()) return false;
   for (const auto& [file, hash] : made_from.at("logs").items()) {
-    if (!fs::exists(directory / file) || hash_of_file(directory / file) != hash) return false;
+    if (!fs::exists(directory / file) || hash_of_file(directory / file) != hash.get<std::string>()) return false;
   }
   return !made_from.contains("model") || made_from.at("model") == hash_of_model(directory);
 }

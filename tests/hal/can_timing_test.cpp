@@ -70,11 +70,14 @@ concept Possible = requires {
   typename std::integral_constant<std::uint32_t, bit_timing(limits, clock_hz, wanted).prescaler>;
 };
 constexpr BitTimingLimits wide{2, 1, 16, 1, 8, 4}, late{2, 1, 16, 3, 8, 4};
-static_assert(Possible<wide, 10, {1}> && Possible<late, 20, {1}>, "90.0 % and 85.0 %: 2.5 % from what CiA 301 says");
-static_assert(Possible<tiny, 8, {1, 850}> && !Possible<tiny, 8, {1, 849}>, "87.5 %: 2.5 % off, and 2.6 %");
-static_assert(!Possible<tiny, 7, {1, 857}> && Possible<tiny, 7, {1, 857, 25, 7}>, "seven quanta where eight are usual");
-static_assert(!Possible<four_at_least, 8, {1, 500}> && Possible<four_at_least, 9, {1, 555}>);
-static_assert(!Possible<wide, 10, {}> && !Possible<wide, 10, {3}>);
+static_assert(Possible<wide, 10, BitRate{1}> && Possible<late, 20, BitRate{1}>,
+              "90.0 % and 85.0 %: 2.5 % from what CiA 301 says");
+static_assert(Possible<tiny, 8, BitRate{1, 850}> && !Possible<tiny, 8, BitRate{1, 849}>,
+              "87.5 %: 2.5 % off, and 2.6 %");
+static_assert(!Possible<tiny, 7, BitRate{1, 857}> && Possible<tiny, 7, BitRate{1, 857, 25, 7}>,
+              "seven quanta where eight are usual");
+static_assert(!Possible<four_at_least, 8, BitRate{1, 500}> && Possible<four_at_least, 9, BitRate{1, 555}>);
+static_assert(!Possible<wide, 10, BitRate{}> && !Possible<wide, 10, BitRate{3}>);
 
 // The clock's tolerance in examples of others.
 // F. Hartwich, A. Bassemir, "The Configuration of the CAN Bit Timing", 1999: 1 Mbit/s of 10 MHz with 6 quanta of
