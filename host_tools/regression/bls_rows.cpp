@@ -54,10 +54,10 @@ template <class V, int inputs>
   for (Index k = 0; k < samples; ++k, u += inputs, out += lanes) {
 #pragma GCC unroll 4
     for (int lane = 0; lane < lanes; lane += V::size) {
-      typename V::Double sum = V::at(weights + lanes + lane) * u[0];
+      typename V::Double sum = V::at(weights + lanes + lane).value * u[0];
 #pragma GCC unroll 8
-      for (int i = 1; i < inputs; ++i) sum = sum + V::at(weights + lanes * (1 + i) + lane) * u[i];
-      V::at(out + lane) = tanh_of_vector<V>(sum + V::at(weights + lane));
+      for (int i = 1; i < inputs; ++i) sum = sum + V::at(weights + lanes * (1 + i) + lane).value * u[i];
+      V::at(out + lane).value = tanh_of_vector<V>(sum + V::at(weights + lane).value);
     }
   }
 }
@@ -82,10 +82,10 @@ template <class V>
   constexpr double end = 700;
 #pragma GCC unroll 4
   for (int lane = 0; lane < lanes; lane += V::size) {
-    Double y = V::at(x + lane);
+    Double y = V::at(x + lane).value;
     y = y > end ? Double{} + end : y;
     const Exponential<V> e(-y);
-    V::at(out + lane) = (e.down - e.up) / e.down;
+    V::at(out + lane).value = (e.down - e.up) / e.down;
   }
 }
 

@@ -22,12 +22,12 @@ template <class V>
 #pragma GCC unroll 4
   for (int i = 0; i < tall; ++i) {
 #pragma GCC unroll 4
-    for (int p = 0; p < parts; ++p) sum[i][p] = V::at(sums + wide * i + V::size * p);
+    for (int p = 0; p < parts; ++p) sum[i][p] = V::at(sums + wide * i + V::size * p).value;
   }
   for (Index r = 0; r < rows; ++r, left += tall, right += wide) {
 #pragma GCC unroll 4
     for (int p = 0; p < parts; ++p) {
-      const typename V::Double x = V::at(right + V::size * p);
+      const typename V::Double x = V::at(right + V::size * p).value;
 #pragma GCC unroll 4
       for (int i = 0; i < tall; ++i) sum[i][p] = sum[i][p] + left[i] * x;
     }
@@ -35,7 +35,7 @@ template <class V>
 #pragma GCC unroll 4
   for (int i = 0; i < tall; ++i) {
 #pragma GCC unroll 4
-    for (int p = 0; p < parts; ++p) V::at(sums + wide * i + V::size * p) = sum[i][p];
+    for (int p = 0; p < parts; ++p) V::at(sums + wide * i + V::size * p).value = sum[i][p];
   }
 }
 

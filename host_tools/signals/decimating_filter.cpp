@@ -37,7 +37,7 @@ template <class V>
   Double re[2][parts], im[2][parts];
 #pragma GCC unroll 4
   for (int p = 0; p < parts; ++p) {
-    const Double x = V::at(leaps.x + p * V::size);
+    const Double x = V::at(leaps.x + p * V::size).value;
 #pragma GCC unroll 2
     for (int s = 0; s < 2; ++s) {
       re[s][p] = leaps.at_rest[2 * s] * x;
@@ -50,10 +50,10 @@ template <class V>
     if (k >= leaps.silent) {
 #pragma GCC unroll 4
       for (int p = 0; p < parts; ++p) {
-        Double& y = V::at(out + p * V::size);
-        y = (leaps.adds ? y : leaps.middle * V::at(x + p * V::size)) +
-            ((leaps.residue[0] * re[0][p] - leaps.residue[1] * im[0][p]) +
-             (leaps.residue[2] * re[1][p] - leaps.residue[3] * im[1][p]));
+        double* const y = out + p * V::size;
+        V::at(y).value = (leaps.adds ? V::at(y).value : leaps.middle * V::at(x + p * V::size).value) +
+                         ((leaps.residue[0] * re[0][p] - leaps.residue[1] * im[0][p]) +
+                          (leaps.residue[2] * re[1][p] - leaps.residue[3] * im[1][p]));
       }
       out += leaps.to_next > 0 ? lanes : -lanes;
     }
@@ -74,7 +74,7 @@ template <class V>
       w -= 4;
 #pragma GCC unroll 4
       for (int p = 0; p < parts; ++p) {
-        const Double value = V::at(x + p * V::size);
+        const Double value = V::at(x + p * V::size).value;
 #pragma GCC unroll 2
         for (int s = 0; s < 2; ++s) {
           re[s][p] = re[s][p] + w[2 * s] * value;

@@ -107,14 +107,14 @@ template <class V, int columns, int sections, class Section>
   for (int s = 0; s < sections; ++s) {
 #pragma GCC unroll 4
     for (int p = 0; p < parts; ++p) {
-      z1[s][p] = V::at(state + (2 * s) * columns + p * V::size);
-      z2[s][p] = V::at(state + (2 * s + 1) * columns + p * V::size);
+      z1[s][p] = V::at(state + (2 * s) * columns + p * V::size).value;
+      z2[s][p] = V::at(state + (2 * s + 1) * columns + p * V::size).value;
     }
   }
   for (Index k = 0; k < samples; ++k, x += step) {
 #pragma GCC unroll 4
     for (int p = 0; p < parts; ++p) {
-      typename V::Double value = V::at(x + p * V::size);
+      typename V::Double value = V::at(x + p * V::size).value;
 #pragma GCC unroll 4
       for (int s = 0; s < sections; ++s) {
         const typename V::Double y = section[s].b0 * value + z1[s][p];
@@ -122,15 +122,15 @@ template <class V, int columns, int sections, class Section>
         z2[s][p] = section[s].b2 * value - section[s].a2 * y;
         value = y;
       }
-      V::at(x + p * V::size) = value;
+      V::at(x + p * V::size).value = value;
     }
   }
 #pragma GCC unroll 4
   for (int s = 0; s < sections; ++s) {
 #pragma GCC unroll 4
     for (int p = 0; p < parts; ++p) {
-      V::at(state + (2 * s) * columns + p * V::size) = z1[s][p];
-      V::at(state + (2 * s + 1) * columns + p * V::size) = z2[s][p];
+      V::at(state + (2 * s) * columns + p * V::size).value = z1[s][p];
+      V::at(state + (2 * s + 1) * columns + p * V::size).value = z2[s][p];
     }
   }
 }

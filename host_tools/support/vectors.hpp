@@ -5,14 +5,18 @@
 
 namespace fxdyn {
 
-/// `count` numbers that the processor adds or multiplies at once (GCC's vector types), wherever they lie in memory.
+/// `count` numbers that the processor adds or multiplies at once (GCC's vector types).
 template <int count>
 struct Vector {
-  typedef double Double __attribute__((vector_size(8 * count), aligned(8), may_alias));
-  typedef std::int64_t Integer __attribute__((vector_size(8 * count), aligned(8), may_alias));
+  typedef double Double __attribute__((vector_size(8 * count), may_alias));
+  typedef std::int64_t Integer __attribute__((vector_size(8 * count), may_alias));
+  /// Wherever they lie in memory. A packed struct: Clang forgets the smaller alignment of a template's own type.
+  struct [[gnu::packed, gnu::may_alias]] InMemory {
+    Double value;
+  };
   static constexpr int size = count;
-  [[gnu::always_inline]] static Double& at(double* x) { return *reinterpret_cast<Double*>(x); }
-  [[gnu::always_inline]] static const Double& at(const double* x) { return *reinterpret_cast<const Double*>(x); }
+  [[gnu::always_inline]] static InMemory& at(double* x) { return *reinterpret_cast<InMemory*>(x); }
+  [[gnu::always_inline]] static const InMemory& at(const double* x) { return *reinterpret_cast<const InMemory*>(x); }
 };
 
 /// How long the processor's vectors are: eight (AVX-512), four (AVX2), and every one has vectors of two. Inner loops
