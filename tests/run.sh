@@ -52,6 +52,6 @@ ctest --test-dir build/host --parallel "$jobs" --output-on-failure --no-tests=er
 build host-asan unit_tests
 step "unit tests with sanitizers"
 # Not the command line's tests from end to end, whole projects, or the page in a browser: minutes each here, of code that
-# the others run. Nor what does not compile: its messages are of the other compiler. Nor hundreds of draws of one and the same.
-ctest --test-dir build/host-asan --parallel "$jobs" --output-on-failure --no-tests=error -L '^unit$' -E '_cli$|^cli$|^report_browser$|^findings_short$|^must_not_compile|^layers_against$|Seeds$|EveryParameterChangesATorque$'
+# the others run. Nor what does not compile: its messages are of the other compiler. Nor hundreds of draws of one test, nor times.
+ctest --test-dir build/host-asan --parallel "$jobs" --output-on-failure --no-tests=error -L '^unit$' -E '_cli$|^cli$|^report_browser$|^findings_short$|^must_not_compile|^layers_against$|Seeds$|Seconds$|EveryParameterChangesATorque$'
 printf '\ndone in %d s\n' "$SECONDS"
