@@ -5,13 +5,14 @@
 
 #include "host_tools/support/error.hpp"
 #include "tests/support/chains.hpp"
+#include "tests/support/files.hpp"
 
 namespace fxdyn {
 namespace {
 
 std::filesystem::path write(const std::string& text) {
   const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-  auto file = std::filesystem::path(testing::TempDir()) / (std::string(info->name()) + ".urdf");
+  auto file = test::folder() / (std::string(info->name()) + ".urdf");
   std::ofstream(file) << text;
   return file;
 }
@@ -31,7 +32,7 @@ struct Bad {
 class BadUrdf : public testing::TestWithParam<Bad> {};
 
 TEST_P(BadUrdf, IsRefusedInOneLine) {
-  const auto file = std::filesystem::path(testing::TempDir()) / ("bad_" + GetParam().name + ".urdf");
+  const auto file = test::folder() / ("bad_" + GetParam().name + ".urdf");
   std::ofstream(file) << GetParam().text;
   testing::internal::CaptureStderr();
   std::string message;

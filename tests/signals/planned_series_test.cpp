@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/support/error.hpp"
+#include "tests/support/files.hpp"
 
 namespace fxdyn {
 namespace {
@@ -23,7 +24,7 @@ class PlannedSeriesFile : public ::testing::Test {
     }
     return "none";
   }
-  std::filesystem::path file_ = std::filesystem::path(::testing::TempDir()) / "planned_series_test.json";
+  std::filesystem::path file_ = test::folder() / "excite.json";
 };
 
 TEST_F(PlannedSeriesFile, WhatIsWrittenIsRead) {
