@@ -23,7 +23,8 @@ Number number_at(const char* bytes, bool swap) {
 CdrReader::CdrReader(std::string_view message) {
   if (message.size() < 4) throw MessageError("is shorter than the header of CDR");
   const int kind = static_cast<unsigned char>(message[0]) * 256 + static_cast<unsigned char>(message[1]);
-  // 0, 1: CDR version 1; 6, 7 (RTPS 2.5) and 0x10, 0x11 (XTypes 1.2): plain CDR version 2; the odd ones are little endian.
+  // 0, 1: CDR version 1; 6, 7 (RTPS 2.5) and 0x10, 0x11 (XTypes 1.2): plain CDR version 2; the odd ones are little
+  // endian.
   const int plain = kind & ~1;
   if (plain != 0 && plain != 0x06 && plain != 0x10)
     throw MessageError(fmt::format("is in encoding 0x{:04x}, which is not plain CDR", kind));

@@ -93,8 +93,8 @@ bool JointMessageReader::knows(const std::string& type) {
 
 JointMessageReader::JointMessageReader(const BagTopic& topic) {
   if (topic.encoding != "cdr")
-    throw MessageError(fmt::format("is in encoding '{}'; CDR of ROS 2 is read: convert it with `rosbags-convert`",
-                                   topic.encoding));
+    throw MessageError(
+        fmt::format("is in encoding '{}'; CDR of ROS 2 is read: convert it with `rosbags-convert`", topic.encoding));
   const std::vector<Member> members = members_of(topic.definition);
   if (plain_type(topic.type) == joint_state) {
     if (!members.empty())
@@ -117,8 +117,8 @@ JointMessageReader::JointMessageReader(const BagTopic& topic) {
     points_.push_back(part_of(members[k].name));
   }
   if (std::find(points_.begin(), points_.end(), static_cast<int>(JointPart::measured)) == points_.end())
-    throw MessageError(fmt::format("is called {}, but has neither 'actual' nor 'feedback' in its definition in the bag",
-                                   topic.type));
+    throw MessageError(
+        fmt::format("is called {}, but has neither 'actual' nor 'feedback' in its definition in the bag", topic.type));
 }
 
 void JointMessageReader::read(std::string_view bytes, JointMessage& out) const {

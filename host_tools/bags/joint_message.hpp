@@ -13,8 +13,8 @@ namespace fxdyn {
 
 /// One number a joint that a message carries.
 enum class JointField : std::uint8_t { position, velocity, acceleration, effort };
-/// Where it comes from: measured (JointState, feedback, actual), asked for (reference, desired), or the controller's own
-/// output.
+/// Where it comes from: measured (JointState, feedback, actual), asked for (reference, desired), or the controller's
+/// own output.
 enum class JointPart : std::uint8_t { measured, reference, command };
 inline constexpr std::size_t joint_fields = 4, joint_parts = 3, joint_slots = joint_fields * joint_parts;
 

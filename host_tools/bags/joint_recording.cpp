@@ -55,7 +55,8 @@ class TopicReader {
       if (next == stream.slots.size() || stream.slots[next] != slot) return false;
       ++next;
     }
-    return next == stream.slots.size() && std::equal(stream.joints.begin(), stream.joints.end(), message_.joints.begin());
+    return next == stream.slots.size() &&
+           std::equal(stream.joints.begin(), stream.joints.end(), message_.joints.begin());
   }
 
   std::size_t stream_of_message() {
@@ -81,9 +82,10 @@ class TopicReader {
       const double moved = static_cast<double>(message_.stamp_ns) - static_cast<double>(clock.stamp_ns);
       const double waited = static_cast<double>(log_time_ns) - static_cast<double>(clock.log_ns);
       if (std::abs(moved) > std::abs(waited) + clock_jump_ns)
-        throw MessageError(fmt::format(
-            "has a stamp {:.9g} s {} the one before it, and was recorded {:.3g} s later: mixed clocks; record one of them",
-            std::abs(moved) / 1e9, moved < 0 ? "before" : "behind", waited / 1e9));
+        throw MessageError(
+            fmt::format("has a stamp {:.9g} s {} the one before it, and was recorded {:.3g} s later: mixed clocks; "
+                        "record one of them",
+                        std::abs(moved) / 1e9, moved < 0 ? "before" : "behind", waited / 1e9));
     }
     clock = {message_.stamp_ns, log_time_ns};
   }

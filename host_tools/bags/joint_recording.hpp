@@ -47,9 +47,9 @@ struct JointTable {
 /// "t", then the names of all columns of a topic that hold a number anywhere.
 std::vector<std::string> column_names(const JointTopic& topic);
 
-/// Those columns ("JOINT.position") in rows of rising time. Where several publishers have them, each joint is taken from
-/// the one that has most of what is asked for, and brought to the stamps of the fastest, by linear interpolation, for as
-/// long as all of them were there. Empties the topic.
+/// Those columns ("JOINT.position") in rows of rising time. Where several publishers have them, each joint is taken
+/// from the one that has most of what is asked for, and brought to the stamps of the fastest, by linear interpolation,
+/// for as long as all of them were there. Empties the topic.
 /// @throws InputError with `where` in front: mixed clocks, two rows of one time, a publisher that pauses
 JointTable take_table(JointTopic& topic, const std::vector<std::string>& names, const std::string& where);
 

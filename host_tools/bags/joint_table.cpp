@@ -29,7 +29,8 @@ std::vector<std::ptrdiff_t> columns_in(const JointStream& stream, const std::vec
   std::vector<std::ptrdiff_t> out(names.size(), -1);
   for (std::size_t c = 0; c < stream.columns.size(); ++c) {
     const auto found = std::find(names.begin(), names.end(), name_of(stream, c));
-    if (found != names.end() && !is_empty(stream.columns[c])) out[static_cast<std::size_t>(found - names.begin())] = static_cast<std::ptrdiff_t>(c);
+    if (found != names.end() && !is_empty(stream.columns[c]))
+      out[static_cast<std::size_t>(found - names.begin())] = static_cast<std::ptrdiff_t>(c);
   }
   return out;
 }
@@ -81,9 +82,10 @@ void sort_rows(JointStream& stream, const std::string& where) {
   for (const std::size_t row : order) {
     if (!kept.empty() && stamps[kept.back()] == stamps[row]) {
       if (is_same(kept.back(), row)) continue;
-      throw InputError(fmt::format("{}: two messages of '{}' have one stamp ({} ns) and other numbers: two publishers of "
-                                   "the same joints; record one of them",
-                                   where, stream.joints.front(), stamps[row]));
+      throw InputError(
+          fmt::format("{}: two messages of '{}' have one stamp ({} ns) and other numbers: two publishers of "
+                      "the same joints; record one of them",
+                      where, stream.joints.front(), stamps[row]));
     }
     kept.push_back(row);
   }
@@ -106,8 +108,9 @@ void check_gaps(const JointStream& stream, std::int64_t from, std::int64_t to, c
   const std::int64_t step = steps[steps.size() / 2];
   for (std::size_t k = 1; k < stamps.size(); ++k) {
     if (stamps[k] <= from || stamps[k - 1] >= to || (stamps[k] - stamps[k - 1]) / longest_gap_steps <= step) continue;
-    throw InputError(fmt::format("{}: the publisher of '{}' pauses for {:.3g} s while the others go on: record it again",
-                                 where, stream.joints.front(), static_cast<double>(stamps[k] - stamps[k - 1]) / 1e9));
+    throw InputError(
+        fmt::format("{}: the publisher of '{}' pauses for {:.3g} s while the others go on: record it again", where,
+                    stream.joints.front(), static_cast<double>(stamps[k] - stamps[k - 1]) / 1e9));
   }
 }
 
@@ -167,9 +170,10 @@ JointTable take_table(JointTopic& topic, const std::vector<std::string>& names, 
   std::int64_t from = base.stamps_ns.front(), to = base.stamps_ns.back();
   for (const Share& share : shares) {
     if (share.stream->by_log_time != base.by_log_time)
-      throw InputError(fmt::format("{}: mixed clocks: the stamps of '{}' are its publisher's, those of '{}' the recorder's",
-                                   where, base.by_log_time ? share.stream->joints.front() : base.joints.front(),
-                                   base.by_log_time ? base.joints.front() : share.stream->joints.front()));
+      throw InputError(
+          fmt::format("{}: mixed clocks: the stamps of '{}' are its publisher's, those of '{}' the recorder's", where,
+                      base.by_log_time ? share.stream->joints.front() : base.joints.front(),
+                      base.by_log_time ? base.joints.front() : share.stream->joints.front()));
     from = std::max(from, share.stream->stamps_ns.front());
     to = std::min(to, share.stream->stamps_ns.back());
   }

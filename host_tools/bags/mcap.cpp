@@ -35,9 +35,9 @@ enum class Op : unsigned char {
   statistics = 0x0B,
   data_end = 0x0F,
 };
-constexpr std::size_t record_head = 9;                   ///< opcode and length
-constexpr std::size_t footer_size = record_head + 20;    ///< summary_start, summary_offset_start, crc
-constexpr std::size_t message_head = 2 + 4 + 8 + 8;      ///< channel, sequence, log_time, publish_time
+constexpr std::size_t record_head = 9;                 ///< opcode and length
+constexpr std::size_t footer_size = record_head + 20;  ///< summary_start, summary_offset_start, crc
+constexpr std::size_t message_head = 2 + 4 + 8 + 8;    ///< channel, sequence, log_time, publish_time
 
 /// A field beyond the end of its record.
 struct TooShort {};
@@ -84,8 +84,7 @@ class McapFile {
   McapFile(const std::filesystem::path& file, BagVisitor& visitor)
       : name_(file.string()), file_(file), visitor_(visitor) {
     const std::uint64_t size = file_.size();
-    if (size < magic.size() || file_.bytes(0, magic.size()) != magic)
-      damaged(0, "is of another version than MCAP 0");
+    if (size < magic.size() || file_.bytes(0, magic.size()) != magic) damaged(0, "is of another version than MCAP 0");
     whole_ = size >= 2 * magic.size() && file_.bytes(size - magic.size(), magic.size()) == magic;
     end_.cut_where = file.filename().string();
   }
@@ -116,7 +115,8 @@ class McapFile {
 
  private:
   [[noreturn]] void damaged(std::uint64_t at, const std::string& what) const {
-    throw InputError(fmt::format("{}: {} (at byte {}): copy it again, or repair it with `mcap recover`", name_, what, at));
+    throw InputError(
+        fmt::format("{}: {} (at byte {}): copy it again, or repair it with `mcap recover`", name_, what, at));
   }
 
   /// A recording that was not closed: what is complete counts. With the bytes of the end in place it is damage.
@@ -170,7 +170,8 @@ class McapFile {
 
   Channel& channel_of(std::uint16_t id, std::uint64_t at) {
     const auto found = channels_.find(id);
-    if (found == channels_.end()) damaged(at, fmt::format("has a message of channel {}, which it does not declare", id));
+    if (found == channels_.end())
+      damaged(at, fmt::format("has a message of channel {}, which it does not declare", id));
     return found->second;
   }
 

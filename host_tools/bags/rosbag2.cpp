@@ -8,8 +8,9 @@
 #include "host_tools/bags/unpack.hpp"
 #include "host_tools/support/error.hpp"
 
-// rosbag2_storage_sqlite3: topics(id, name, type, serialization_format, ..), messages(id, topic_id, timestamp [ns], data),
-// and since its schema version 4 (Iron) message_definitions(id, topic_type, encoding, encoded_message_definition, ..).
+// rosbag2_storage_sqlite3: topics(id, name, type, serialization_format, ..), messages(id, topic_id, timestamp [ns],
+// data), and since its schema version 4 (Iron) message_definitions(id, topic_type, encoding,
+// encoded_message_definition, ..).
 
 namespace fxdyn {
 namespace {

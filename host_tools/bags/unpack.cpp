@@ -27,8 +27,8 @@ class ZstdStream {
       ZSTD_outBuffer out{piece_.data(), piece_.size(), 0};
       left_ = ::ZSTD_decompressStream(stream_.get(), &out, &in);
       if (::ZSTD_isError(left_) != 0)
-        throw InputError(fmt::format("{}: compressed by zstd, and damaged after {} bytes: copy it again", name_,
-                                     used_ + in.pos));
+        throw InputError(
+            fmt::format("{}: compressed by zstd, and damaged after {} bytes: copy it again", name_, used_ + in.pos));
       take({piece_.data(), out.pos});
     }
     used_ += packed.size();
@@ -80,8 +80,7 @@ bool unpack_lz4_into(std::string_view packed, char* room, std::size_t size) {
   std::size_t read = 0, written = 0;
   while (true) {
     std::size_t in = packed.size() - read, out = size - written;
-    const std::size_t left =
-        ::LZ4F_decompress(made, room + written, &out, packed.data() + read, &in, nullptr);
+    const std::size_t left = ::LZ4F_decompress(made, room + written, &out, packed.data() + read, &in, nullptr);
     if (::LZ4F_isError(left) != 0) return false;
     read += in;
     written += out;
@@ -96,8 +95,8 @@ void unpack_zstd_file(const std::filesystem::path& packed, const std::filesystem
   const auto take = [&](std::string_view piece) {
     out.write(piece.data(), static_cast<std::streamsize>(piece.size()));
     if (!out)
-      throw InputError(fmt::format("{}: no room to unpack it in {}; set TMPDIR to a folder with more",
-                                   packed.string(), to.parent_path().string()));
+      throw InputError(fmt::format("{}: no room to unpack it in {}; set TMPDIR to a folder with more", packed.string(),
+                                   to.parent_path().string()));
   };
   ZstdStream stream(packed.string());
   std::vector<char> piece(std::size_t{1} << 20);

@@ -92,8 +92,8 @@ Recorded recorded_of(const fs::path& file, const Log& log, const LogFactOptions&
 /// The columns by their names, or as they are given.
 ColumnGuess columns_in(const fs::path& file, const Robot& robot, const std::string& given) {
   const LogReader& reader = reader_of(file);
-  ColumnGuess guess = reader.columns == nullptr ? guess_columns(read_head(file), robot)
-                                                : guess_topic(reader.columns(file), robot);
+  ColumnGuess guess =
+      reader.columns == nullptr ? guess_columns(read_head(file), robot) : guess_topic(reader.columns(file), robot);
   if (!given.empty()) {
     LogFormat named = columns_of(given, robot);
     for (const auto& [signal, prefix] : named.columns) {
@@ -218,8 +218,7 @@ std::string init_project(const std::vector<fs::path>& logs, const fs::path& urdf
   for (const fs::path& file : logs)
     recorded.push_back(recorded_of(file, read_in_its_unit(file, robot.size(), turns, format), options));
 
-  std::string out = fmt::format("# {}: {} joints ({})\n", robot.name, robot.size(),
-                                fmt::join(names_of(robot), ", "));
+  std::string out = fmt::format("# {}: {} joints ({})\n", robot.name, robot.size(), fmt::join(names_of(robot), ", "));
   out += "# made by fxdyn init; go on with: fxdyn check PROJECT\n[robot]\n";
   out += fmt::format("urdf = \"{}\"\n", fs::relative(urdf, directory).generic_string());
   out += "# gravity = [0.0, 0.0, -9.81]   # in the base frame: write another where the base is not level\n";

@@ -12,8 +12,8 @@
 #include "host_tools/identify/payload.hpp"
 #include "host_tools/identify/payload_result.hpp"
 #include "host_tools/pipeline/log_check.hpp"
-#include "host_tools/regression/metrics_result.hpp"
 #include "host_tools/project/log_entries.hpp"
+#include "host_tools/regression/metrics_result.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
 

@@ -30,7 +30,8 @@ std::string listed(const JointTopic& topic) {
   for (const JointStream& stream : topic.streams)
     for (const std::string& joint : stream.joints)
       if (std::find(joints.begin(), joints.end(), joint) == joints.end()) joints.push_back(joint);
-  return fmt::format("{} ({}) of {}", topic.name, topic.type, joints.empty() ? "no joints" : fmt::format("{}", fmt::join(joints, ", ")));
+  return fmt::format("{} ({}) of {}", topic.name, topic.type,
+                     joints.empty() ? "no joints" : fmt::format("{}", fmt::join(joints, ", ")));
 }
 
 [[noreturn]] void no_joint_states(const JointRecording& recording, const std::string& where, const std::string& topic) {
@@ -40,10 +41,11 @@ std::string listed(const JointTopic& topic) {
   const std::size_t all = others.size();
   if (all > most) others.resize(most);
   const std::string what = topic.empty() ? "no joint states" : fmt::format("no joint states on topic {}", topic);
-  throw InputError(fmt::format("{}: {}: it has {}{}; record sensor_msgs/msg/JointState, as in ros2 bag record "
-                               "/joint_states, or name its topic: topic = \"/..\"",
-                               where, what, all == 0 ? "no topics" : fmt::format("{}", fmt::join(others, ", ")),
-                               all > most ? fmt::format(" and {} others", all - most) : ""));
+  throw InputError(
+      fmt::format("{}: {}: it has {}{}; record sensor_msgs/msg/JointState, as in ros2 bag record "
+                  "/joint_states, or name its topic: topic = \"/..\"",
+                  where, what, all == 0 ? "no topics" : fmt::format("{}", fmt::join(others, ", ")),
+                  all > most ? fmt::format(" and {} others", all - most) : ""));
 }
 
 /// Names of a project's joint columns; empty: they are numbered, or not of this signal.
@@ -61,20 +63,23 @@ std::vector<std::string> missing_of(const JointTopic& topic, const Names& wanted
 }
 
 /// What to say where a topic lacks columns: that it has other joints, or no torque.
-[[noreturn]] void lacks(const JointRecording& recording, const JointTopic& nearest, const Names& wanted, const std::string& where) {
+[[noreturn]] void lacks(const JointRecording& recording, const JointTopic& nearest, const Names& wanted,
+                        const std::string& where) {
   const Names gone = missing_of(nearest, wanted), has = column_names(nearest);
   const std::string joint = gone.front().substr(0, gone.front().find('.'));
   const bool knows_joint =
       std::any_of(has.begin(), has.end(), [&](const std::string& name) { return name.starts_with(joint + "."); });
   if (knows_joint && gone.front().ends_with(".effort"))
-    throw InputError(fmt::format("{}: {} has no {}: its driver measures no torque (effort is empty or NaN in every "
-                                 "message); it has {}",
-                                 where, nearest.name, fmt::join(gone, ", "), fmt::join(has, ", ")));
+    throw InputError(
+        fmt::format("{}: {} has no {}: its driver measures no torque (effort is empty or NaN in every "
+                    "message); it has {}",
+                    where, nearest.name, fmt::join(gone, ", "), fmt::join(has, ", ")));
   Names topics;
   for (const JointTopic& topic : recording.topics) topics.push_back(listed(topic));
-  throw InputError(fmt::format("{}: no topic has {}: there is {}; name the columns of its joints, as in columns = {{ q = "
-                               "[\"{}\", ..], tau = [..] }}",
-                               where, fmt::join(gone, ", "), fmt::join(topics, "; "), has.size() > 1 ? has[1] : "JOINT.position"));
+  throw InputError(
+      fmt::format("{}: no topic has {}: there is {}; name the columns of its joints, as in columns = {{ q = "
+                  "[\"{}\", ..], tau = [..] }}",
+                  where, fmt::join(gone, ", "), fmt::join(topics, "; "), has.size() > 1 ? has[1] : "JOINT.position"));
 }
 
 JointTopic& choose(JointRecording& recording, const Names& wanted, const std::string& where, const std::string& topic) {
@@ -135,9 +140,10 @@ ColumnTable cut(std::vector<std::vector<double>> columns, const Names& names, co
                         where, rows - (end - begin));
   for (std::size_t row = begin; row < end; ++row) {
     if (const auto column = bad(row); column != all)
-      throw InputError(fmt::format("{}: '{}' is no number at t = {:.9g} s, though it is one before and after; cut it out "
-                                   "by from_s and to_s, or record it again",
-                                   where, names[static_cast<std::size_t>(column)], columns[0][row]));
+      throw InputError(
+          fmt::format("{}: '{}' is no number at t = {:.9g} s, though it is one before and after; cut it out "
+                      "by from_s and to_s, or record it again",
+                      where, names[static_cast<std::size_t>(column)], columns[0][row]));
   }
   for (std::vector<double>& column : columns) {
     column.resize(std::max(begin, end));
@@ -188,7 +194,9 @@ std::vector<LogColumns> bag_columns(const std::filesystem::path& file) {
     if (!topic.trouble.empty()) trouble = fmt::format("{}: {}: {}", file.string(), topic.name, topic.trouble);
     if (topic.trouble.empty() && topic.messages > 0) out.push_back({topic.name, column_names(topic)});
   }
-  if (out.empty()) throw InputError(trouble.empty() ? file.string() + ": its topics have no messages: was the driver running?" : trouble);
+  if (out.empty())
+    throw InputError(trouble.empty() ? file.string() + ": its topics have no messages: was the driver running?"
+                                     : trouble);
   return out;
 }
 

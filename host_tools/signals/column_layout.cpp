@@ -76,8 +76,8 @@ std::optional<int> ColumnNames::take(const std::string& name) {
 /// The columns that a project names joint by joint.
 void ColumnNames::add_named(std::size_t signal, const std::vector<std::string>& names, std::size_t joints) {
   if (names.size() != joints) {
-    throw InputError(fmt::format("{}: columns.{} names {} columns for {} moving joints", where_,
-                                 signal_names[signal], names.size(), joints));
+    throw InputError(fmt::format("{}: columns.{} names {} columns for {} moving joints", where_, signal_names[signal],
+                                 names.size(), joints));
   }
   for (std::size_t joint = 0; joint < joints; ++joint) {
     const auto column = take(names[joint]);
@@ -120,22 +120,22 @@ void ColumnNames::add(std::size_t signal, const std::string& name, std::size_t j
 
 void ColumnNames::missing(const std::string& name, const std::string& meaning) const {
   if (name.starts_with('#')) {
-    throw InputError(fmt::format("{}: no column {} ({}): the file has {}, counted from 0", where_,
-                                 name.substr(1), meaning, names_.size()));
+    throw InputError(fmt::format("{}: no column {} ({}): the file has {}, counted from 0", where_, name.substr(1),
+                                 meaning, names_.size()));
   }
   const std::string all = fmt::format("{}", fmt::join(names_, ","));
   if (names_.size() == 1 && all.find_first_of(";\t ") != std::string::npos) {
-    throw InputError(fmt::format("{}: no commas in the header '{}'; separate columns by commas", where_,
-                                 all.substr(0, 60)));
+    throw InputError(
+        fmt::format("{}: no commas in the header '{}'; separate columns by commas", where_, all.substr(0, 60)));
   }
   if (!has_names_) {
-    throw InputError(fmt::format(
-        "{}: starts with a number; the first line must name the columns (t,q1,...,tau1,...), or the "
-        "project gives the numbers of these {} columns, from 0: columns = {{ t = 0, q = [1], tau = [2] }}",
-        where_, names_.size()));
+    throw InputError(
+        fmt::format("{}: starts with a number; the first line must name the columns (t,q1,...,tau1,...), or the "
+                    "project gives the numbers of these {} columns, from 0: columns = {{ t = 0, q = [1], tau = [2] }}",
+                    where_, names_.size()));
   }
-  throw InputError(fmt::format("{}: no column '{}' ({}); {}", where_, name, meaning,
-                               column_advice(name, names_, joints_)));
+  throw InputError(
+      fmt::format("{}: no column '{}' ({}); {}", where_, name, meaning, column_advice(name, names_, joints_)));
 }
 
 Log to_log(ColumnTable table, const ColumnLayout& layout, std::size_t joints) {

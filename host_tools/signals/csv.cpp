@@ -31,7 +31,8 @@ bool starts_with_number(std::string_view text) {
 
 class Rows {
  public:
-  Rows(const std::string& file, const ColumnLayout& layout) : file_(file), layout_(layout), values_(layout.names.size()) {}
+  Rows(const std::string& file, const ColumnLayout& layout)
+      : file_(file), layout_(layout), values_(layout.names.size()) {}
 
   /// Stamps as they stand, of the first rows.
   std::vector<double> first_stamps(LineReader lines) {

@@ -20,9 +20,8 @@ constexpr std::array readers{
 std::span<const LogReader> log_readers() { return readers; }
 
 const LogReader& reader_of(const std::filesystem::path& file, std::span<const LogReader> all) {
-  const auto own = std::find_if(all.begin(), all.end(), [&](const LogReader& reader) {
-    return reader.knows != nullptr && reader.knows(file);
-  });
+  const auto own = std::find_if(all.begin(), all.end(),
+                                [&](const LogReader& reader) { return reader.knows != nullptr && reader.knows(file); });
   if (own != all.end()) return *own;
   std::string extension = file.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
@@ -42,7 +41,8 @@ std::vector<std::string> joint_columns_of(const std::string& signal, const std::
   return out;
 }
 
-LogFormat with_joint_names(const std::filesystem::path& file, LogFormat format, const std::vector<std::string>& joints) {
+LogFormat with_joint_names(const std::filesystem::path& file, LogFormat format,
+                           const std::vector<std::string>& joints) {
   if (reader_of(file).columns == nullptr) return format;
   for (const char* signal : signal_names) {
     if (format.columns.contains(signal) || format.joint_columns.contains(signal)) continue;

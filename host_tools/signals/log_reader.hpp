@@ -57,7 +57,8 @@ struct LogReader {
   RecordedLog (*read)(const LogRequest& request);
   /// Whether a file is its own, by its first bytes; it may have any name. nullptr: the extension says it.
   bool (*knows)(const std::filesystem::path& file) = nullptr;
-  /// Of a format that names the joints; the topic that serves best first. nullptr: a line of the text names the columns.
+  /// Of a format that names the joints; the topic that serves best first. nullptr: a line of the text names the
+  /// columns.
   /// @throws InputError: it has none
   std::vector<LogColumns> (*columns)(const std::filesystem::path& file) = nullptr;
 };

@@ -64,7 +64,8 @@ TEST(JointRecording, RowsAreSortedAndAMessageThatCameTwiceCountsOnce) {
   JointTopic topic = states.read();
   EXPECT_EQ(take_table(topic, {"a.position"}, "states.mcap").columns[1], (Column{0, 1, 2, 3}));
   topic = States().add(begin_ns, 0, {"a"}, {1}).add(begin_ns, 0, {"a"}, {2}).read();
-  test::expect_refused("states.mcap", {"'a'", "two publishers"}, [&] { take_table(topic, {"a.position"}, "states.mcap"); });
+  test::expect_refused("states.mcap", {"'a'", "two publishers"},
+                       [&] { take_table(topic, {"a.position"}, "states.mcap"); });
 }
 
 TEST(JointRecording, WithoutAStampTheRecordersTimeCounts) {
@@ -74,14 +75,17 @@ TEST(JointRecording, WithoutAStampTheRecordersTimeCounts) {
 }
 
 TEST(JointRecording, MixedClocksAreSaid) {
-  EXPECT_NE(States().add(begin_ns, 0, {"a"}, {1}).add(0, ms, {"a"}, {1}).read().trouble.find("no stamp"), std::string::npos);
+  EXPECT_NE(States().add(begin_ns, 0, {"a"}, {1}).add(0, ms, {"a"}, {1}).read().trouble.find("no stamp"),
+            std::string::npos);
   // the simulator's time, and then the wall's
   EXPECT_NE(States().add(12'000 * ms, 0, {"a"}, {1}).add(begin_ns, ms, {"a"}, {1}).read().trouble.find("mixed clocks"),
             std::string::npos);
   // a simulator at half the speed is one clock
   EXPECT_EQ(States().add(0 + ms, 0, {"a"}, {1}).add(3000 * ms, 6000 * ms, {"a"}, {1}).read().trouble, "");
   JointTopic topic = States().add(0, 0, {"a"}, {1}).add(begin_ns, 0, {"b"}, {1}).read();
-  test::expect_refused("x.mcap", {"mixed clocks", "'a'", "'b'"}, [&] { take_table(topic, {"a.position", "b.position"}, "x.mcap"); });
+  test::expect_refused("x.mcap", {"mixed clocks", "'a'", "'b'"}, [&] {
+    take_table(topic, {"a.position", "b.position"}, "x.mcap");
+  });
 }
 
 TEST(JointRecording, APublisherThatPausesIsNotInterpolated) {
@@ -91,12 +95,17 @@ TEST(JointRecording, APublisherThatPausesIsNotInterpolated) {
     if (k < 30 || k > 60) states.add(begin_ns + k * ms, k * ms, {"b"}, {1});
   }
   JointTopic topic = states.read();
-  test::expect_refused("x.mcap", {"'b' pauses for 0.032 s"}, [&] { take_table(topic, {"a.position", "b.position"}, "x.mcap"); });
+  test::expect_refused("x.mcap", {"'b' pauses for 0.032 s"}, [&] {
+    take_table(topic, {"a.position", "b.position"}, "x.mcap");
+  });
 }
 
 TEST(JointRecording, AColumnWithoutAnyNumberIsNone) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  const JointTopic topic = States().add(begin_ns, 0, {"a", "b"}, {1, 2}, {nan, 3}).add(begin_ns + ms, ms, {"a", "b"}, {1, 2}, {nan, nan}).read();
+  const JointTopic topic = States()
+                               .add(begin_ns, 0, {"a", "b"}, {1, 2}, {nan, 3})
+                               .add(begin_ns + ms, ms, {"a", "b"}, {1, 2}, {nan, nan})
+                               .read();
   EXPECT_EQ(column_names(topic), (std::vector<std::string>{"t", "a.position", "b.position", "b.effort"}));
 }
 

@@ -95,7 +95,9 @@ TEST(Mcap, OtherSchemasAndEncodingsAreTheTopicsTrouble) {
     bag.message(id, begin_ns, test::joint_state(begin_ns, {"a"}, {1}, {}, {}));
     return read_topic(test::write("schema.mcap", bag.bytes())).trouble;
   };
-  EXPECT_EQ(trouble("std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n", "cdr"), "");
+  EXPECT_EQ(trouble("std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n",
+                    "cdr"),
+            "");
   EXPECT_NE(trouble("std_msgs/Header header\nfloat64 position\n", "cdr").find("'float64 position'"), std::string::npos);
   EXPECT_NE(trouble("", "ros1").find("'ros1'"), std::string::npos);
 }

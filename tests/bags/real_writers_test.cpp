@@ -11,7 +11,8 @@ namespace {
 const std::vector<std::string> joints{"base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3"};
 
 Log read(const std::filesystem::path& file) {
-  return read_log(file, joints.size(), std::vector<bool>(joints.size(), true), with_joint_names(file, {}, joints), {}, {});
+  return read_log(file, joints.size(), std::vector<bool>(joints.size(), true), with_joint_names(file, {}, joints), {},
+                  {});
 }
 
 class RealWriters : public testing::TestWithParam<const char*> {

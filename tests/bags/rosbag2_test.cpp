@@ -26,7 +26,9 @@ std::string small_database() {
       "INSERT INTO topics VALUES(2, '/tf', 'tf2_msgs/msg/TFMessage', 'cdr', ''); BEGIN";
   EXPECT_EQ(::sqlite3_exec(base, tables, nullptr, nullptr, nullptr), SQLITE_OK);
   sqlite3_stmt* insert = nullptr;
-  EXPECT_EQ(::sqlite3_prepare_v2(base, "INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)", -1, &insert, nullptr), SQLITE_OK);
+  EXPECT_EQ(::sqlite3_prepare_v2(base, "INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)", -1, &insert,
+                                 nullptr),
+            SQLITE_OK);
   for (int k = 0; k < 200; ++k) {
     const std::int64_t ns = begin_ns + k * 2'000'000;
     const std::string data = test::joint_state(ns, {"a", "b"}, {1.0 * k, 2}, {3, 4}, {5, -0.5 * k});

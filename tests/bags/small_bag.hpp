@@ -41,7 +41,8 @@ inline std::string joint_state(std::int64_t stamp_ns, const std::vector<std::str
                                const Reals& velocity, const Reals& effort) {
   Bytes out;
   out.raw(std::string("\0\1\0\0", 4));
-  out.add(static_cast<std::int32_t>(stamp_ns / 1'000'000'000)).add(static_cast<std::uint32_t>(stamp_ns % 1'000'000'000));
+  out.add(static_cast<std::int32_t>(stamp_ns / 1'000'000'000))
+      .add(static_cast<std::uint32_t>(stamp_ns % 1'000'000'000));
   out.text(std::string("world", 6)).align(4, 4).add(static_cast<std::uint32_t>(names.size()));
   for (const std::string& name : names) out.align(4, 4).text(name + '\0');
   for (const Reals& values : {position, velocity, effort}) {

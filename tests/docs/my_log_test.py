@@ -5,6 +5,7 @@ the robot's range and torque: then columns, units and signs came through."""
 import math
 import pathlib
 import re
+import sqlite3
 import struct
 import subprocess
 import sys
@@ -82,14 +83,39 @@ def staubli(folder, rows):
     (folder / 'staubli.csv').write_text('\n'.join(lines) + '\n')
 
 
+def joint_state(stamp, names, *fields):
+    """sensor_msgs/msg/JointState in little endian CDR."""
+    out = bytearray(struct.pack('<iII', int(stamp // 10**9), stamp % 10**9, 1) + b'\0')
+    def align(size):
+        out.extend(bytes(-len(out) % size))
+    align(4)
+    out.extend(struct.pack('<I', len(names)))
+    for name in names:
+        align(4)
+        out.extend(struct.pack('<I', len(name) + 1) + name.encode() + b'\0')
+    for values in fields:
+        align(4)
+        out.extend(struct.pack('<I', len(values)))
+        align(8)
+        out.extend(struct.pack(f'<{len(values)}d', *values))
+    return b'\0\1\0\0' + bytes(out)
+
+
 def ros_2(folder, rows):
-    names = joint_names()
-    pick = lambda values: [f'{values[j]:.10g}' for j in ROS_ORDER]
-    lines = []
+    names = [joint_names()[j] for j in ROS_ORDER]
+    pick = lambda values: [values[j] for j in ROS_ORDER]
+    (folder / 'my_bag').mkdir()
+    (folder / 'my_bag/metadata.yaml').write_text('rosbag2_bagfile_information:\n  relative_file_paths:\n    - my_bag_0.db3\n')
+    bag = sqlite3.connect(folder / 'my_bag/my_bag_0.db3')
+    bag.execute('CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT, offered_qos_profiles TEXT)')
+    bag.execute('CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)')
+    bag.execute("INSERT INTO topics VALUES(1, '/joint_states', 'sensor_msgs/msg/JointState', 'cdr', '')")
     for (t, q, tau), dq in zip(rows, velocities(rows)):
-        whole = 1700000000 + int(t)
-        lines.append(','.join([str(whole), str(round((t - int(t)) * 1e9)), '', *[names[j] for j in ROS_ORDER], *pick(q), *pick(dq), *pick(tau)]))
-    (folder / 'states.csv').write_text('\n'.join(lines) + '\n')
+        stamp = 1700000000 * 10**9 + round(t * 1e9)
+        bag.execute('INSERT INTO messages(topic_id, timestamp, data) VALUES(1, ?, ?)',
+                    (stamp + 200000, joint_state(stamp, names, pick(q), pick(dq), pick(tau))))
+    bag.commit()
+    bag.close()
 
 
 def odrive(folder, rows):
@@ -117,7 +143,7 @@ def can_sniffer(folder, rows):
 
 
 KINDS = {'Universal Robots (RTDE)': universal_robots, 'Franka (libfranka)': franka, 'KUKA (RSI)': kuka, 'Staubli': staubli,
-         'ROS 2 JointState': ros_2, 'ODrive': odrive, 'moteus': moteus, 'A CAN sniffer (CiA 402)': can_sniffer}
+         'ROS 2': ros_2, 'ODrive': odrive, 'moteus': moteus, 'A CAN sniffer (CiA 402)': can_sniffer}
 
 
 def commands_of(page):

@@ -24,7 +24,8 @@ void add_states(test::SmallBag& bag, const std::string& topic, const std::vector
     const bool is_nan = std::find(nan.begin(), nan.end(), k) != nan.end();
     test::Reals tau{1.0 * k, is_nan ? std::nan("") : 2.0 * k};
     if (!effort) tau.clear();
-    bag.message(id, begin_ns + k * step_ns, test::joint_state(begin_ns + k * step_ns, names, {q_of(k, 0), q_of(k, 1)}, {}, tau));
+    bag.message(id, begin_ns + k * step_ns,
+                test::joint_state(begin_ns + k * step_ns, names, {q_of(k, 0), q_of(k, 1)}, {}, tau));
   }
 }
 
@@ -69,13 +70,18 @@ TEST(BagLog, WithoutJointStatesItSaysWhatThereIs) {
   test::SmallBag bag;
   bag.message(bag.channel("/tf", "tf2_msgs/msg/TFMessage"), begin_ns, "");
   const auto file = test::write("tf.mcap", bag.bytes());
-  test::expect_refused(file, {"no joint states", "/tf (tf2_msgs/msg/TFMessage)", "ros2 bag record /joint_states"}, [&] { read(file); });
+  test::expect_refused(file, {"no joint states", "/tf (tf2_msgs/msg/TFMessage)", "ros2 bag record /joint_states"},
+                       [&] { read(file); });
 }
 
 TEST(BagLog, OtherJointsAreListed) {
   const auto file = with_states("/joint_states", {"arm_1", "arm_2"});
-  test::expect_refused(file, {"no topic has shoulder.position, elbow.position", "/joint_states (sensor_msgs/msg/JointState) of arm_1, arm_2", "arm_1.position"}, [&] { read(file); });
-  const LogFormat format{.joint_columns = {{"q", {"arm_1.position", "arm_2.position"}}, {"tau", {"arm_1.effort", "arm_2.effort"}}}};
+  test::expect_refused(file,
+                       {"no topic has shoulder.position, elbow.position",
+                        "/joint_states (sensor_msgs/msg/JointState) of arm_1, arm_2", "arm_1.position"},
+                       [&] { read(file); });
+  const LogFormat format{
+      .joint_columns = {{"q", {"arm_1.position", "arm_2.position"}}, {"tau", {"arm_1.effort", "arm_2.effort"}}}};
   EXPECT_EQ(read(file, format).samples(), 100);
 }
 
@@ -99,10 +105,15 @@ TEST(BagLog, TheTopicIsChosenOrAskedFor) {
   add_states(bag, "/left/joint_states", joints);
   add_states(bag, "/right/joint_states", joints, {3});
   const auto file = test::write("two.mcap", bag.bytes());
-  test::expect_refused(file, {"/left/joint_states and /right/joint_states", "topic = \"/left/joint_states\""}, [&] { read(file); });
+  test::expect_refused(file, {"/left/joint_states and /right/joint_states", "topic = \"/left/joint_states\""},
+                       [&] { read(file); });
   EXPECT_EQ(read(file, {.columns = {{topic_key, "/left/joint_states"}}}).samples(), 100);
-  test::expect_refused(file, {"'elbow.effort'"}, [&] { read(file, {.columns = {{topic_key, "/right/joint_states"}}}); });
-  test::expect_refused(file, {"on topic /none", "/left/joint_states"}, [&] { read(file, {.columns = {{topic_key, "/none"}}}); });
+  test::expect_refused(file, {"'elbow.effort'"}, [&] {
+    read(file, {.columns = {{topic_key, "/right/joint_states"}}});
+  });
+  test::expect_refused(file, {"on topic /none", "/left/joint_states"}, [&] {
+    read(file, {.columns = {{topic_key, "/none"}}});
+  });
   test::SmallBag with_default;
   add_states(with_default, "/left/joint_states", joints, {3});
   add_states(with_default, "/joint_states", joints);
@@ -124,7 +135,8 @@ TEST(BagLog, AFolderNeedsItsParts) {
   const auto folder = test::folder() / "bag";
   std::filesystem::create_directories(folder);
   const auto metadata = [&](const std::string& names) {
-    test::write("bag/metadata.yaml", "rosbag2_bagfile_information:\n  relative_file_paths:\n" + names + "  duration:\n");
+    test::write("bag/metadata.yaml",
+                "rosbag2_bagfile_information:\n  relative_file_paths:\n" + names + "  duration:\n");
   };
   metadata("    - bag_0.mcap\n    - bag_1.mcap\n");
   test::SmallBag bag;
