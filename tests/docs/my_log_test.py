@@ -5,13 +5,14 @@ the robot's range and torque: then columns, units and signs came through."""
 import math
 import pathlib
 import re
-import sqlite3
 import struct
 import subprocess
 import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / 'tests/support'))
+import ros2_bags
 PAGE = ROOT / 'docs/guide/my-log.md'
 DEMO = ROOT / 'host_tools/demo'
 JOINTS = 6
@@ -83,39 +84,16 @@ def staubli(folder, rows):
     (folder / 'staubli.csv').write_text('\n'.join(lines) + '\n')
 
 
-def joint_state(stamp, names, *fields):
-    """sensor_msgs/msg/JointState in little endian CDR."""
-    out = bytearray(struct.pack('<iII', int(stamp // 10**9), stamp % 10**9, 1) + b'\0')
-    def align(size):
-        out.extend(bytes(-len(out) % size))
-    align(4)
-    out.extend(struct.pack('<I', len(names)))
-    for name in names:
-        align(4)
-        out.extend(struct.pack('<I', len(name) + 1) + name.encode() + b'\0')
-    for values in fields:
-        align(4)
-        out.extend(struct.pack('<I', len(values)))
-        align(8)
-        out.extend(struct.pack(f'<{len(values)}d', *values))
-    return b'\0\1\0\0' + bytes(out)
-
-
 def ros_2(folder, rows):
     names = [joint_names()[j] for j in ROS_ORDER]
     pick = lambda values: [values[j] for j in ROS_ORDER]
     (folder / 'my_bag').mkdir()
     (folder / 'my_bag/metadata.yaml').write_text('rosbag2_bagfile_information:\n  relative_file_paths:\n    - my_bag_0.db3\n')
-    bag = sqlite3.connect(folder / 'my_bag/my_bag_0.db3')
-    bag.execute('CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, serialization_format TEXT, offered_qos_profiles TEXT)')
-    bag.execute('CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)')
-    bag.execute("INSERT INTO topics VALUES(1, '/joint_states', 'sensor_msgs/msg/JointState', 'cdr', '')")
+    messages = []
     for (t, q, tau), dq in zip(rows, velocities(rows)):
         stamp = 1700000000 * 10**9 + round(t * 1e9)
-        bag.execute('INSERT INTO messages(topic_id, timestamp, data) VALUES(1, ?, ?)',
-                    (stamp + 200000, joint_state(stamp, names, pick(q), pick(dq), pick(tau))))
-    bag.commit()
-    bag.close()
+        messages.append((stamp + 200000, ros2_bags.joint_state(stamp, names, pick(q), pick(dq), pick(tau))))
+    ros2_bags.database(folder / 'my_bag/my_bag_0.db3', messages)
 
 
 def odrive(folder, rows):

@@ -33,12 +33,33 @@ import zipfile
 import good
 
 HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "support"))
+import ros2_bags
 TIMEOUT_S = 60
+
+
+def make_bag(kind, text):
+    """The log's rows as messages of a ROS 2 bag."""
+    begin, names = 1700000000 * 10**9, ["shoulder", "elbow"] if kind != "of another robot" else ["joint_a", "joint_b"]
+    messages = []
+    for k, line in enumerate(text.splitlines()[1:]):
+        t, *values = map(float, line.split(","))
+        at = begin + round(t * 1e9)
+        stamp = round(t * 1e9) + 10**9 if kind == "of two clocks" and k < 500 else at
+        effort = values[2:] if kind != "without torque" else []
+        if kind == "with NaN" and k == 700:
+            effort = [effort[0], float("nan")]
+        messages.append((at, ros2_bags.joint_state(stamp, names, values[:2], [], effort)))
+    topic = {"without joint states": ("/tf", "tf2_msgs/msg/TFMessage")}.get(kind, ("/joint_states", ros2_bags.JOINT_STATE))
+    data = ros2_bags.database(":memory:", messages, *topic)
+    return data[:len(data) // 2] if kind == "cut" else data
 
 
 def make_bytes(kind, text, file):
     """The log's text as other programs would store it; None: `file` was written."""
     data = text.encode()
+    if kind.startswith("bag "):
+        return make_bag(kind.removeprefix("bag "), text)
     if kind == "gzip":
         return gzip.compress(data, 1)
     if kind == "gzip, cut":
