@@ -1,11 +1,13 @@
 #include <fmt/format.h>
 
+#include <unistd.h>
 #include <filesystem>
 #include <map>
 #include <new>
 
 #include "host_tools/cli/shell_files.hpp"
 #include "host_tools/cli/verb.hpp"
+#include "host_tools/effects/effect_library.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/heap.hpp"
 #include "host_tools/support/pipes.hpp"
@@ -48,6 +50,15 @@ void complain_of_usage(const CLI::App& app, const CLI::ParseError& error, const 
   fmt::print(stderr, "fxdyn: {}: {}\n", one_line(wrong), one_line(fmt::format("as in `{}`", works)));
 }
 
+/// Starts the program that has the project's effects in this one's place; returns where it is not there.
+void start_instead(const std::string& library, char** argv) {
+  std::error_code none;
+  const auto self = std::filesystem::read_symlink("/proc/self/exe", none);
+  const std::string program = (self.parent_path() / ("fxdyn-" + library)).string();
+  std::fflush(nullptr);
+  ::execv(program.c_str(), argv);
+}
+
 int run(int argc, char** argv) {
   CLI::App app{
       "fxdyn: from a robot's measured log to torque feedforward on its drive controllers.\n"
@@ -80,6 +91,10 @@ int main(int argc, char** argv) {
   const auto complain = [](const std::string& what) { fmt::print(stderr, "fxdyn: {}\n", one_line(what)); };
   try {
     return run(argc, argv);
+  } catch (const fxdyn::OtherEffectLibrary& error) {
+    start_instead(error.library, argv);
+    complain(error.what());
+    return 2;
   } catch (const fxdyn::InputError& error) {
     complain(error.what());
     return 2;
