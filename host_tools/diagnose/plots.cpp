@@ -52,7 +52,8 @@ VectorXd joined_columns(const std::vector<Residuals>& logs, MatrixXd Residuals::
 Chart against(const std::vector<Residuals>& logs, MatrixXd Residuals::*of, Index joint, const std::string& x_label,
               const std::string& y_label) {
   const VectorXd x = joined_columns(logs, of, joint);
-  const VectorXd before = joined_columns(logs, &Residuals::before, joint), after = joined_columns(logs, &Residuals::after, joint);
+  const VectorXd before = joined_columns(logs, &Residuals::before, joint),
+                 after = joined_columns(logs, &Residuals::after, joint);
   const ClassMeans mean_before = class_means(x, before), mean_after = class_means(x, after);
   return {x_label,
           y_label,

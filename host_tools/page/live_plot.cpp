@@ -74,11 +74,13 @@ std::string live_figure(std::string_view svg, std::string_view caption, const Li
   const double origin = time_origin(plot.t);
   const std::vector<Index> kept = kept_samples(residual, plot.most_samples);
   Packed data;
-  for (const VectorXd& column : {VectorXd(plot.t.array() - origin), plot.measured, residual, plot.velocity, plot.position})
+  for (const VectorXd& column :
+       {VectorXd(plot.t.array() - origin), plot.measured, residual, plot.velocity, plot.position})
     data.add(column, kept);
-  out.insert(tag.size(), fmt::format(" class=\"live\" data-units=\"{} {}\" data-time=\"{}\" data-ends=\"{}\" data-live=\"{}\"",
-                                     escape(plot.torque_unit), escape(plot.path_unit),
-                                     escape(time_label("time [s]", origin)), data.ends, base64(data.bytes)));
+  out.insert(tag.size(),
+             fmt::format(" class=\"live\" data-units=\"{} {}\" data-time=\"{}\" data-ends=\"{}\" data-live=\"{}\"",
+                         escape(plot.torque_unit), escape(plot.path_unit), escape(time_label("time [s]", origin)),
+                         data.ends, base64(data.bytes)));
   return out;
 }
 

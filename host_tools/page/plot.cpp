@@ -262,8 +262,7 @@ std::string curve_command(const Curve& one, const fs::path& directory, const std
     write_file(directory / file, text);
     return fmt::format("'{}' using 1:2:3 with filledcurves lc rgb '{}' {}", file, one.colour, title);
   }
-  write_file(directory / file,
-             one.path ? path(one.x, one.y, chart_points) : curve(one.x, one.y, chart_points, origin));
+  write_file(directory / file, one.path ? path(one.x, one.y, chart_points) : curve(one.x, one.y, chart_points, origin));
   return fmt::format("'{}' with lines lw {} lc rgb '{}' {}", file, one.width, one.colour, title);
 }
 
@@ -273,7 +272,8 @@ std::string chart_commands(const Chart& chart, const fs::path& directory, const 
   std::string lines;
   for (std::size_t i = 0; i < chart.curves.size(); ++i)
     lines += (i > 0 ? ", " : "") + curve_command(chart.curves[i], directory, fmt::format("{}_{}.dat", name, i), origin);
-  const std::string range = chart.y_from < chart.y_to ? fmt::format("[{:.6g}:{:.6g}]", chart.y_from, chart.y_to) : "[*:*]";
+  const std::string range =
+      chart.y_from < chart.y_to ? fmt::format("[{:.6g}:{:.6g}]", chart.y_from, chart.y_to) : "[*:*]";
   return fmt::format("{} logscale y\nset yrange {}\nset format y '{}'\nset xlabel '{}'\nset ylabel '{}'\nplot {}\n",
                      chart.logarithmic ? "set" : "unset", range, chart.logarithmic ? "%.0e" : "%g",
                      quoted(time_label(chart.x_label, origin)), quoted(chart.y_label), lines);
@@ -289,7 +289,8 @@ std::vector<std::string> draw(const std::vector<std::vector<Chart>>& all, int co
   for (std::size_t p = 0; p < all.size(); ++p) {
     const int rows = (static_cast<int>(all[p].size()) + columns - 1) / columns;
     script += fmt::format(
-        "set terminal svg size 1000,{} dynamic noenhanced font 'sans-serif,12' background '#ffffff'\nset tmargin 2\nset "
+        "set terminal svg size 1000,{} dynamic noenhanced font 'sans-serif,12' background '#ffffff'\nset tmargin "
+        "2\nset "
         "output '{}.svg'\nset multiplot layout {},{}\n",
         row_height * rows, p, rows, columns);
     for (std::size_t c = 0; c < all[p].size(); ++c)
@@ -300,6 +301,8 @@ std::vector<std::string> draw(const std::vector<std::vector<Chart>>& all, int co
   return pictures(directory.path(), all.size());
 }
 
-std::string draw(const std::vector<Chart>& charts, int columns) { return draw(std::vector<std::vector<Chart>>{charts}, columns).front(); }
+std::string draw(const std::vector<Chart>& charts, int columns) {
+  return draw(std::vector<std::vector<Chart>>{charts}, columns).front();
+}
 
 }  // namespace fxdyn

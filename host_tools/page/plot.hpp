@@ -42,7 +42,7 @@ struct Curve {
 struct Chart {
   std::string x_label, y_label;  ///< with unit
   std::vector<Curve> curves;
-  bool logarithmic = false;  ///< y
+  bool logarithmic = false;     ///< y
   double y_from = 0, y_to = 0;  ///< the axis; equal: as the curves need
 };
 

@@ -47,12 +47,15 @@ std::string masses(const ReportInput& input) {
   const MetricsResult metrics = metrics_of(file);
   if (!metrics.fit || !metrics.fit->physical) return "";
   const PhysicalResult& bodies = *metrics.fit->physical;
-  Table table({{"link"}, {"mass [kg]", "n"}, {"from the data", "n"}, {"centre x, y, z [m]", "n"},
-               {"from the data", "n"}, {"mass in the URDF [kg]", "n"}});
+  Table table({{"link"},
+               {"mass [kg]", "n"},
+               {"from the data", "n"},
+               {"centre x, y, z [m]", "n"},
+               {"from the data", "n"},
+               {"mass in the URDF [kg]", "n"}});
   const auto three = [](const std::array<BodyFigure, 3>& all, const char* format, auto value) {
     std::string out;
-    for (const BodyFigure& one : all)
-      out += (out.empty() ? "" : ", ") + fmt::format(fmt::runtime(format), value(one));
+    for (const BodyFigure& one : all) out += (out.empty() ? "" : ", ") + fmt::format(fmt::runtime(format), value(one));
     return out;
   };
   for (const LinkResult& link : bodies.links) {
@@ -63,7 +66,11 @@ std::string masses(const ReportInput& input) {
                {three(link.centre, "{:.0f} %", [](const BodyFigure& one) { return 100 * one.data_share; }), "n"},
                link.urdf ? number(link.urdf->mass, 3) : Cell{"-", "n"}});
   }
-  table.add({{"all links"}, number(bodies.mass.value, 3), share_cell(bodies.mass), {"-", "n"}, {"-", "n"},
+  table.add({{"all links"},
+             number(bodies.mass.value, 3),
+             share_cell(bodies.mass),
+             {"-", "n"},
+             {"-", "n"},
              bodies.urdf_mass ? number(*bodies.urdf_mass, 3) : Cell{"-", "n"}});
   return subsection("Masses") +
          paragraph(fmt::format(

@@ -24,7 +24,7 @@ struct FindingPicture {
   std::size_t joint = 0;           ///< from 0; of a finding on the robot the joint that feels most of it
   std::string effect, parameters;  ///< names, and "amplitude 2.1 ± 0.05 N*m"; empty: unknown
   ShownSignal over;
-  double explained = 0;          ///< share of the effect's torque (unknown: of what is left) that is a function of it
+  double explained = 0;           ///< share of the effect's torque (unknown: of what is left) that is a function of it
   Eigen::VectorXd without, with;  ///< residual of the model without the effect (not fitted again), and with it
   ClassMeans torque;              ///< of the effect alone: predicted with it minus without
   Eigen::VectorXd band;           ///< 1.96 standard deviations of `torque`; empty: not known

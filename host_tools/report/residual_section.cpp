@@ -51,8 +51,7 @@ std::string residual_section(const ReportInput& input, const nlohmann::json&) {
   if (logs.empty()) return "";
   const std::vector<Joint>& joints = robot_of(input.fitted).joints;
   std::vector<std::vector<Chart>> charts;
-  for (std::size_t j = 0; j < joints.size(); ++j)
-    charts.push_back(charts_of(logs, joints[j], static_cast<Index>(j)));
+  for (std::size_t j = 0; j < joints.size(); ++j) charts.push_back(charts_of(logs, joints[j], static_cast<Index>(j)));
   const std::vector<std::string> pictures = draw(charts, 2);
   std::vector<std::string> all;
   for (std::size_t j = 0; j < joints.size(); ++j)

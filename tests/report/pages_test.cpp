@@ -179,7 +179,8 @@ TEST(Pages, LivePlotsComeWithTheirLibraryOnceAndItsLicence) {
   EXPECT_EQ(page.find("<script", script + 1), std::string::npos);
   EXPECT_NE(page.find("Permission is hereby granted, free of charge", script), std::string::npos);
   std::size_t figures = 0;
-  for (std::size_t at = page.find("<figure class=\"live\""); at < script; at = page.find("<figure class=\"live\"", at + 1))
+  for (std::size_t at = page.find("<figure class=\"live\""); at < script;
+       at = page.find("<figure class=\"live\"", at + 1))
     ++figures;
   EXPECT_EQ(figures, 6U);
 }
