@@ -12,8 +12,8 @@ packages=(
   libzstd-dev liblz4-dev libsqlite3-dev
   # pins of the node on Linux
   libgpiod-dev
-  # report
-  gnuplot-nox
+  # report: its pictures; what npm needs to install its plotting library
+  gnuplot-nox nodejs
   # target
   gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib qemu-system-arm
   binutils-aarch64-linux-gnu openocd libunicorn-dev libcapstone-dev
@@ -22,12 +22,13 @@ packages=(
   # sanitizers: of Clang 14, templates with consteval calls do not compile
   clang-16 libclang-rt-16-dev
   # tests
-  chromium nodejs
+  chromium
   libgtest-dev libunicorn-dev librapidcheck-dev libbenchmark-dev liborocos-kdl-dev libmujoco-dev libpagmo-dev python3 llvm-14 zstd lz4
   # spelling of the pages, their site, the reference of the headers
   aspell aspell-en mkdocs mkdocs-material doxygen
 )
 
+# npm brings the plotting library of the reports (host_tools/page/plotting) and the packages of their tests.
 # Node.js from elsewhere has its own npm, beside which Debian's can't be installed.
 command -v npm >/dev/null || packages+=(npm)
 

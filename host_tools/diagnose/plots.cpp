@@ -3,14 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
-#include <numeric>
 
 #include "host_tools/effects/model_parts.hpp"
+#include "host_tools/page/class_means.hpp"
 #include "host_tools/page/diagnosis_plot.hpp"
 #include "host_tools/page/plot.hpp"
-#include "host_tools/signals/spectrum.hpp"
+#include "host_tools/report/shown_log.hpp"
 #include "host_tools/support/files.hpp"
 
 namespace fxdyn {
@@ -26,7 +24,6 @@ constexpr const char* before_colour = "#2e6fb7";
 constexpr const char* after_colour = "#e4572e";
 constexpr const char* before_cloud = "#b82e6fb7";
 constexpr const char* after_cloud = "#b8e4572e";
-constexpr const char* floor_colour = "#888888";
 
 /// One log without its edges, samples x joints.
 struct Residuals {
@@ -46,46 +43,18 @@ Residuals residuals(const ProcessedLog& log, const IdentifiedModel& nominal, con
 }
 
 /// One column of all logs, NaN between them.
-VectorXd joined(const std::vector<Residuals>& logs, MatrixXd Residuals::*of, Index joint) {
-  Index rows = 0;
-  for (const Residuals& one : logs) rows += one.t.size() + 1;
-  VectorXd out = VectorXd::Constant(rows, std::numeric_limits<double>::quiet_NaN());
-  Index row = 0;
-  for (const Residuals& one : logs) {
-    out.segment(row, one.t.size()) = (one.*of).col(joint);
-    row += one.t.size() + 1;
-  }
-  return out;
-}
-
-struct Means {
-  VectorXd x, y;
-};
-/// Means of y over classes of x with equally many samples.
-Means means(const VectorXd& x, const VectorXd& y) {
-  constexpr Index classes = 80;
-  std::vector<Index> order;
-  for (Index k = 0; k < x.size(); ++k) {
-    if (!std::isnan(x[k])) order.push_back(k);
-  }
-  std::sort(order.begin(), order.end(), [&](Index a, Index b) { return x[a] < x[b]; });
-  const auto count = static_cast<Index>(order.size()), bins = std::min(classes, count);
-  Means out{VectorXd::Zero(bins), VectorXd::Zero(bins)};
-  for (Index b = 0; b < bins; ++b) {
-    const Index from = b * count / bins, to = (b + 1) * count / bins;
-    for (Index k = from; k < to; ++k) {
-      out.x[b] += x[order[static_cast<std::size_t>(k)]] / static_cast<double>(to - from);
-      out.y[b] += y[order[static_cast<std::size_t>(k)]] / static_cast<double>(to - from);
-    }
-  }
-  return out;
+VectorXd joined_columns(const std::vector<Residuals>& logs, MatrixXd Residuals::*of, Index joint) {
+  std::vector<VectorXd> columns;
+  for (const Residuals& one : logs) columns.emplace_back((one.*of).col(joint));
+  return joined(columns);
 }
 
 Chart against(const std::vector<Residuals>& logs, MatrixXd Residuals::*of, Index joint, const std::string& x_label,
               const std::string& y_label) {
-  const VectorXd x = joined(logs, of, joint);
-  const VectorXd before = joined(logs, &Residuals::before, joint), after = joined(logs, &Residuals::after, joint);
-  const Means mean_before = means(x, before), mean_after = means(x, after);
+  const VectorXd x = joined_columns(logs, of, joint);
+  const VectorXd before = joined_columns(logs, &Residuals::before, joint),
+                 after = joined_columns(logs, &Residuals::after, joint);
+  const ClassMeans mean_before = class_means(x, before), mean_after = class_means(x, after);
   return {x_label,
           y_label,
           {{x, before, before_cloud, 0.6, {}, true},
@@ -94,31 +63,13 @@ Chart against(const std::vector<Residuals>& logs, MatrixXd Residuals::*of, Index
            {mean_after.x, mean_after.y, after_colour, 2.2, "mean after"}}};
 }
 
-/// Root of the power spectral density of the residuals up to 1.5 times the cut-off, and the noise floor as white noise
-/// below it: noise^2 = density * cut-off.
 Chart spectra(const Residuals& log, Index joint, const std::string& unit) {
-  const double step = log.log->step_s, cutoff = log.log->filter.torque_cutoff_hz;
-  const auto curve_of = [&](const VectorXd& residual, const char* colour, const char* title) {
-    const Spectrum spectrum = welch(residual, step);
-    const Index bins =
-        std::min(spectrum.density.size() - 1, static_cast<Index>(1.5 * cutoff / spectrum.resolution_hz) + 1);
-    Curve out{VectorXd(bins), VectorXd(bins), colour, 1.4, title};
-    for (Index k = 0; k < bins; ++k) {
-      out.x[k] = spectrum.frequency(k + 1);
-      out.y[k] = std::sqrt(std::max(spectrum.density[k + 1], 1e-30));
-    }
-    return out;
-  };
-  Chart chart{
-      fmt::format("frequency [Hz] in {}", log.log->name),
-      fmt::format("residual [{}/Hz^0.5]", unit),
-      {curve_of(log.before.col(joint), before_colour, "before"), curve_of(log.after.col(joint), after_colour, "after")},
-      true};
-  const double noise = log.log->torque_noise[joint];
-  if (noise > 0 && cutoff > 0) {
-    const double level = noise / std::sqrt(std::min(cutoff, 0.5 / step));
-    chart.curves.push_back({Eigen::Vector2d(0, cutoff), Eigen::Vector2d(level, level), floor_colour, 1.4, "noise"});
-  }
+  Chart chart{fmt::format("frequency [Hz] in {}", log.log->name),
+              fmt::format("residual [{}/Hz^0.5]", unit),
+              {spectrum_curve(log.before.col(joint), *log.log, before_colour, "before"),
+               spectrum_curve(log.after.col(joint), *log.log, after_colour, "after")},
+              true};
+  for (const Curve& noise : noise_curve(*log.log, joint)) chart.curves.push_back(noise);
   return chart;
 }
 

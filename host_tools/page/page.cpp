@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "host_tools/page/live_plot.hpp"
 #include "host_tools/page/style.hpp"
 
 namespace fxdyn::page {
@@ -62,8 +63,8 @@ std::string document(std::string_view title, std::string_view body) {
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n<meta name=\"viewport\" "
       "content=\"width=device-width, initial-scale=1\">\n<link rel=\"icon\" href=\"data:,\">\n<title>{} - "
       "fxdyn</title>\n<style>{}</style></head><body>\n<a class=\"skip\" href=\"#main\">To the "
-      "content</a>\n{}</body></html>\n",
-      escape(title), style, body);
+      "content</a>\n{}{}</body></html>\n",
+      escape(title), style, body, body.find("<figure class=\"live\"") != std::string_view::npos ? live_parts() : "");
 }
 
 std::string Table::bare_html(std::string_view caption) const {

@@ -33,7 +33,7 @@ class Table {
   std::string head_, rows_;
 };
 
-/// A whole page; `body` is HTML whose main part has the id `main`.
+/// A whole page; `body` is HTML whose main part has the id `main`. With a live_figure() in it, live_parts() too.
 std::string document(std::string_view title, std::string_view body);
 /// The picture, an <svg> element, with a title for those who can't see it, and a caption.
 std::string figure(std::string_view svg, std::string_view caption);

@@ -15,6 +15,7 @@
 #include <filesystem>
 #include <string_view>
 
+#include "host_tools/page/time_axis.hpp"
 #include "host_tools/support/files.hpp"
 #include "host_tools/support/temporary_folder.hpp"
 
@@ -47,18 +48,6 @@ std::string run_gnuplot(const fs::path& directory) {
   std::string errors = read_file(directory / "errors.txt");
   std::replace(errors.begin(), errors.end(), '\n', ' ');
   return fmt::format("gnuplot failed: {}", errors);
-}
-
-/// Where an axis of time begins: 0, or the first stamp where six digits don't resolve what follows (seconds since
-/// 1970).
-double origin_of(const Eigen::VectorXd& t) {
-  constexpr double resolved = 1e-4;
-  const double length = t[t.size() - 1] - t[0];
-  return std::fabs(t[0]) * resolved > length ? t[0] : 0;
-}
-
-std::string label_of(const std::string& axis, double origin) {
-  return origin == 0 ? axis : fmt::format("{} after {:.12g}", axis, origin);
 }
 
 /// The curve as a gnuplot data block of at most `points` lines: of each bucket its lowest and highest sample, in time
@@ -122,7 +111,7 @@ double round_up(double value) {
 }
 
 std::string commands(std::size_t number, const TorquePlot& plot) {
-  const double origin = origin_of(plot.t);
+  const double origin = time_origin(plot.t);
   const std::string data = fmt::format("{}.dat", number);
   return fmt::format(R"(set output '{0}.svg'
 set multiplot
@@ -150,7 +139,7 @@ unset multiplot
 unset output
 )",
                      number, plot.t[0] - origin, plot.t[plot.t.size() - 1] - origin, plot.unit, data,
-                     round_up((plot.measured - plot.predicted).cwiseAbs().maxCoeff()), label_of("time [s]", origin));
+                     round_up((plot.measured - plot.predicted).cwiseAbs().maxCoeff()), time_label("time [s]", origin));
 }
 
 /// Colours of curves that share a panel; more curves than these take them again.
@@ -202,6 +191,16 @@ std::vector<std::string> pictures(const fs::path& directory, std::size_t count) 
 
 }  // namespace
 
+double time_origin(const Eigen::VectorXd& t) {
+  constexpr double resolved = 1e-4;
+  const double length = t[t.size() - 1] - t[0];
+  return std::fabs(t[0]) * resolved > length ? t[0] : 0;
+}
+
+std::string time_label(const std::string& axis, double origin) {
+  return origin == 0 ? axis : fmt::format("{} after {:.12g}", axis, origin);
+}
+
 std::vector<std::string> draw(const std::vector<TorquePlot>& plots) {
   if (plots.empty()) return {};
   // Three curves a plot, about 15 bytes a point, beside 10 kB of frame a plot: a page of six joints and seven logs
@@ -211,7 +210,7 @@ std::vector<std::string> draw(const std::vector<TorquePlot>& plots) {
   std::string script = settings;
   for (std::size_t i = 0; i < plots.size(); ++i) {
     const TorquePlot& plot = plots[i];
-    const double origin = origin_of(plot.t);
+    const double origin = time_origin(plot.t);
     write_file(directory.path() / fmt::format("{}.dat", i),
                curve(plot.t, plot.measured, points, origin) + curve(plot.t, plot.predicted, points, origin) +
                    curve(plot.t, plot.measured - plot.predicted, points, origin));
@@ -232,7 +231,7 @@ std::string draw(const std::vector<Panel>& panels, const std::vector<std::string
       panel_height * panels.size(), panels.size());
   for (std::size_t p = 0; p < panels.size(); ++p) {
     const Panel& panel = panels[p];
-    const double origin = origin_of(panel.t);
+    const double origin = time_origin(panel.t);
     std::string data, lines;
     for (Eigen::Index c = 0; c < panel.columns.cols(); ++c) {
       const auto i = static_cast<std::size_t>(c);
@@ -243,42 +242,67 @@ std::string draw(const std::vector<Panel>& panels, const std::vector<std::string
     write_file(directory.path() / fmt::format("{}.dat", p), data);
     script += fmt::format("set xrange [{:.6g}:{:.6g}]\nset ylabel '{}'\nset xlabel '{}'\nplot {}\n",
                           panel.t[0] - origin, panel.t[panel.t.size() - 1] - origin, panel.label,
-                          p + 1 == panels.size() ? label_of("time [s]", origin) : "", lines);
+                          p + 1 == panels.size() ? time_label("time [s]", origin) : "", lines);
     script += "unset key\n";  // one is enough
   }
   write_file(directory.path() / "script.gp", script + "unset multiplot\nunset output\n");
   return pictures(directory.path(), 1).front();
 }
 
-std::string draw(const std::vector<Chart>& charts, int columns) {
-  constexpr int row_height = 300;
+namespace {
+
+/// gnuplot's words for one curve, whose data it writes into the directory.
+std::string curve_command(const Curve& one, const fs::path& directory, const std::string& file, double origin) {
   constexpr Eigen::Index chart_points = 600;
-  const int rows = (static_cast<int>(charts.size()) + columns - 1) / columns;
+  const std::string title = one.title.empty() ? "notitle" : "title '" + quoted(one.title) + "'";
+  if (one.y_top.size() > 0) {
+    std::string text;
+    for (Eigen::Index k = 0; k < one.x.size(); ++k)
+      text += fmt::format("{:.5g} {:.5g} {:.5g}\n", one.x[k] - origin, one.y[k], one.y_top[k]);
+    write_file(directory / file, text);
+    return fmt::format("'{}' using 1:2:3 with filledcurves lc rgb '{}' {}", file, one.colour, title);
+  }
+  write_file(directory / file, one.path ? path(one.x, one.y, chart_points) : curve(one.x, one.y, chart_points, origin));
+  return fmt::format("'{}' with lines lw {} lc rgb '{}' {}", file, one.width, one.colour, title);
+}
+
+std::string chart_commands(const Chart& chart, const fs::path& directory, const std::string& name) {
+  const bool has_origin = !chart.curves.empty() && !chart.curves[0].path && chart.curves[0].x.size() > 0;
+  const double origin = has_origin ? time_origin(chart.curves[0].x) : 0;
+  std::string lines;
+  for (std::size_t i = 0; i < chart.curves.size(); ++i)
+    lines += (i > 0 ? ", " : "") + curve_command(chart.curves[i], directory, fmt::format("{}_{}.dat", name, i), origin);
+  const std::string range =
+      chart.y_from < chart.y_to ? fmt::format("[{:.6g}:{:.6g}]", chart.y_from, chart.y_to) : "[*:*]";
+  return fmt::format("{} logscale y\nset yrange {}\nset format y '{}'\nset xlabel '{}'\nset ylabel '{}'\nplot {}\n",
+                     chart.logarithmic ? "set" : "unset", range, chart.logarithmic ? "%.0e" : "%g",
+                     quoted(time_label(chart.x_label, origin)), quoted(chart.y_label), lines);
+}
+
+}  // namespace
+
+std::vector<std::string> draw(const std::vector<std::vector<Chart>>& all, int columns) {
+  constexpr int row_height = 300;
+  if (all.empty()) return {};
   const TemporaryFolder directory;
   std::string script = settings;
-  script += fmt::format(
-      "set terminal svg size 1000,{} dynamic noenhanced font 'sans-serif,12' background '#ffffff'\nset tmargin 2\nset "
-      "output '0.svg'\nset multiplot layout {},{}\n",
-      row_height * rows, rows, columns);
-  for (std::size_t c = 0; c < charts.size(); ++c) {
-    const Chart& chart = charts[c];
-    std::string lines;
-    const bool has_origin = !chart.curves.empty() && !chart.curves[0].path && chart.curves[0].x.size() > 0;
-    const double origin = has_origin ? origin_of(chart.curves[0].x) : 0;
-    for (std::size_t i = 0; i < chart.curves.size(); ++i) {
-      const Curve& one = chart.curves[i];
-      const std::string file = fmt::format("{}_{}.dat", c, i);
-      write_file(directory.path() / file,
-                 one.path ? path(one.x, one.y, chart_points) : curve(one.x, one.y, chart_points, origin));
-      lines += fmt::format("{}'{}' with lines lw {} lc rgb '{}' {}", i > 0 ? ", " : "", file, one.width, one.colour,
-                           one.title.empty() ? "notitle" : "title '" + quoted(one.title) + "'");
-    }
-    script += fmt::format("{} logscale y\nset format y '{}'\nset xlabel '{}'\nset ylabel '{}'\nplot {}\n",
-                          chart.logarithmic ? "set" : "unset", chart.logarithmic ? "%.0e" : "%g",
-                          quoted(label_of(chart.x_label, origin)), quoted(chart.y_label), lines);
+  for (std::size_t p = 0; p < all.size(); ++p) {
+    const int rows = (static_cast<int>(all[p].size()) + columns - 1) / columns;
+    script += fmt::format(
+        "set terminal svg size 1000,{} dynamic noenhanced font 'sans-serif,12' background '#ffffff'\nset tmargin "
+        "2\nset "
+        "output '{}.svg'\nset multiplot layout {},{}\n",
+        row_height * rows, p, rows, columns);
+    for (std::size_t c = 0; c < all[p].size(); ++c)
+      script += chart_commands(all[p][c], directory.path(), fmt::format("{}_{}", p, c));
+    script += "unset multiplot\nunset output\n";
   }
-  write_file(directory.path() / "script.gp", script + "unset multiplot\nunset output\n");
-  return pictures(directory.path(), 1).front();
+  write_file(directory.path() / "script.gp", script);
+  return pictures(directory.path(), all.size());
+}
+
+std::string draw(const std::vector<Chart>& charts, int columns) {
+  return draw(std::vector<std::vector<Chart>>{charts}, columns).front();
 }
 
 }  // namespace fxdyn

@@ -36,16 +36,20 @@ struct Curve {
   double width = 1.2;
   std::string title = {};  ///< empty: not in the key
   bool path = false;
+  Eigen::VectorXd y_top = {};  ///< a band from y to here instead of a line
 };
 
 struct Chart {
   std::string x_label, y_label;  ///< with unit
   std::vector<Curve> curves;
-  bool logarithmic = false;  ///< y
+  bool logarithmic = false;     ///< y
+  double y_from = 0, y_to = 0;  ///< the axis; equal: as the curves need
 };
 
 /// Charts side by side, `columns` in a row, as an <svg> element.
 /// Where gnuplot is missing or fails, a picture that says so, and a note on stderr.
 std::string draw(const std::vector<Chart>& charts, int columns);
+/// Many such pictures by one run of gnuplot.
+std::vector<std::string> draw(const std::vector<std::vector<Chart>>& pictures, int columns);
 
 }  // namespace fxdyn

@@ -5,11 +5,12 @@ namespace fxdyn::page {
 const char* const style = R"(
 :root { color-scheme: light dark; --text: #222; --quiet: #595959; --page: #fff; --head: #f2f2f2; --line: #d8d8d8;
   --accent: #b8380f; --link: #0b57a4; --good: #e2f2e4; --amber: #fdeec8; --bad: #fbdfd8; --unknown: #ebebeb;
-  --good-mark: #1f6f43; --amber-mark: #8a5a00; --bad-mark: #b3261e; --unknown-mark: #5a5a5a; --mark-text: #fff; }
+  --good-mark: #1f6f43; --amber-mark: #8a5a00; --bad-mark: #b3261e; --unknown-mark: #5a5a5a; --mark-text: #fff;
+  --measured: #222; --predicted: #d9480f; --residual: #2e6fb7; }
 @media screen and (prefers-color-scheme: dark) {
   :root { --text: #e6e6e6; --quiet: #a8a8a8; --page: #16181b; --head: #24272b; --line: #3b3f45; --accent: #ff9a73;
     --link: #8ec5ff; --good: #1d3a28; --amber: #4a3a10; --bad: #54231d; --unknown: #303338; --good-mark: #7fd6a2;
-    --amber-mark: #f0c350; --bad-mark: #ff9c8f; --unknown-mark: #bdbdbd; --mark-text: #16181b; }
+    --amber-mark: #f0c350; --bad-mark: #ff9c8f; --unknown-mark: #bdbdbd; --mark-text: #16181b; --measured: #e6e6e6; --predicted: #ff8c5a; --residual: #7cb8f5; }
   svg.plot { filter: invert(.91) hue-rotate(180deg); }
 }
 * { box-sizing: border-box; }
@@ -37,6 +38,11 @@ svg { display: block; width: 100%; height: auto; }
 .sketch .leader { stroke-width: 1; } .disc { fill: var(--unknown-mark); } .disc.good { fill: var(--good-mark); }
 .disc.amber { fill: var(--amber-mark); } .disc.bad { fill: var(--bad-mark); }
 .disc text { fill: var(--mark-text); text-anchor: middle; font-weight: 600; }
+.live.on > svg.plot { display: none; } .live-plot { margin: .3em 0; } .live-plot .uplot { font: inherit; }
+.live-plot .u-select { background: var(--link); opacity: .2; }
+.tools { display: flex; flex-wrap: wrap; gap: .2em .9em; align-items: center; max-width: none; font-size: .85em; font-variant-numeric: tabular-nums; }
+.tools > span { display: flex; flex-wrap: wrap; gap: .1em .9em; } .tools i { display: inline-block; width: 1em; height: .3em; margin-right: .35em; vertical-align: middle; }
+.tools button { font: inherit; color: var(--text); background: var(--head); border: 1px solid var(--line); border-radius: 4px; padding: .2em .6em; }
 table { border-collapse: collapse; margin: .6em 0; font-size: .92em; }
 caption { text-align: left; font-weight: 600; padding: .2em 0; }
 th, td { padding: .22em .7em; border-bottom: 1px solid var(--line); text-align: left; vertical-align: top; font-weight: normal; }
@@ -60,6 +66,7 @@ td.bad { background: var(--bad); } td.good { background: var(--good); } td.amber
   th, td { padding: .12em .35em; min-width: 3.4em; } tbody th { min-width: 4.6em; } td.n { white-space: normal; } thead th { overflow-wrap: anywhere; }
   tr, figure, ol.joints li { break-inside: avoid; } thead { display: table-header-group; }
   .overview { grid-template-columns: 58mm minmax(0, 1fr); } .mark, td, thead th, .disc { print-color-adjust: exact; }
+  .live.on > svg.plot { display: block; } .live-plot { display: none; }
   .figures { display: grid; grid-template-columns: 1fr 1fr; gap: 1mm 4mm; } .figures figure { margin: 0; }
 }
 )";

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <string>
@@ -13,6 +14,8 @@
 
 namespace fxdyn {
 
+struct ShownLog;
+
 /// What a section may draw from.
 struct ReportInput {
   const IdentifiedModel& fitted;           ///< effects/model_parts.hpp gives its parts, identified_model.hpp all of it
@@ -21,6 +24,8 @@ struct ReportInput {
   const std::filesystem::path& directory;  ///< where the results are
   const ReportSettings& settings = default_settings;
   static inline const ReportSettings default_settings{};
+  /// Of shown_logs() in shown_log.hpp: ask that.
+  mutable std::shared_ptr<const std::vector<ShownLog>> shown{};
 };
 
 /// A part of report.html. One more: a file NAME_section.cpp with its function, and a line in sections.cpp

@@ -10,6 +10,8 @@
   SECTION(data, "metrics", anything, false)         \
   SECTION(error, "metrics", anything, false)        \
   SECTION(diagnosis, "diagnosis", diagnosis, false) \
+  SECTION(findings, "", anything, true)             \
+  SECTION(residual, "", anything, true)             \
   SECTION(bls, "metrics", anything, false)          \
   SECTION(comparison, "compare", inputs, false)     \
   SECTION(efficiency, "efficiency", inputs, false)  \

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/page/diagnosis_plot.hpp"
+#include "host_tools/page/live_plot.hpp"
 #include "host_tools/page/plot.hpp"
 #include "host_tools/regression/metrics_result.hpp"
 #include "host_tools/report/replay_result.hpp"
@@ -126,7 +127,10 @@ struct Case {
     if (folder == nullptr) return;
     const fs::path limits = fs::path(folder) / "limits.json";
     json all = fs::exists(limits) ? json::parse(read_file(limits)) : json::object();
-    all[name] = {{"joints", model.robot.size()}, {"first_screen", first_screen}, {"plots", plots}};
+    all[name] = {{"joints", model.robot.size()},
+                 {"first_screen", first_screen},
+                 {"plots", plots},
+                 {"live", logs.size() * model.robot.size()}};
     write_file(limits, all.dump());
     write_file(fs::path(folder) / (name + ".html"), page);
   }
@@ -136,12 +140,25 @@ struct Case {
   std::vector<ProcessedLog> logs;
 };
 
+/// Two effects that were found, as diagnosis leaves them in a model.
+void add_findings(IdentifiedModel& model) {
+  for (std::size_t j = 0; j < model.joints.size(); ++j) {
+    EffectFit stribeck = test::effect("stribeck", {0.1}, {0.8}), ripple = test::effect("ripple", {20}, {0.3, 0.2});
+    stribeck.named = ripple.named = true;
+    stribeck.linear_std = {0.05};
+    ripple.linear_std = {0.02, 0.02};
+    model.joints[j].effects.push_back(stribeck);
+    model.joints[j].effects.push_back(ripple);
+  }
+}
+
 TEST(Pages, SameInputSameBytesAndNothingFromElsewhere) {
   Case puma("puma");
+  add_findings(puma.model);
   puma.logs = {test::small_log(puma.model, Role::test, 1)};
   const std::string page = puma.page();
   EXPECT_EQ(page, puma.page());
-  for (const char* part : {"http:", "https:", "src=", "<script", "@import", "url("})
+  for (const char* part : {"http:", "https:", "src=", "@import", "url("})
     EXPECT_EQ(page.find(part), std::string::npos) << part;
   for (const char* part : {"<a href=\"#diagnosis\">Diagnosis</a>", "<section id=\"diagnosis\">", "1190.0", "1198.5",
                            "bit-exact in 1000 ticks", "<caption>"})
@@ -150,8 +167,27 @@ TEST(Pages, SameInputSameBytesAndNothingFromElsewhere) {
   puma.hand_over(page, true, true);
 }
 
+TEST(Pages, LivePlotsComeWithTheirLibraryOnceAndItsLicence) {
+  if (!page::has_live_plots()) GTEST_SKIP() << "built without npm: pictures only";
+  Case puma("licence");
+  const std::string without = puma.page();
+  EXPECT_EQ(without.find("<script"), std::string::npos);  // nothing to draw, nothing to run
+  puma.logs = {test::small_log(puma.model, Role::test, 1)};
+  const std::string page = puma.page();
+  const std::size_t script = page.find("<script>");
+  ASSERT_NE(script, std::string::npos);
+  EXPECT_EQ(page.find("<script", script + 1), std::string::npos);
+  EXPECT_NE(page.find("Permission is hereby granted, free of charge", script), std::string::npos);
+  std::size_t figures = 0;
+  for (std::size_t at = page.find("<figure class=\"live\""); at < script;
+       at = page.find("<figure class=\"live\"", at + 1))
+    ++figures;
+  EXPECT_EQ(figures, 6U);
+}
+
 TEST(Pages, SixJointsAndSevenLogsAreAtMostTwoMegabytesInThreeSeconds) {
   Case puma("seven_logs");
+  add_findings(puma.model);
   for (std::uint64_t seed = 1; seed <= 7; ++seed)
     puma.logs.push_back(test::small_log(puma.model, Role::test, seed, 0.2));
   const auto start = std::chrono::steady_clock::now();
@@ -172,7 +208,7 @@ TEST(Pages, NamesWithMarkupAndOfTwoHundredCharactersDoNoHarm) {
   robot.joints[2].name = std::string(200, 'W');
   const Case hostile("hostile", robot);
   const std::string page = hostile.page();
-  EXPECT_EQ(page.find("<script"), std::string::npos);
+  EXPECT_EQ(page.find("<script>alert"), std::string::npos);
   EXPECT_EQ(page.find("<img"), std::string::npos);
   EXPECT_EQ(page.find("<h1>xx"), std::string::npos);
   hostile.hand_over(page, false);

@@ -73,26 +73,84 @@ async function checkAxe(page, name) {
   check(found.passes.length > 10, `${name}: axe looked at ${found.passes.length} rules only`);
 }
 
-/// Counts pixels of the plot's own colours, not the paper's: those that are neither white nor grey.
+/// Pixels of an element's own colours, not the paper's: those that are neither white nor grey.
+async function paintedPixels(element, blank) {
+  const picture = await element.screenshot({encoding: 'base64'});
+  return blank.evaluate(async (data) => {
+    const image = new Image();
+    image.src = `data:image/png;base64,${data}`;
+    await image.decode();
+    const canvas = new OffscreenCanvas(image.width, image.height).getContext('2d');
+    canvas.drawImage(image, 0, 0);
+    const bytes = canvas.getImageData(0, 0, image.width, image.height).data;
+    let count = 0;
+    for (let k = 0; k < bytes.length; k += 4)
+      if (Math.max(bytes[k], bytes[k + 1], bytes[k + 2]) - Math.min(bytes[k], bytes[k + 1], bytes[k + 2]) > 60) ++count;
+    return count;
+  }, picture);
+}
+
 async function checkPlots(page, blank, name) {
-  const plots = await page.$$('svg.plot');
+  const plots = await page.$$('figure:not(.on) > svg.plot');
   check(plots.length > 0, `${name}: no plot`);
   for (const [i, plot] of plots.entries()) {
-    const picture = await plot.screenshot({encoding: 'base64'});
-    const painted = await blank.evaluate(async (data) => {
-      const image = new Image();
-      image.src = `data:image/png;base64,${data}`;
-      await image.decode();
-      const canvas = new OffscreenCanvas(image.width, image.height).getContext('2d');
-      canvas.drawImage(image, 0, 0);
-      const bytes = canvas.getImageData(0, 0, image.width, image.height).data;
-      let count = 0;
-      for (let k = 0; k < bytes.length; k += 4)
-        if (Math.max(bytes[k], bytes[k + 1], bytes[k + 2]) - Math.min(bytes[k], bytes[k + 1], bytes[k + 2]) > 60) ++count;
-      return count;
-    }, picture);
+    const painted = await paintedPixels(plot, blank);
     check(painted > 100, `${name}: plot ${i + 1} has ${painted} painted pixels`);
   }
+}
+
+/// In the page: the least and the largest time of each panel of the first live plot, and its readout.
+function shownTimes() {
+  const {live} = document.querySelector('figure.live');
+  return {ends: live.plots.map((u) => [u.scales.x.min, u.scales.x.max]), words: live.readout.textContent};
+}
+
+/// Torque and residual, velocity and position are drawn, and follow one zoom and one cursor.
+async function checkLivePlots(page, blank, name, expected) {
+  const figures = await page.$$('figure.live');
+  check(figures.length === expected, `${name}: ${figures.length} live plots, ${expected} expected (built without npm?)`);
+  if (figures.length === 0) return;
+  for (const [i, figure] of figures.entries()) {
+    await figure.scrollIntoView();
+    const made = await page.waitForFunction((f) => f.live?.plots.length === 4, {timeout: 5000}, figure).catch(() => null);
+    check(made, `${name}: live plot ${i + 1} is not there`);
+    const painted = made ? await paintedPixels(await figure.$('.live-plot'), blank) : 0;
+    check(painted > 500, `${name}: live plot ${i + 1} has ${painted} painted pixels`);
+    check(await figure.$eval('svg.plot', (e) => getComputedStyle(e).display === 'none'), `${name}: picture ${i + 1} stays beside its live plot`);
+  }
+  await figures[0].scrollIntoView();
+  const panels = await figures[0].$$('.u-over');
+  const before = await page.evaluate(shownTimes);
+  const box = await panels[1].boundingBox();
+  await page.mouse.move(box.x + 0.25 * box.width, box.y + 20);
+  await page.mouse.down();
+  await page.mouse.move(box.x + 0.5 * box.width, box.y + 20, {steps: 5});
+  await page.mouse.up();
+  const zoomed = await page.evaluate(shownTimes);
+  const span = before.ends[0][1] - before.ends[0][0];
+  for (const [from, to] of zoomed.ends)
+    check(Math.abs(to - from - span / 4) < span / 50, `${name}: a quarter was dragged, shown are ${from} .. ${to} s of ${span} s`);
+  check(/^[\d.]+ s.*measured -?[\d.e-]+ N.*residual.*velocity.*position/.test(zoomed.words), `${name}: the cursor reads "${zoomed.words}"`);
+  await figures[0].$eval('.live-plot', (e) => e.focus());
+  await page.keyboard.press('ArrowRight');
+  const moved = await page.evaluate(shownTimes);
+  check(moved.words !== zoomed.words, `${name}: the arrow key does not move the cursor`);
+  await page.keyboard.press('0');
+  const all = await page.evaluate(shownTimes);
+  check(JSON.stringify(all.ends) === JSON.stringify(before.ends), `${name}: 0 shows ${JSON.stringify(all.ends)} instead of all`);
+  await page.evaluate(() => scrollTo(0, 0));
+}
+
+/// The same page where scripts are not allowed: its pictures are all there.
+async function checkWithoutScripts(browser, url, name) {
+  const page = await browser.newPage();
+  await page.setJavaScriptEnabled(false);
+  await page.setViewport(desktop);
+  await page.goto(url);
+  const hidden = await page.$$eval('svg.plot', (all) => all.filter((e) => e.getBoundingClientRect().height < 50).length);
+  const plots = await page.$$('svg.plot');
+  check(plots.length > 0 && hidden === 0, `${name}: without scripts ${hidden} of ${plots.length} pictures are hidden`);
+  await page.close();
 }
 
 async function checkFirstScreen(page, name, joints) {
@@ -161,7 +219,11 @@ async function checkPage(browser, blank, directory, file, expected) {
   await checkKeyboard(page, name);
   await checkStructure(page, name);
   if (expected.first_screen) await checkFirstScreen(page, name, expected.joints);
-  if (expected.plots) await checkPlots(page, blank, name);
+  if (expected.plots) {
+    await checkLivePlots(page, blank, name, expected.live);
+    await checkPlots(page, blank, name);
+    await checkWithoutScripts(browser, url, name);
+  }
   const start = Date.now();
   let pages = 0;
   for (const scheme of ['light', 'dark']) {
