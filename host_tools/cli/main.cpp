@@ -3,12 +3,11 @@
 #include <unistd.h>
 #include <filesystem>
 #include <map>
-#include <new>
 
+#include "host_tools/cli/output.hpp"
 #include "host_tools/cli/shell_files.hpp"
 #include "host_tools/cli/verb.hpp"
 #include "host_tools/effects/effect_library.hpp"
-#include "host_tools/support/error.hpp"
 #include "host_tools/support/heap.hpp"
 #include "host_tools/support/pipes.hpp"
 #include "model/version.hpp"
@@ -71,6 +70,7 @@ int run(int argc, char** argv) {
     CLI::App* options =
         app.add_subcommand(verb.name, fmt::format("{}\nExample: fxdyn {} {}", verb.help, verb.name, verb.example));
     actions[options] = verb.add(*options);
+    cli::Output::add_options(*options);
   }
 
   try {
@@ -80,7 +80,17 @@ int run(int argc, char** argv) {
     complain_of_usage(app, error, {argv + 1, argv + argc});
     return 2;
   }
-  actions.at(app.get_subcommands().front())();
+  const CLI::App* verb = app.get_subcommands().front();
+  cli::Output output(*verb);
+  try {
+    actions.at(verb)();
+  } catch (const OtherEffectLibrary&) {
+    throw;  // the other program says it
+  } catch (...) {
+    output.end(cli::ending_of(std::current_exception()));
+    throw;
+  }
+  output.end({});
   return 0;
 }
 
@@ -95,20 +105,9 @@ int main(int argc, char** argv) {
     start_instead(error.library, argv);
     complain(error.what());
     return 2;
-  } catch (const fxdyn::InputError& error) {
-    complain(error.what());
-    return 2;
-  } catch (const fxdyn::DataError& error) {
-    complain(error.what());
-    return 1;
-  } catch (const std::bad_alloc&) {
-    complain("not enough memory: cut the logs by from_s and to_s, or free some");
-    return 2;
-  } catch (const std::filesystem::filesystem_error& error) {
-    complain(fmt::format("{}: {}", error.path1().string(), error.code().message()));
-    return 2;
-  } catch (const std::exception& error) {
-    complain(fmt::format("internal error: {}", error.what()));
-    return 2;
+  } catch (...) {
+    const fxdyn::cli::Ending ending = fxdyn::cli::ending_of(std::current_exception());
+    complain(ending.complaint);
+    return ending.exit;
   }
 }

@@ -37,5 +37,7 @@ function(fxdyn_add_effects name)
   add_executable(${name} $<TARGET_OBJECTS:fxdyn> ${knows_types})
   set_target_properties(${name} PROPERTIES OUTPUT_NAME fxdyn-${name} RUNTIME_OUTPUT_DIRECTORY $<TARGET_FILE_DIR:fxdyn>)
   target_compile_definitions(${name} PRIVATE FXDYN_EFFECTS="${list}" FXDYN_EFFECT_LIBRARY="${name}")
-  target_link_libraries(${name} PRIVATE $<TARGET_PROPERTY:fxdyn,LINK_LIBRARIES>)
+  get_target_property(links fxdyn LINK_LIBRARIES)
+  list(REMOVE_ITEM links CLI11::CLI11)  # headers alone, and its target is not known everywhere
+  target_link_libraries(${name} PRIVATE ${links})
 endfunction()
