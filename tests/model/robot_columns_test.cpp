@@ -49,6 +49,9 @@ std::vector<double> shape_of(std::string_view effect, std::size_t joint) {
   if (effect == "delay") return {0.0071};
   if (effect == "elasticity") return {0.01};
   if (effect == "backlash") return {5};
+  if (effect == "position_curve" || effect == "friction_over_position") return {-0.2, 1};
+  if (effect == "velocity_curve") return {-1, 2};
+  if (effect == "load_curve") return {-0.1 * rated[joint], 0.2 * rated[joint]};
   return std::vector<double>(find_effect(effect)->shape.size(), 1);
 }
 
