@@ -14,6 +14,7 @@ namespace fxdyn {
 struct TorqueLead {
   double seconds = 0;            ///< torque ahead of the motion: [signals] torque_lead_s
   double before = 0, after = 0;  ///< share of the torque's RMS that is not explained, mean of the joints that move
+  double nats = 0;               ///< gained
 };
 /// The shift that explains the torque best, where it gains `gain` and is longer than `least_lead_s`: shorter ones
 /// belong to identify, which finds them by itself.

@@ -126,6 +126,10 @@ void judge_columns(Project project, const Robot& robot, const fs::path& data, co
   const auto late = find_long_torque_lead(project, logs, options);
   count("late torque", late.has_value(), late && std::fabs(late->seconds) < 0.01,
         fmt::format("{:.3g} s off, told {:.3g}", off, late ? late->seconds : 0));
+  fmt::print("LEAD {} off {:.3g} sound [{:.3g} {:.3g} {:.3g} {:.1f}] late [{:.3g} {:.3g} {:.3g} {:.1f}]\n",
+             data.parent_path().filename().string(), off, told ? told->seconds : 0, told ? told->before : 0,
+             told ? told->after : 0, told ? told->nats : 0, late ? late->seconds : 0, late ? late->before : 0,
+             late ? late->after : 0, late ? late->nats : 0);
   project.signals.torque_lead_s.reset();
   std::vector<Log> train = read_logs(project, Role::train, data);
   const bool sound = are_exchanged(project, train, options);
@@ -159,6 +163,10 @@ int run(int argc, char** argv) {
   app.add_option("--masses", share, "off by up to this share")->capture_default_str();
   app.add_option("--gain", options.gain)->capture_default_str();
   app.add_option("--independent", options.independent)->capture_default_str();
+  app.add_option("--lead-leaves", options.lead_leaves)->capture_default_str();
+  app.add_option("--beyond", options.beyond)->capture_default_str();
+  std::vector<std::string> only;
+  app.add_option("--only", only, "names of cases; else all");
   app.add_option("--mass-error", options.mass_errors[0])->capture_default_str();
   CLI11_PARSE(app, argc, argv);
 
@@ -182,6 +190,7 @@ int run(int argc, char** argv) {
     cases.push_back({"sound", robot, samples});
     const double sound = ArrangementEvidence(robot, samples, options)(as_given(robot)).nats;
     for (const Planted& one : cases) {
+      if (!only.empty() && std::find(only.begin(), only.end(), one.name) == only.end()) continue;
       const ArrangementEvidence evidence(one.robot, one.samples, options);
       // What the right columns would gain: less than that, and no method of this kind can tell.
       const double gained = evidence(as_given(one.robot)).nats - sound;
