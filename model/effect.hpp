@@ -148,10 +148,22 @@ inline constexpr std::size_t words_of = [] {
     return E::shape.size() + E::linear.size();
 }();
 
+namespace detail {
+/// What an effect emits is a stored number of the quantity that it names.
+template <class N, class Tag, class Phi>
+consteval void check_phi() {
+  static_assert(std::is_same_v<Phi, typename N::template Of<Tag::value>>,
+                "an effect emits a number of the quantity it names: N::clamp where the value may leave its range, "
+                "N::proven_narrow where it can't");
+}
+}  // namespace detail
+
 /// theta^T phi of one effect for this tick, as N::TorqueSum or N::DeflectionSum; steps its state.
 template <class E, class N>
 constexpr auto contribution(const JointInput<N>& u, Words<N> words, typename E::template State<N>& state,
                             Saturations& saturations) {
+  static_assert(std::is_trivially_copyable_v<typename E::template State<N>>,
+                "an effect remembers plain numbers: nothing that allocates or points elsewhere");
   if constexpr (requires { E::template sum<N>(u, words, state, saturations); }) {
     return E::template sum<N>(u, words, state, saturations);
   } else {
@@ -159,12 +171,14 @@ constexpr auto contribution(const JointInput<N>& u, Words<N> words, typename E::
     if constexpr (acts_on<E> == ActsOn::position) {
       auto sum = N::no_deflection();
       E::template basis<N>(u, words, state, saturations, [&](auto tag, std::size_t i, auto phi) {
+        detail::check_phi<N, decltype(tag), decltype(phi)>();
         sum = sum + coefficients.template deflection_coefficient<decltype(tag)::value>(i) * phi;
       });
       return sum;
     } else {
       auto sum = N::no_torque();
       E::template basis<N>(u, words, state, saturations, [&](auto tag, std::size_t i, auto phi) {
+        detail::check_phi<N, decltype(tag), decltype(phi)>();
         sum = sum + coefficients.template coefficient<decltype(tag)::value>(i) * phi;
       });
       return sum;

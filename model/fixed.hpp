@@ -158,6 +158,18 @@ struct Fixed {
   friend constexpr auto operator<=>(Fixed, Fixed) = default;
 };
 
+template <class T>
+concept OfRaw = requires(T x) {
+  x.raw;
+};
+
+/// No number is divided in fixed point. Declared for its message alone.
+template <class A, class B>
+requires(OfRaw<A> || OfRaw<B>) constexpr auto operator/(const A&, const B&) {
+  static_assert(sizeof(A) == 0,
+                "no division on the drive: a shape parameter is stored as the reciprocal that the formula needs");
+}
+
 /// x within [lower, upper]; counted where it was not.
 template <int bits>
 constexpr Fixed<bits> limit(Fixed<bits> x, Fixed<bits> lower, Fixed<bits> upper, Saturations& saturations) {

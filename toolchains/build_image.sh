@@ -1,10 +1,9 @@
 #!/usr/bin/env bash
-# build_image.sh TABLES.hpp OUT_DIR [PRESET [EFFECTS.hpp]]: builds the firmware image with these tables (preset: cortex-m4).
-# EFFECTS.hpp as in FXDYN_EFFECTS; without it what build/host was configured with.
+# build_image.sh TABLES.hpp OUT_DIR [PRESET]: builds the firmware image with these tables (preset: cortex-m4).
 # Leaves OUT_DIR/fxdyn-<board>.elf and OUT_DIR/size.json; the build tree stays in OUT_DIR/build-PRESET for the next time.
 set -euo pipefail
 if [ $# -lt 2 ]; then
-  echo "usage: build_image.sh TABLES.hpp OUT_DIR [PRESET [EFFECTS.hpp]]" >&2
+  echo "usage: build_image.sh TABLES.hpp OUT_DIR [PRESET]" >&2
   exit 2
 fi
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -16,8 +15,9 @@ out=$(realpath "$2")
 preset=${3:-cortex-m4}
 known=$(awk '/^[a-z]/ && / fxdyn=/ { printf " %s", $2 }' "$root/toolchains/boards.txt")
 [[ "$known " == *" $preset "* ]] || { echo "build_image: no image for '$preset', known:$known" >&2; exit 2; }
-# those that fxdyn was built with
-effects=${4:-$(sed -n 's/^FXDYN_EFFECTS:FILEPATH=//p' "$root/build/host/CMakeCache.txt" 2>/dev/null || true)}
+# a library of effects that fxdyn_add_effects() made
+library=$(sed -n 's|^// Effects of the library \([a-z0-9_]*\) are in it[.]$|\1|p' "$tables")
+effects=${library:+$root/build/host/effects/$library.hpp}
 rm -f "$out"/fxdyn-*.elf "$out/size.json"
 build=$out/build-$preset
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# build_node.sh TABLES.hpp OUT_DIR [linux|PRESET [EFFECTS.hpp]]: builds the drive node with these tables; PRESET: one of boards.txt with an image
+# build_node.sh TABLES.hpp OUT_DIR [linux|PRESET]: builds the drive node with these tables; PRESET: one of boards.txt with an image
 # "node". Leaves it in OUT_DIR: fxdyn_node (linux, the default), else node-<board>.elf, .bin and .hex with their size.json.
 set -euo pipefail
 if [ $# -lt 2 ]; then
@@ -16,8 +16,9 @@ known=$(awk '/^[a-z]/ && / node=/ { printf " %s", $2 }' "$root/toolchains/boards
 [[ " linux$known " == *" $preset "* ]] || { echo "build_node: no node for '$preset', known: linux$known" >&2; exit 2; }
 target=fxdyn_node configure=$preset
 [ "$preset" != linux ] || { target=fxdyn_linux_node configure=host; }
-# those that fxdyn was built with
-effects=${4:-$(sed -n 's/^FXDYN_EFFECTS:FILEPATH=//p' "$root/build/host/CMakeCache.txt" 2>/dev/null || true)}
+# a library of effects that fxdyn_add_effects() made
+library=$(sed -n 's|^// Effects of the library \([a-z0-9_]*\) are in it[.]$|\1|p' "$tables")
+effects=${library:+$root/build/host/effects/$library.hpp}
 build=$out/build-$preset log=$out/build-$preset.log
 (cd "$root" && cmake --preset "$configure" -B "$build" -DFXDYN_TABLES="$tables" -DFXDYN_EFFECTS="$effects" && cmake --build "$build" --target "$target") \
   >"$log" 2>&1 || { cat "$log" >&2; exit 1; }

@@ -108,6 +108,12 @@ std::optional<TorqueLead> find_long_torque_lead(const Project& project, const st
   return TorqueLead{known + lead, given.left, best.left, given.nats - best.nats};
 }
 
+double torque_lead_nats(const Project& project, const std::vector<ProcessedLog>& logs, double seconds,
+                        const ArrangementOptions& options) {
+  const TorqueSamples samples = sample_torque(logs, options.samples, seconds);
+  return explain(project.robot, samples, options, friction_memory(project.robot, logs, samples)).nats;
+}
+
 std::optional<MeasuredLead> torque_lead(const Project& project, const std::vector<ProcessedLog>& logs,
                                         const ArrangementOptions& options) {
   const double known = project.signals.torque_lead_s.value_or(0), step = options.least_lead_s;

@@ -21,6 +21,11 @@ struct TorqueLead {
 std::optional<TorqueLead> find_long_torque_lead(const Project& project, const std::vector<ProcessedLog>& logs,
                                                 const ArrangementOptions& options);
 
+/// Minus the log of the evidence of a torque that is `seconds` ahead of the motion, up to a constant that all shifts
+/// share.
+double torque_lead_nats(const Project& project, const std::vector<ProcessedLog>& logs, double seconds,
+                        const ArrangementOptions& options);
+
 struct MeasuredLead {
   double seconds = 0;     ///< torque ahead of the motion
   double resolution = 0;  ///< [s] a shift by that raises what stays unexplained (squared) by the share `blurred`

@@ -5,11 +5,13 @@
 #include <net/if_arp.h>
 #include <sys/socket.h>
 #include <unistd.h>
+#include <nlohmann/json.hpp>
 
 #include <clocale>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <thread>
 #include <vector>
@@ -141,8 +143,19 @@ std::vector<Finding> findings() {
   return out;
 }
 
-void look() {
+void print_json(const std::vector<Finding>& all) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const Finding& one : all) {
+    nlohmann::json entry{{"used_by", one.used_by}, {"looked_for", one.what}, {"found", one.found}};
+    if (one.found.empty()) entry["command"] = one.command;
+    list.push_back(std::move(entry));
+  }
+  fmt::print("{}\n", list.dump(1));
+}
+
+void look(bool as_json) {
   const std::vector<Finding> all = findings();
+  if (as_json) return print_json(all);
   std::string missing;
   const Finding* needed = nullptr;
   fmt::print("{:<30}{:<29}{}\n", "used by", "looked for", "found");
@@ -164,6 +177,10 @@ void look() {
 
 }  // namespace
 
-Action add_doctor(CLI::App&) { return look; }
+Action add_doctor(CLI::App& verb) {
+  const auto as_json = std::make_shared<bool>(false);
+  verb.add_flag("--json", *as_json, "for machines");
+  return [as_json] { look(*as_json); };
+}
 
 }  // namespace fxdyn::cli

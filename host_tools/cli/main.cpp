@@ -1,12 +1,13 @@
 #include <fmt/format.h>
 
+#include <unistd.h>
 #include <filesystem>
 #include <map>
-#include <new>
 
+#include "host_tools/cli/output.hpp"
 #include "host_tools/cli/shell_files.hpp"
 #include "host_tools/cli/verb.hpp"
-#include "host_tools/support/error.hpp"
+#include "host_tools/effects/effect_library.hpp"
 #include "host_tools/support/heap.hpp"
 #include "host_tools/support/pipes.hpp"
 #include "model/version.hpp"
@@ -48,6 +49,15 @@ void complain_of_usage(const CLI::App& app, const CLI::ParseError& error, const 
   fmt::print(stderr, "fxdyn: {}: {}\n", one_line(wrong), one_line(fmt::format("as in `{}`", works)));
 }
 
+/// Starts the program that has the project's effects in this one's place; returns where it is not there.
+void start_instead(const std::string& library, char** argv) {
+  std::error_code none;
+  const auto self = std::filesystem::read_symlink("/proc/self/exe", none);
+  const std::string program = (self.parent_path() / ("fxdyn-" + library)).string();
+  std::fflush(nullptr);
+  ::execv(program.c_str(), argv);
+}
+
 int run(int argc, char** argv) {
   CLI::App app{
       "fxdyn: from a robot's measured log to torque feedforward on its drive controllers.\n"
@@ -60,6 +70,7 @@ int run(int argc, char** argv) {
     CLI::App* options =
         app.add_subcommand(verb.name, fmt::format("{}\nExample: fxdyn {} {}", verb.help, verb.name, verb.example));
     actions[options] = verb.add(*options);
+    cli::Output::add_options(*options);
   }
 
   try {
@@ -69,7 +80,17 @@ int run(int argc, char** argv) {
     complain_of_usage(app, error, {argv + 1, argv + argc});
     return 2;
   }
-  actions.at(app.get_subcommands().front())();
+  const CLI::App* verb = app.get_subcommands().front();
+  cli::Output output(*verb);
+  try {
+    actions.at(verb)();
+  } catch (const OtherEffectLibrary&) {
+    throw;  // the other program says it
+  } catch (...) {
+    output.end(cli::ending_of(std::current_exception()));
+    throw;
+  }
+  output.end({});
   return 0;
 }
 
@@ -80,20 +101,13 @@ int main(int argc, char** argv) {
   const auto complain = [](const std::string& what) { fmt::print(stderr, "fxdyn: {}\n", one_line(what)); };
   try {
     return run(argc, argv);
-  } catch (const fxdyn::InputError& error) {
+  } catch (const fxdyn::OtherEffectLibrary& error) {
+    start_instead(error.library, argv);
     complain(error.what());
     return 2;
-  } catch (const fxdyn::DataError& error) {
-    complain(error.what());
-    return 1;
-  } catch (const std::bad_alloc&) {
-    complain("not enough memory: cut the logs by from_s and to_s, or free some");
-    return 2;
-  } catch (const std::filesystem::filesystem_error& error) {
-    complain(fmt::format("{}: {}", error.path1().string(), error.code().message()));
-    return 2;
-  } catch (const std::exception& error) {
-    complain(fmt::format("internal error: {}", error.what()));
-    return 2;
+  } catch (...) {
+    const fxdyn::cli::Ending ending = fxdyn::cli::ending_of(std::current_exception());
+    complain(ending.complaint);
+    return ending.exit;
   }
 }

@@ -46,6 +46,7 @@ Action add_payload(CLI::App& verb);
 Action add_effects(CLI::App& verb);
 Action add_fleet(CLI::App& verb);
 Action add_fleet_worker(CLI::App& verb);
+Action add_history(CLI::App& verb);
 Action add_doctor(CLI::App& verb);
 Action add_completion(CLI::App& verb);
 Action add_man(CLI::App& verb);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "host_tools/effects/effect_library.hpp"
 #include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/support/error.hpp"
 #include "model/catalogue.hpp"
@@ -254,6 +255,14 @@ std::string why_not_identified(const EffectInfo& info) {
       return fmt::format("effect '{}': the search of its {} is not built yet", info.name, shape.name);
   }
   return {};
+}
+
+std::string_view effect_library() {
+#ifdef FXDYN_EFFECT_LIBRARY
+  return FXDYN_EFFECT_LIBRARY;
+#else
+  return {};
+#endif
 }
 
 Eigen::MatrixXd effect_columns(std::string_view effect, std::span<const double> shape, double sign_width,

@@ -11,6 +11,7 @@
 #include <limits>
 #include <sstream>
 
+#include "host_tools/effects/effect_library.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/project/log_entries.hpp"
 #include "host_tools/signals/time_unit.hpp"
@@ -82,6 +83,7 @@ class ProjectReader {
 
   Project read() {
     Table root({file_, "", 1}, root_);
+    if (auto table = root.table("effects")) read_effects(*table);
     read_robot(Table(root.need("robot", "add a table [robot] with urdf = \"...\"")));
     if (auto table = root.table("signals")) read_signals(*table);
     if (auto table = root.table("check")) {
@@ -252,6 +254,21 @@ class ProjectReader {
       project_.signals.edge_s = edge->number();
     }
     default_format_ = read_format(table, {});
+    table.finish();
+  }
+
+  void read_effects(Table& table) {
+    if (const auto library = table.find("library")) {
+      const std::string name = library->string();
+      if (name.empty() || name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") != std::string::npos)
+        library->place().fail("lower case letters, digits and _ make a name, that of fxdyn_add_effects()");
+      if (name != effect_library())
+        throw OtherEffectLibrary(library->place().message(fmt::format(
+                                     "there is no program fxdyn-{} beside fxdyn: build it by `cmake --build "
+                                     "--preset host --target {}` (docs/guide/effects.md)",
+                                     name, name)),
+                                 name);
+    }
     table.finish();
   }
 

@@ -35,6 +35,7 @@ std::string project_hash(const Project& project) {
     target->erase("accept_error");
     if (target->empty()) table.erase("target");
   }
+  table.erase("report");  // how results are shown
   std::ostringstream text;
   text << table;
   return hash_of(text.str() + read_file(project.urdf));

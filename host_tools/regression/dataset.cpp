@@ -25,6 +25,8 @@ using Eigen::VectorXd;
 
 /// Samples beside a block that differences of sixth order look at, its one-sided ends included.
 constexpr Index halo = 8;
+/// Torque band over the frequency that holds 99.9 % of the motion: friction reverses faster than the motion.
+constexpr double torque_band = 8;
 constexpr double lowest_position_hz = 5;  ///< whatever the noise is, friction reverses as fast
 
 /// Rows [from, from + count) of q and its derivatives; what is measured is not differentiated.
@@ -244,7 +246,7 @@ FilterFit choose_filter(const std::vector<Log>& logs, const SignalSettings& sett
   filter.position_cutoff_hz =
       settings.position_cutoff_hz.value_or(noisy ? position : rate / 2);  // half the rate: no filter
   filter.torque_cutoff_hz = settings.torque_cutoff_hz.value_or(
-      std::min({0.4 * rate, filter.position_cutoff_hz, std::max(5 * filter.excited_hz, 10.0)}));
+      std::min({0.4 * rate, filter.position_cutoff_hz, std::max(torque_band * filter.excited_hz, 10.0)}));
   filter.torque_lead_s = settings.torque_lead_s.value_or(0);
   filter.edge_s = settings.edge_s.value_or(3 / std::min(filter.torque_cutoff_hz, filter.position_cutoff_hz));
   return filter;

@@ -6,21 +6,27 @@
 #include <cstdio>
 #include <mutex>
 
+#include "host_tools/support/quiet.hpp"
+
 namespace fxdyn {
 namespace {
 constexpr std::size_t width = 30;
 std::mutex drawing;
+bool quiet = false;
 bool on_terminal() {
   static const bool yes = ::isatty(STDERR_FILENO) != 0;
   return yes;
 }
 }  // namespace
 
+void be_quiet() { quiet = true; }
+
 void Progress::stage(const std::string& name, std::size_t total) {
   done();
   name_ = name;
   total_ = total;
   steps_ = 0;
+  if (quiet) return;
   if (on_terminal()) {
     draw(0);
   } else {
@@ -30,7 +36,7 @@ void Progress::stage(const std::string& name, std::size_t total) {
 
 void Progress::step() {
   const std::size_t steps = ++steps_;
-  if (on_terminal()) draw(steps);
+  if (on_terminal() && !quiet) draw(steps);
 }
 
 void Progress::draw(std::size_t steps) {
@@ -42,7 +48,7 @@ void Progress::draw(std::size_t steps) {
 }
 
 void Progress::done() {
-  if (!name_.empty() && on_terminal()) fmt::print(stderr, "\n");
+  if (!name_.empty() && on_terminal() && !quiet) fmt::print(stderr, "\n");
   name_.clear();
 }
 

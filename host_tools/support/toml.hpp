@@ -56,10 +56,11 @@ struct Place {
   std::string path;  ///< of the key, as in "robot.gravity"
   int line = 0;
 
-  [[noreturn]] void fail(const std::string& what) const {
-    throw InputError(path.empty() ? fmt::format("{}:{}: {}", file, line, what)
-                                  : fmt::format("{}:{}: {}: {}", file, line, path, what));
+  std::string message(const std::string& what) const {
+    return path.empty() ? fmt::format("{}:{}: {}", file, line, what)
+                        : fmt::format("{}:{}: {}: {}", file, line, path, what);
   }
+  [[noreturn]] void fail(const std::string& what) const { throw InputError(message(what)); }
 };
 
 inline int line_of(const toml::node& node) { return static_cast<int>(node.source().begin.line); }

@@ -1,21 +1,19 @@
 #!/usr/bin/env bash
-# new_effect.sh FXDYN DIRECTORY [EFFECT PARAMETERS [HEADER]]: simulates a friction, identifies it, finds it where it is hidden, predicts and
-# exports it; an image for a Cortex-M4 computes it bit for bit in QEMU. The files go to DIRECTORY/EFFECT. Without EFFECT: that of this folder.
-# PARAMETERS as in a scenario, all of them, of a joint with 20 N*m. HEADER is what FXDYN_EFFECTS named; none: the effect is in model/effects.
+# new_effect.sh FXDYN DIRECTORY EFFECT PARAMETERS [LIBRARY]: simulates a friction, identifies it, finds it where it is hidden, predicts and
+# exports it; an image for a Cortex-M4 computes it bit for bit in QEMU. The files go to DIRECTORY/EFFECT.
+# PARAMETERS as in a scenario, all of them, of a joint with 20 N*m. LIBRARY of fxdyn_add_effects(); none: the effect is in model/effects.
 #   tests/new_effect/new_effect.sh build/host/host_tools/cli/fxdyn out/try stribeck 'velocity = 0.1, amplitude = 2'
 set -uo pipefail
-if [ $# -lt 2 ] || [ $# -eq 3 ]; then
+if [ $# -lt 4 ]; then
   sed -n '2,5s/^# *//p' "$0" >&2
   exit 2
 fi
 fxdyn=$(realpath "$1")
 here=$(cd "$(dirname "$0")" && pwd)
 root=$here/../..
-if [ $# -gt 2 ]; then
-  effect=$3 parameters=$4 header=${5:+$(realpath "$5")}
-else
-  effect=tanh_cubic_damping parameters='velocity = 0.5, amplitude = 1.5' header=$here/effects.hpp
-fi
+effect=$3 parameters=$4 library=${5:-}
+# fxdyn itself starts it for projects that name the library; scenarios and models do not
+own=$fxdyn${library:+-$library}
 work=$2/$effect
 # as in the tables: TanhCubicDamping
 type=$(sed -E 's/(^|_)([a-z])/\U\2/g' <<<"$effect")
@@ -29,8 +27,8 @@ fail() {
   failures=$((failures + 1))
 }
 step() { echo "[$SECONDS s] $*"; }
-# fxdyn's verb, its output shown where it fails
-must() { "$fxdyn" "$@" >said.txt 2>&1 || { fail "fxdyn $1: $(tail -1 said.txt)"; cat said.txt; exit 1; }; }
+# verb of a program, its output shown where it fails
+must() { "$@" >said.txt 2>&1 || { fail "fxdyn $2: $(tail -1 said.txt)"; cat said.txt; exit 1; }; }
 
 effect() { printf '[[effect]]\nname = "%s"\njoint = %s\nparameters = { %s }\n' "$1" "$2" "$3"; }
 log() { printf '[[log]]\nname = "%s"\nduration_s = 10\nperiod_s = 5\nspeed = %s\nseed = %s\n' "$1" "$2" "$3"; }
@@ -45,6 +43,7 @@ log() { printf '[[log]]\nname = "%s"\nduration_s = 10\nperiod_s = 5\nspeed = %s\
 project() {
   {
     printf '[robot]\nurdf = "arm.urdf"\nrated_torque = [60, 20]\n%s\n' "$2"
+    [ -z "$library" ] || printf '[effects]\nlibrary = "%s"\n' "$library"
     for entry in a:train b:train judge:validate test:test; do
       printf '[[log]]\nfile = "%s.csv"\nrole = "%s"\n' "${entry%:*}" "${entry#*:}"
     done
@@ -56,12 +55,12 @@ effects = [$nominal, \"$effect\"]"
 project hidden ""
 
 step "effects"
-must effects
+must "$own" effects
 grep -q "^$effect  *tau = ." said.txt || fail "effects: $effect is not listed"
-"$fxdyn" effects --json >effects.json
+"$own" effects --json >effects.json
 
 step "simulate"
-must simulate arm.toml --out .
+must "$own" simulate arm.toml --out .
 
 # value FILE PYTHON: a value out of JSON
 value() { python3 -c "import json,sys; print(eval(sys.argv[2], {'d': json.load(open(sys.argv[1]))}))" "$1" "$2"; }
@@ -88,11 +87,11 @@ PYTHON
 }
 
 step "identify"
-must identify known.toml --out out/known
+must "$fxdyn" identify known.toml --out out/known
 near out/known/model.json shape linear
 
 step "diagnose"
-must diagnose hidden.toml --out out/hidden
+must "$fxdyn" diagnose hidden.toml --out out/hidden
 found=$(value out/hidden/diagnosis.json "[[e['effect'] for e in j['effects']] for j in d['joints']]")
 # What goes on is a model that has the effect.
 run=hidden
@@ -104,23 +103,23 @@ else
 fi
 
 step "predict"
-must predict --model out/$run/model.json --log test.csv --out out/prediction
+must "$own" predict --model out/$run/model.json --log test.csv --out out/prediction
 relative=$(value out/prediction/metrics.json "max(j['relative'] for j in d['logs'][0]['joints'])")
 awk -v r="$relative" 'BEGIN { exit !(r < 0.01) }' || fail "predict: relative error $relative"
 
 step "export"
-must export $run.toml --out out/$run
+must "$fxdyn" export $run.toml --out out/$run
 grep -q "$type" out/$run/tables.hpp || fail "export: the tables do not name it"
 
 step "image for a Cortex-M4"
-"$root/toolchains/build_image.sh" out/$run/tables.hpp image cortex-m4 ${header:+"$header"} >said.txt 2>&1 || {
+"$root/toolchains/build_image.sh" out/$run/tables.hpp image cortex-m4 >said.txt 2>&1 || {
   cat said.txt
   fail "the image does not build"
   exit 1
 }
 
 step "replay in QEMU"
-must replay $run.toml --out out/$run --image image/fxdyn-mps2-an386.elf --ticks 500
+must "$fxdyn" replay $run.toml --out out/$run --image image/fxdyn-mps2-an386.elf --ticks 500
 [ "$(value out/$run/replay.json "d['bit_exact']")" = True ] || fail "replay: not bit for bit"
 
 step "done"

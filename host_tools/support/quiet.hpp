@@ -1,0 +1,8 @@
+#pragma once
+
+namespace fxdyn {
+
+/// No progress bars from here on: Progress draws nothing.
+void be_quiet();
+
+}  // namespace fxdyn

@@ -1,0 +1,73 @@
+#!/usr/bin/env bash
+# output_test.sh FXDYN: --json prints one object with the results of this run alone, --quiet nothing but complaints.
+set -euo pipefail
+fxdyn=$1
+root=$(cd "$(dirname "$0")/../.." && pwd)
+work=$(mktemp -d)
+trap 'rm -r "$work"' EXIT
+cd "$work"
+failed=0
+fail() {
+  echo "FAILED: $*" >&2
+  failed=1
+}
+
+cp "$root/tests/support/elastic_arm/arm.urdf" .
+cat >arm.toml <<'TOML'
+seed = 4
+[robot]
+urdf = "arm.urdf"
+rated_torque = [60, 20]
+acceleration = [8, 8]
+[[effect]]
+name = "viscous"
+joint = "all"
+parameters = { coefficient = [1.5, 0.6] }
+[[log]]
+name = "a"
+duration_s = 4
+period_s = 4
+[[log]]
+name = "b"
+duration_s = 4
+period_s = 4
+seed = 2
+TOML
+cat >robot.toml <<'TOML'
+[robot]
+urdf = "arm.urdf"
+rated_torque = [60, 20]
+[[log]]
+file = "a.csv"
+role = "train"
+[[log]]
+file = "b.csv"
+role = "test"
+TOML
+
+# says CODE PYTHON ARGUMENTS..: the exit code, and what holds for the JSON `d` on standard output
+says() {
+  local code=0 expected=$1 condition=$2
+  shift 2
+  "$fxdyn" "$@" >said.json 2>err || code=$?
+  [ "$code" -eq "$expected" ] || fail "$*: exit code $code: $(cat err)"
+  python3 -c "import json,sys; d = json.load(open('said.json')); sys.exit(not ($condition))" || fail "$*: not $condition: $(head -c 400 said.json)"
+}
+says 0 "d['verb'] == 'simulate' and d['exit'] == 0 and {'a.csv', 'b.csv'} <= set(d['files'])" simulate arm.toml --out . --json
+[ ! -s err ] || fail "simulate --json: progress on standard error: $(head -1 err)"
+mkdir out
+echo '{"old": 1}' >out/old.json
+touch -d '1 hour ago' out/old.json
+says 0 "len(d['results']['model.json']['joints']) == 2 and 'metrics.json' in d['results'] and 'old.json' not in d['files']" identify robot.toml --out out --json
+says 2 "d['exit'] == 2 and 'gone.toml' in d['complaint'] and not d['results']" identify gone.toml --out none --json
+[ "$(wc -l <err)" -eq 1 ] || fail "a complaint has $(wc -l <err) lines"
+says 0 "[e for e in d if e['effect'] == 'viscous']" effects --json
+says 0 "d['findings'] is not None and d['logs']" check robot.toml --json
+says 0 "{'used_by', 'looked_for', 'found'} <= set(d[0])" doctor --json
+
+"$fxdyn" identify robot.toml --out out --quiet >said 2>err || fail "identify --quiet: $(cat err)"
+[ ! -s said ] && [ ! -s err ] || fail "identify --quiet: $(head -1 said)$(head -1 err)"
+code=0
+"$fxdyn" identify gone.toml --out out --quiet >said 2>err || code=$?
+[ "$code" -eq 2 ] && grep -q "gone.toml" err && [ ! -s said ] || fail "--quiet hides a complaint"
+exit $failed
