@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 constexpr std::array<std::string_view, 3> print_a_file{"init", "completion", "man"};
 
 const std::string json_help = "print the results as one JSON object, and nothing else";
-const std::string quiet_help = "print nothing but what is wrong";
+const std::string quiet_help = "no tables and no progress: only notes and complaints, on standard error";
 
 bool is_set(const CLI::App& verb, const char* name) {
   const CLI::Option* option = verb.get_option_no_throw(name);
@@ -50,7 +50,8 @@ nlohmann::json results_of(const fs::path& directory, const std::set<std::string>
   for (const std::string& name : names) {
     if (!name.ends_with(".json")) continue;
     std::ifstream file(directory / name);
-    out[name] = nlohmann::json::parse(file, nullptr, false);
+    nlohmann::json content = nlohmann::json::parse(file, nullptr, false);
+    if (!content.is_discarded()) out[name] = std::move(content);
   }
   return out;
 }

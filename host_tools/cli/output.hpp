@@ -15,7 +15,8 @@ struct Ending {
 /// 2: bad input or usage, 1: the data can't support the answer.
 Ending ending_of(const std::exception_ptr& error);
 
-/// What a verb says on standard output: its tables, nothing (--quiet), or its results as JSON (--json).
+/// What a verb says on standard output: its tables, nothing (--quiet: notes and complaints
+/// are on standard error), or its results as JSON (--json).
 class Output {
  public:
   /// Adds --quiet and --json to a verb; not to those whose output is a file by itself. A verb may have a --json of its

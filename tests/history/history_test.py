@@ -69,7 +69,7 @@ with tempfile.TemporaryDirectory() as name:
         folders.append(work / 'out' / day)
         run('identify', work / f'{i}.toml', '--out', folders[-1])
     friction = 'coulomb amplitude'
-    joints = [j['name'] for j in json.loads((folders[0] / 'model.json').read_text())['robot']['joints']]
+    joints = [j['joint'] for j in json.loads((folders[0] / 'metrics.json').read_text())['logs'][0]['joints']]
     said = run('history', *reversed(folders), '--out', work / 'history', '--limit', f'{joints[1]} {friction}=1.6').stdout
     page = (work / 'history/history.html').read_text()
     result = json.loads((work / 'history/history.json').read_text())
