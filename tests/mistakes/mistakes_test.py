@@ -74,7 +74,9 @@ def make_bytes(kind, text, file):
         return None
     magic = {"parquet": b"PAR1\x15\x04\x15\x80", "hdf5": b"\x89HDF\r\n\x1a\n\0\0", "matlab": b"MATLAB 5.0 MAT-file\0",
              "ros bag": b"#ROSBAG V2.0\n\x45\0\0\0", "sqlite": b"SQLite format 3\0", "numpy": b"\x93NUMPY\x01\0v\0",
-             "zstd": b"\x28\xb5\x2f\xfd\x04\x58"}
+             "zstd": b"\x28\xb5\x2f\xfd\x04\x58",
+             # a block of the type that the format reserves
+             "zstd, damaged": b"\x28\xb5\x2f\xfd\x20\x05\x07\x00\x00t,q1\n"}
     if kind in magic:
         return magic[kind] + bytes(range(256)) * 8
     return {"utf-16": lambda: text.encode("utf-16"), "utf-16 without mark": lambda: text.encode("utf-16-le"),
