@@ -126,7 +126,7 @@ std::vector<double> expected(std::string_view effect, const JointSeries& s, int 
   if (effect == "eccentricity") return {std::polar(1.0, q).imag(), std::polar(1.0, q).real()};
   if (effect == "position_curve") return bumps(q, -0.1, 0.15);
   if (effect == "velocity_curve") return bumps(dq, -0.1, 0.2);
-  if (effect == "load_curve") return bumps(structural, -20, 15);
+  if (effect == "load_curve") return bumps(structural, -0.5, 0.3);
   if (effect == "friction_over_position") return bumps(q, -0.1, 0.15, sign);
   if (effect == "motor_coupling") {
     const double other = -0.8 * s.peers_dq(k, 1);
@@ -151,7 +151,7 @@ std::vector<double> shape_of(std::string_view effect) {
   if (effect == "motor_coupling") return {2, -0.8, 0.05};
   if (effect == "position_curve" || effect == "friction_over_position") return {-0.1, 0.25};
   if (effect == "velocity_curve") return {-0.1, 0.3};
-  if (effect == "load_curve") return {-20, 35};
+  if (effect == "load_curve") return {-0.5, 0.8};  // within the load of one_joint()
   const std::size_t count = find_effect(effect)->shape.size();
   if (count > 0) ADD_FAILURE() << "no values for the shape of " << effect << ": write them into shape_of()";
   return std::vector<double>(count, 0.1);
