@@ -6,6 +6,7 @@
 
 #include "host_tools/exchange/certificate.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
+#include "host_tools/project/project.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
 
@@ -24,17 +25,31 @@ std::vector<ProcessedLog> held_out_logs(Pipeline& pipeline) {
   std::vector<ProcessedLog> logs = without_load(pipeline.logs(Role::test));
   if (logs.empty()) logs = without_load(pipeline.logs(Role::validate));
   if (logs.empty())
-    throw DataError("export --to: no held-out log to judge the file by: give a log without load the role \"test\"");
+    throw DataError(
+        "export --to: each held-out log has a load, and the file has none: give a log without it the role \"test\"");
   return logs;
+}
+
+/// What the project alone decides: asked before hours of work.
+/// @throws InputError
+void check_project(const Project& project) {
+  if (!project.identify.physical) {
+    throw InputError(fmt::format(
+        "{}: a simulator takes possible bodies only: set `physical = true` in [identify], then export again",
+        project.file.string()));
+  }
+  if (!project.has_role(Role::test) && !project.has_role(Role::validate)) {
+    throw InputError(fmt::format("{}: no held-out log to judge the file by: give a log or a window the role \"test\"",
+                                 project.file.string()));
+  }
 }
 
 /// The links as possible bodies, of the stage that made the model.
 Robot possible_bodies(const Pipeline& pipeline) {
   const fs::path file = pipeline.directory() / "identified.urdf";
-  if (!pipeline.project().identify.physical || !fs::exists(file)) {
-    throw DataError(fmt::format(
-        "export --to: a simulator takes possible bodies only: set `physical = true` in [identify] of {} and run again",
-        pipeline.project().file.string()));
+  if (!fs::exists(file)) {
+    throw InputError(fmt::format("{}: is not there: run `fxdyn run {} --out {}` first", file.string(),
+                                 pipeline.project().file.string(), pipeline.directory().string()));
   }
   return read_urdf(file);
 }
@@ -43,6 +58,7 @@ Robot possible_bodies(const Pipeline& pipeline) {
 
 std::string export_for_simulators(Pipeline& pipeline, const std::vector<std::string>& formats) {
   for (const std::string& name : formats) export_format(name);  // an unknown one: before hours of work
+  check_project(pipeline.project());
   const IdentifiedModel model = pipeline.model();
   const Robot bodies = possible_bodies(pipeline);
   const std::vector<ProcessedLog> held_out = held_out_logs(pipeline), train = pipeline.logs(Role::train);
