@@ -67,7 +67,8 @@ Action add_export(CLI::App& verb) {
   const auto formats = std::make_shared<std::vector<std::string>>();
   verb.add_option("--to", *formats,
                   "no tables, but files for simulators and what each can't say: " + export_format_names())
-      ->delimiter(',');
+      ->delimiter(',')
+      ->allow_extra_args(false);
   return [options, formats] {
     Pipeline pipeline(options->project, options->out);
     if (!formats->empty()) {

@@ -11,6 +11,7 @@
 #include "host_tools/robot/write_urdf.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
+#include "host_tools/support/temporary_folder.hpp"
 
 namespace fxdyn {
 namespace {
@@ -37,9 +38,11 @@ void write_urdf_dynamics(const SimpleRobot& robot, const std::filesystem::path& 
   std::vector<LinkInertia<Real>> inertia;
   for (std::size_t j = 0; j < robot.joints.size(); ++j)
     inertia.push_back(to_link_inertia(*robot.robot.joints[j].inertial, chain.urdf_in_dh[j]));
-  write_urdf(robot.urdf, file, robot.robot, chain, inertia);
+  const TemporaryFolder temporary;
+  const std::filesystem::path bodies = temporary.path() / "bodies.urdf";
+  write_urdf(robot.urdf, bodies, robot.robot, chain, inertia);
   TiXmlDocument document;
-  document.Parse(read_file(file).c_str(), nullptr, TIXML_ENCODING_UTF8);
+  document.Parse(read_file(bodies).c_str(), nullptr, TIXML_ENCODING_UTF8);
   TiXmlElement* root = document.FirstChildElement("robot");
   if (document.Error() || root == nullptr)
     throw InputError(fmt::format("{}: can't be read as XML; run `fxdyn check`", robot.urdf.string()));
