@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <functional>
 #include <nlohmann/json.hpp>
 
@@ -17,11 +18,26 @@ namespace fs = std::filesystem;
 constexpr std::size_t changed = 1;  ///< the joint whose entry in the file is changed
 const std::string changed_name = "joint_2";
 
+/// Published moments miss the triangle inequality A + B >= C, which MuJoCo asks for.
+void make_possible(Inertial& body) {
+  const Eigen::Vector3d moments = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(body.tensor).eigenvalues();
+  const double missing = moments[2] - moments[1] - moments[0];
+  if (missing > -1e-6) body.tensor += (missing + 1e-6) * Eigen::Matrix3d::Identity();
+}
+
+IdentifiedModel possible_puma() {
+  Robot robot = test::puma_with_friction().robot;
+  for (Joint& joint : robot.joints) make_possible(*joint.inertial);
+  IdentifiedModel model = test::plant_of(robot);
+  model.joints = test::puma_with_friction().joints;
+  for (JointFit& joint : model.joints) joint.tau_limit = 100;
+  return model;
+}
+
 /// The PUMA 560 with its published rotors and friction, and logs that know its torques exactly.
 class Exchange : public testing::TestWithParam<const char*> {
  protected:
-  Exchange() : format(export_format(GetParam())), model(test::puma_with_friction()) {
-    for (JointFit& joint : model.joints) joint.tau_limit = 100;
+  Exchange() : format(export_format(GetParam())), model(possible_puma()) {
     train = test::processed({test::exact_log(model, Role::train, 1)});
     held_out = test::processed({test::exact_log(model, Role::test, 2)});
   }
@@ -161,7 +177,7 @@ TEST_P(Exchange, LossIsThatOfWhatIsLeftOut) {
   EXPECT_GT(expected, 5);
   EXPECT_NEAR(joint.cannot_say, expected, 0.01 * expected);
   EXPECT_NEAR(joint.file_rmse, joint.cannot_say, 1e-6 * joint.cannot_say);  // the log is the model's own
-  EXPECT_LT(joint.model_rmse, 1e-9);
+  EXPECT_LT(joint.model_rmse, 1e-6);
   EXPECT_EQ(joint.left_out.back(), "spring");
 }
 
@@ -238,6 +254,7 @@ TEST(ExportFormats, PrismaticJointsAndNamesThatNeedCare) {
     if (!test::slides(robot)) continue;
     ++found;
     robot.joints[0].name = "a & \"b\" <c>";
+    for (Joint& joint : robot.joints) make_possible(*joint.inertial);
     IdentifiedModel model = test::plant_of(robot);
     SimpleRobot simple{robot, std::vector<SimpleJoint>(4, SimpleJoint{2, 3, 0.5, 10}), {}};
     const fs::path file = test::folder() / "slides.xml";
@@ -259,7 +276,7 @@ TEST(ExportFormats, UrdfKeepsWhatItDoesNotKnow) {
   Robot robot = read_urdf(original);
   robot.joints[0].inertial = Inertial{2, {0.1, 0, 0}, 0.1 * Eigen::Matrix3d::Identity()};
   const fs::path file = test::folder() / "own_out.urdf";
-  write_urdf_dynamics({robot, {{0.5, 0.25, 0, 0}}, original}, file);
+  write_urdf_dynamics({robot, {SimpleJoint{0.5, 0.25, 0, 0}}, original}, file);
   const std::string text = read_file(file);
   for (const char* kept : {"kept", "<box size=\"1 1 1\"", "<mu1>0.2</mu1>", "damping=\"0.5\" friction=\"0.25\""})
     EXPECT_NE(text.find(kept), std::string::npos) << kept;
