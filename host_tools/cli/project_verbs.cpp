@@ -5,6 +5,8 @@
 #include "host_tools/cli/verb.hpp"
 #include "host_tools/compare/compare.hpp"
 #include "host_tools/compare/efficiency.hpp"
+#include "host_tools/exchange/exchange.hpp"
+#include "host_tools/exchange/formats.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
 #include "host_tools/report/report.hpp"
 #include "host_tools/support/error.hpp"
@@ -61,7 +63,21 @@ Action add_train(CLI::App& verb) {
   return stage(verb, [](Pipeline& pipeline) { pipeline.train(); });
 }
 Action add_export(CLI::App& verb) {
-  return stage(verb, [](Pipeline& pipeline) { pipeline.export_tables(); });
+  const auto options = add_project(verb);
+  const auto formats = std::make_shared<std::vector<std::string>>();
+  verb.add_option("--to", *formats,
+                  "no tables, but files for simulators and what each can't say: " + export_format_names())
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  return [options, formats] {
+    Pipeline pipeline(options->project, options->out);
+    if (!formats->empty()) {
+      fmt::print("{}", export_for_simulators(pipeline, *formats));
+      return;
+    }
+    pipeline.export_tables();
+    fmt::print("{}", summary_table(pipeline.directory()));
+  };
 }
 Action add_report(CLI::App& verb) {
   return stage(verb, [](Pipeline& pipeline) { pipeline.report(); });

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "host_tools/exchange/formats.hpp"
+
+namespace fxdyn {
+
+struct CertificateOptions {
+  /// What was read back may differ from what was meant, where friction slides, of the joint's largest torque [-].
+  /// Rounding of 17 digits and of another library's rigid body leaves 1e-12; hand.
+  double as_meant = 1e-6;
+};
+
+/// What a written file says of one joint, over the held-out logs. [N*m | N]
+struct JointCertificate {
+  std::string name, unit;
+  SimpleJoint written;
+  std::vector<std::string> left_out;  ///< effects without a word in the format
+  double cannot_say = 0;              ///< RMS of model minus file, both below the torque's cut-off
+  double file_rmse = 0;               ///< of measured minus file
+  double model_rmse = 0;              ///< of measured minus model
+  double misread = 0;                 ///< largest |read back - meant| where friction slides
+  double largest = 0;                 ///< largest |meant|: what `misread` is compared with
+  double sliding_share = 0;           ///< of the samples
+  bool as_meant = true;               ///< the format's own library reads what was meant
+};
+
+struct Certificate {
+  std::string format, file, reader;
+  std::string role;               ///< of the logs: "test", or "validate" where there are none
+  std::vector<std::string> logs;  ///< their files
+  std::vector<JointCertificate> joints;
+  bool as_meant() const;
+};
+
+/// Reads the file back by its format's own library, replays the logs, and compares the torques with those of the model,
+/// with the measured ones, and with what was meant. The file is taken as it is: whoever changed it is found out.
+/// @param logs held-out logs, not empty, without a known load
+/// @throws DataError: the library refuses the file
+Certificate certify(const ExportFormat& format, const std::filesystem::path& file, const SimpleRobot& meant,
+                    const IdentifiedModel& model, const std::vector<ProcessedLog>& logs,
+                    const CertificateOptions& options = {});
+
+nlohmann::json to_json(const Certificate& certificate);
+/// One line a joint.
+std::string certificate_table(const Certificate& certificate);
+
+/// @throws DataError naming the joint that is read back otherwise than it was meant
+void require_as_meant(const Certificate& certificate);
+
+}  // namespace fxdyn

@@ -1,0 +1,34 @@
+#include "host_tools/exchange/formats.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+
+#include "host_tools/support/error.hpp"
+
+namespace fxdyn {
+
+std::span<const ExportFormat> export_formats() {
+  static constexpr std::array all{
+      ExportFormat{"urdf", "the project's URDF with the identified bodies and <dynamics damping friction>",
+                   "simulator.urdf", "urdfdom", false, write_urdf_dynamics, replay_urdf},
+      ExportFormat{"mjcf", "MuJoCo: bodies, joints with damping, frictionloss and armature, one motor a joint",
+                   "simulator.xml", "MuJoCo", true, write_mjcf, replay_mjcf},
+  };
+  return all;
+}
+
+std::string export_format_names() {
+  std::string out;
+  for (const ExportFormat& format : export_formats()) out += (out.empty() ? "" : ", ") + std::string(format.name);
+  return out;
+}
+
+const ExportFormat& export_format(const std::string& name) {
+  for (const ExportFormat& format : export_formats()) {
+    if (name == format.name) return format;
+  }
+  throw InputError(fmt::format("export: --to {}: no such format; there are {}", name, export_format_names()));
+}
+
+}  // namespace fxdyn

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "host_tools/exchange/simple_robot.hpp"
+#include "host_tools/signals/motion.hpp"
+
+namespace fxdyn {
+
+/// Torques of a written file over a motion.
+struct ReplayedTorque {
+  Eigen::MatrixXd tau;  ///< samples x joints [N*m | N]
+  /// 1 where the joint's dry friction is at its limit, against the motion; else it sticks, and how is the simulator's
+  /// own affair.
+  Eigen::MatrixXd sliding;
+};
+
+/// A format of simulators. A new one is a file with two functions and a line in formats.cpp.
+struct ExportFormat {
+  const char* name;    ///< what follows --to
+  const char* help;    ///< what it is
+  const char* file;    ///< name of the file that is written
+  const char* reader;  ///< whose library reads it back
+  bool has_armature;   ///< it knows a rotor's inertia
+  /// @throws InputError, DataError: the format can't hold this robot
+  void (*write)(const SimpleRobot& robot, const std::filesystem::path& file);
+  /// The file as its own library reads it, over a motion of the robot that is expected in it.
+  /// @throws DataError: the library refuses the file, or other joints are in it
+  ReplayedTorque (*replay)(const std::filesystem::path& file, const IdentifiedModel& expected, const MotionRows& motion,
+                           double step_s);
+};
+
+std::span<const ExportFormat> export_formats();
+/// @throws InputError: unknown; lists the known ones
+const ExportFormat& export_format(const std::string& name);
+/// "urdf, mjcf"
+std::string export_format_names();
+
+// urdf_format.cpp
+void write_urdf_dynamics(const SimpleRobot& robot, const std::filesystem::path& file);
+ReplayedTorque replay_urdf(const std::filesystem::path& file, const IdentifiedModel& expected, const MotionRows& motion,
+                           double step_s);
+// mjcf_format.cpp
+void write_mjcf(const SimpleRobot& robot, const std::filesystem::path& file);
+ReplayedTorque replay_mjcf(const std::filesystem::path& file, const IdentifiedModel& expected, const MotionRows& motion,
+                           double step_s);
+
+}  // namespace fxdyn
