@@ -7,15 +7,18 @@
 #include "model/effects/eccentricity.hpp"
 #include "model/effects/elasticity.hpp"
 #include "model/effects/friction_drift.hpp"
+#include "model/effects/friction_over_position.hpp"
 #include "model/effects/gravity_compensator.hpp"
 #include "model/effects/gravity_tilt.hpp"
 #include "model/effects/joint_coupling.hpp"
+#include "model/effects/load_curve.hpp"
 #include "model/effects/load_friction.hpp"
 #include "model/effects/lugre.hpp"
 #include "model/effects/maxwell_slip.hpp"
 #include "model/effects/motor_coupling.hpp"
 #include "model/effects/offset.hpp"
 #include "model/effects/payload.hpp"
+#include "model/effects/position_curve.hpp"
 #include "model/effects/presliding.hpp"
 #include "model/effects/ripple.hpp"
 #include "model/effects/rotor_inertia.hpp"
@@ -23,6 +26,7 @@
 #include "model/effects/spring.hpp"
 #include "model/effects/stribeck.hpp"
 #include "model/effects/torque_gain.hpp"
+#include "model/effects/velocity_curve.hpp"
 #include "model/effects/viscous.hpp"
 #include "model/effects/viscous_cubic.hpp"
 #include "model/effects/viscous_quadratic.hpp"
@@ -43,11 +47,12 @@ using UserEffects = EffectList<>;
 namespace fxdyn {
 
 /// The one list of joint effects: simulator, identifier, exporter and diagnoser walk it.
-using Catalogue = Joined<
-    EffectList<Viscous, Coulomb, Offset, RotorInertia, Stribeck, Presliding, AsymmetricFriction, ViscousQuadratic,
-               ViscousCubic, LoadFriction, TorqueGain, Ripple, Spring, GravityCompensator, FrictionDrift, Saturation,
-               JointCoupling, Delay, Elasticity, Backlash, Eccentricity, MotorCoupling, Lugre, MaxwellSlip>,
-    UserEffects>;
+using Catalogue =
+    Joined<EffectList<Viscous, Coulomb, Offset, RotorInertia, Stribeck, Presliding, AsymmetricFriction,
+                      ViscousQuadratic, ViscousCubic, LoadFriction, TorqueGain, Ripple, Spring, GravityCompensator,
+                      FrictionDrift, Saturation, JointCoupling, Delay, Elasticity, Backlash, Eccentricity,
+                      MotorCoupling, Lugre, MaxwellSlip, PositionCurve, VelocityCurve, LoadCurve, FrictionOverPosition>,
+           UserEffects>;
 
 /// Effects on the rigid body itself: they change its parameters and have no basis.
 using BodyEffects = EffectList<Payload, GravityTilt>;

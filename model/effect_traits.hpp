@@ -27,6 +27,7 @@ struct MotionScales {
   bool like_previous = false;  ///< the joint before is of the same type: the two may share a gear
   bool like_next = false;      ///< likewise the joint after
   double upper = 0;            ///< largest value that the parameter may have here
+  double lowest = 0;           ///< q [rad | m]
 };
 
 /// A few values of one parameter.
@@ -177,6 +178,7 @@ struct EffectTraits {
   /// Like masses about the joint's axis: a turned gravity shows those of an upright first joint, where no name is due.
   bool as_masses_about_axis = false;
   bool share = false;       ///< its only coefficient is 1 by definition
+  bool curve = false;       ///< of what has no name: fitted where all names are done, not one of them
   unsigned identified = 0;  ///< place among the effects that `identify` adds by itself; 0: it does not
   double shortest_session_s = 0;
   std::uint32_t most_ticks = 0;  ///< a time shape is at most so many ticks; 0: any
@@ -192,6 +194,8 @@ struct EffectTraits {
   std::array<std::string_view, 2> warms_into{};
 
   constexpr bool drifts() const { return !warms_into[0].empty(); }
+  /// A name that diagnosis tries by itself.
+  constexpr bool sought() const { return !nominal && !unites_others() && !curve; }
   constexpr bool unites_others() const { return !unites[0].empty(); }
   constexpr bool named_experiment(const NamedExperiment& experiment) const {
     for (const NamedExperiment& own : experiments) {

@@ -19,7 +19,7 @@ struct SineCosine {
   U sine, cosine;
 };
 
-/// A number of quantity `count` in parts.
+/// A number in parts.
 template <class U>
 struct WholeAndRest {
   std::uint32_t whole;
@@ -57,6 +57,13 @@ constexpr double clipping(double x, double limit) { return x > limit ? limit - x
 constexpr WholeAndRest<double> split_count(double x) {
   const double limited = x > 0 ? (x < 32767 ? x : 32767) : 0;
   const auto whole = static_cast<std::uint32_t>(limited);
+  return {whole, limited - whole};
+}
+/// x limited to 0 .. last + 1, of which `rest` is 1 at the end.
+constexpr WholeAndRest<double> split_argument(double x, std::uint32_t last) {
+  const double end = last + 1.0, limited = x > 0 ? (x < end ? x : end) : 0;
+  const auto piece = static_cast<std::uint32_t>(limited);
+  const std::uint32_t whole = piece < last ? piece : last;
   return {whole, limited - whole};
 }
 
@@ -313,6 +320,16 @@ constexpr WholeAndRest<std::int32_t> split_count(std::int32_t x) {
   return {static_cast<std::uint32_t>(x) >> count_bits, (x & ((1 << count_bits) - 1)) << (unit_bits - count_bits)};
 }
 
+/// An argument (argument_bits) limited to 0 .. last + 1 < 16 in parts, the rest with 30 bits: 1 at the end.
+constexpr WholeAndRest<std::int32_t> split_argument(std::int32_t x, std::uint32_t last) {
+  const auto end = static_cast<std::int32_t>((last + 1) << argument_bits);
+  x &= ~(x >> 31);
+  x = x < end ? x : end;
+  const std::uint32_t piece = static_cast<std::uint32_t>(x) >> argument_bits;
+  const std::uint32_t whole = piece - static_cast<std::uint32_t>(piece > last);
+  return {whole, (x - static_cast<std::int32_t>(whole << argument_bits)) * (1 << (unit_bits - argument_bits))};
+}
+
 }  // namespace raw
 
 // ---- fixed point
@@ -356,6 +373,10 @@ constexpr Fixed<unit_bits> slip(Fixed<unit_bits> z, Fixed<unit_bits> moved) { re
 constexpr Fixed<unit_bits> doubled(Fixed<unit_bits> x) { return {raw::add_saturated(x.raw, x.raw)}; }
 constexpr WholeAndRest<Fixed<unit_bits>> split_count(Fixed<count_bits> x) {
   const auto parts = raw::split_count(x.raw);
+  return {parts.whole, {parts.rest}};
+}
+constexpr WholeAndRest<Fixed<unit_bits>> split_argument(Fixed<argument_bits> x, std::uint32_t last) {
+  const auto parts = raw::split_argument(x.raw, last);
   return {parts.whole, {parts.rest}};
 }
 

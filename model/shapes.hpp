@@ -103,6 +103,14 @@ inline ValueList neighbours(Scales s) {
   if (s.joint + 1 < s.joints) found.add(s.joint + 2);
   return found;
 }
+
+// free curves: over the whole motion
+inline ValueList lowest(Scales s) { return {s.lowest}; }
+inline ValueList range(Scales s) { return {s.range}; }
+inline ValueList lowest_speed(Scales s) { return {-s.speed}; }
+inline ValueList range_of_speed(Scales s) { return {2 * s.speed}; }
+inline ValueList lowest_load(Scales s) { return {-s.structural}; }
+inline ValueList range_of_load(Scales s) { return {2 * s.structural}; }
 }  // namespace detail
 
 /// A velocity below which friction is another one. Narrower than the sign is the sign; wider is viscous friction.
@@ -140,5 +148,16 @@ inline constexpr ShapeValues other_joint{
 /// The joint before or after; its index from 1. Motors that share a gear turn joints of one type.
 inline constexpr ShapeValues neighbour{
     .tried = detail::mates, .judged = detail::neighbours, .search = ShapeSearch::list};
+/// Where a free curve's knots begin, and how far they reach.
+inline constexpr ShapeValues curve_from{.tried = detail::lowest, .judged = detail::lowest, .search = ShapeSearch::list};
+inline constexpr ShapeValues curve_span{.tried = detail::range, .judged = detail::range, .search = ShapeSearch::list};
+inline constexpr ShapeValues curve_velocity_from{
+    .tried = detail::lowest_speed, .judged = detail::lowest_speed, .search = ShapeSearch::list};
+inline constexpr ShapeValues curve_velocity_span{
+    .tried = detail::range_of_speed, .judged = detail::range_of_speed, .search = ShapeSearch::list};
+inline constexpr ShapeValues curve_load_from{
+    .tried = detail::lowest_load, .judged = detail::lowest_load, .search = ShapeSearch::list};
+inline constexpr ShapeValues curve_load_span{
+    .tried = detail::range_of_load, .judged = detail::range_of_load, .search = ShapeSearch::list};
 
 }  // namespace fxdyn::shapes

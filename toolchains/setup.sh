@@ -9,6 +9,7 @@ packages=(
   g++ cmake ninja-build pkg-config
   # host libraries
   libeigen3-dev liburdfdom-dev libtomlplusplus-dev nlohmann-json3-dev libcli11-dev libfmt-dev zlib1g-dev
+  libzstd-dev liblz4-dev libsqlite3-dev
   # pins of the node on Linux
   libgpiod-dev
   # report: its pictures; what npm needs to install its plotting library
@@ -22,7 +23,7 @@ packages=(
   clang-16 libclang-rt-16-dev
   # tests
   chromium
-  libgtest-dev libunicorn-dev librapidcheck-dev libbenchmark-dev liborocos-kdl-dev libmujoco-dev libpagmo-dev python3 llvm-14
+  libgtest-dev libunicorn-dev librapidcheck-dev libbenchmark-dev liborocos-kdl-dev libmujoco-dev libpagmo-dev python3 llvm-14 zstd lz4
   # spelling of the pages, their site, the reference of the headers
   aspell aspell-en mkdocs mkdocs-material doxygen
 )

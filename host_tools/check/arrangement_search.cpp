@@ -145,14 +145,6 @@ class Moves {
     }
   }
 
-  /// Whether a joint can have gone so far: within the URDF's range and as far again, or within `widest` where it has
-  /// none.
-  bool is_possible(Index j, double range) const {
-    const auto& limits = joint(j).limits;
-    const bool known = limits && !joint(j).continuous && limits->upper > limits->lower;
-    return range < (known ? 2 * (limits->upper - limits->lower) : options_.widest);
-  }
-
   /// Another unit of the position: only where the range as given is none that the joint can have. A smaller motion
   /// always explains a joint that hardly feels its own, and a larger one is told from it by nothing but the torque.
   void units(Index j) {
@@ -160,7 +152,7 @@ class Moves {
     const double range = std::fabs(now_.motion_gain[j]) * (upper - lower);
     const bool turns = joint(j).type == JointType::revolute;
     std::vector<double> factors;
-    if (!is_possible(j, range)) factors = turns ? std::vector<double>{pi / 180} : std::vector<double>{1e-3, 0.01};
+    if (evidence_.excess(now_, j) > 0) factors = turns ? std::vector<double>{pi / 180} : std::vector<double>{1e-3, 0.01};
     if (!turns && range < options_.shortest_slide) factors.push_back(1e3);
     for (const double factor : factors) {
       ArrangementMove& move = add(Mistake::position_unit, j);

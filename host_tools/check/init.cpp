@@ -7,11 +7,13 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <optional>
 
 #include "host_tools/check/check.hpp"
 #include "host_tools/check/column_guess.hpp"
 #include "host_tools/check/course.hpp"
 #include "host_tools/project/log_entries.hpp"
+#include "host_tools/signals/log_reader.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/time_text.hpp"
 
@@ -31,14 +33,44 @@ std::string list(const std::vector<std::string>& columns) {
   return fmt::format("[{}]", fmt::join(out, ", "));
 }
 
-/// Whether the names are those that a project need not say: q1, q2, ...
-bool is_default(const LogFormat& format) {
-  if (format.columns.size() > 1 || format.columns.at("t") != "t") return false;
-  for (const auto& [signal, names] : format.joint_columns) {
-    for (std::size_t j = 0; j < names.size(); ++j)
-      if (names[j] != fmt::format("{}{}", signal, j + 1)) return false;
+std::vector<std::string> names_of(const Robot& robot) {
+  std::vector<std::string> names;
+  for (const Joint& joint : robot.joints) names.push_back(joint.name);
+  return names;
+}
+
+/// Whether the names are those that a project need not say: q1, q2, ...; in a recording that names its joints, the
+/// URDF's.
+bool is_default(const LogFormat& format, const Robot& robot) {
+  if (format.columns.size() > 1 + format.columns.count(topic_key) || format.columns.at("t") != "t") return false;
+  return std::all_of(format.joint_columns.begin(), format.joint_columns.end(), [&](const auto& given) {
+    const auto& [signal, names] = given;
+    std::vector<std::string> numbered;
+    for (std::size_t j = 0; j < names.size(); ++j) numbered.push_back(fmt::format("{}{}", signal, j + 1));
+    return names == numbered || names == joint_columns_of(signal, names_of(robot));
+  });
+}
+
+/// The joints' columns of a recording that names them: of the first topic that has what is needed.
+ColumnGuess guess_topic(const std::vector<LogColumns>& topics, const Robot& robot) {
+  std::optional<ColumnGuess> out;
+  for (const LogColumns& topic : topics) {
+    const auto has = [&](const std::string& name) {
+      return std::find(topic.names.begin(), topic.names.end(), name) != topic.names.end();
+    };
+    ColumnGuess guess;
+    guess.format.columns["t"] = "t";
+    for (const char* signal : signal_names) {
+      const std::vector<std::string> names = joint_columns_of(signal, names_of(robot));
+      if (!names.empty() && std::all_of(names.begin(), names.end(), has)) guess.format.joint_columns[signal] = names;
+    }
+    const bool named = guess.format.joint_columns.contains("q") && guess.format.joint_columns.contains("tau");
+    if (!named) guess = guess_columns(CsvHead{topic.names, {}, topic.names.size()}, robot);
+    if (topics.size() > 1) guess.format.columns[topic_key] = topic.topic;
+    if (guess.missing.empty()) return guess;
+    if (!out) out = guess;
   }
-  return true;
+  return *out;
 }
 
 struct Recorded {
@@ -59,7 +91,9 @@ Recorded recorded_of(const fs::path& file, const Log& log, const LogFactOptions&
 
 /// The columns by their names, or as they are given.
 ColumnGuess columns_in(const fs::path& file, const Robot& robot, const std::string& given) {
-  ColumnGuess guess = guess_columns(read_head(file), robot);
+  const LogReader& reader = reader_of(file);
+  ColumnGuess guess =
+      reader.columns == nullptr ? guess_columns(read_head(file), robot) : guess_topic(reader.columns(file), robot);
   if (!given.empty()) {
     LogFormat named = columns_of(given, robot);
     for (const auto& [signal, prefix] : named.columns) {
@@ -107,11 +141,15 @@ std::vector<std::string> roles_of(const std::vector<Recorded>& logs) {
 }
 
 /// @param format of the guess, with what the numbers have shown of its units
-void write_signals(const ColumnGuess& guess, const LogFormat& format, std::size_t joints, std::string& out) {
+void write_signals(const ColumnGuess& guess, const LogFormat& format, const Robot& robot, std::string& out) {
   const bool by_names = !format.columns.at("t").starts_with('#');
-  if (is_default(format) && !guess.torque_is_current && format.position_gain.empty()) return;
+  const auto topic = format.columns.find(topic_key);
+  if (is_default(format, robot) && !guess.torque_is_current && format.position_gain.empty() &&
+      topic == format.columns.end())
+    return;
   out += "\n[signals]\n";
-  if (!is_default(format)) {
+  if (topic != format.columns.end()) out += fmt::format("topic = \"{}\"\n", topic->second);
+  if (!is_default(format, robot)) {
     out += fmt::format("# which column of the file holds what, joint by joint{}\n",
                        by_names ? "" : "; numbers count from 0");
     std::string columns = "t = " + quoted(format.columns.at("t"));
@@ -130,7 +168,7 @@ void write_signals(const ColumnGuess& guess, const LogFormat& format, std::size_
   if (guess.torque_is_current) {
     out +=
         "# the torque's columns are currents: write torque constant x gear ratio of each joint [N*m/A], then check\n";
-    out += fmt::format("torque_gain = [{}]\n", fmt::join(std::vector<std::string>(joints, "1.0"), ", "));
+    out += fmt::format("torque_gain = [{}]\n", fmt::join(std::vector<std::string>(robot.size(), "1.0"), ", "));
   }
 }
 
@@ -180,20 +218,13 @@ std::string init_project(const std::vector<fs::path>& logs, const fs::path& urdf
   for (const fs::path& file : logs)
     recorded.push_back(recorded_of(file, read_in_its_unit(file, robot.size(), turns, format), options));
 
-  std::string out = fmt::format("# {}: {} joints ({})\n", robot.name, robot.size(),
-                                fmt::join(
-                                    [&] {
-                                      std::vector<std::string> names;
-                                      for (const Joint& joint : robot.joints) names.push_back(joint.name);
-                                      return names;
-                                    }(),
-                                    ", "));
+  std::string out = fmt::format("# {}: {} joints ({})\n", robot.name, robot.size(), fmt::join(names_of(robot), ", "));
   out += "# made by fxdyn init; go on with: fxdyn check PROJECT\n[robot]\n";
   out += fmt::format("urdf = \"{}\"\n", fs::relative(urdf, directory).generic_string());
   out += "# gravity = [0.0, 0.0, -9.81]   # in the base frame: write another where the base is not level\n";
   out += fmt::format("# rated_torque = [{}]   # of each joint, from the data sheet\n",
                      fmt::join(std::vector<std::string>(robot.size(), ".."), ", "));
-  write_signals(guess, format, robot.size(), out);
+  write_signals(guess, format, robot, out);
 
   const std::vector<std::string> roles = roles_of(recorded);
   for (std::size_t i = 0; i < recorded.size(); ++i) {

@@ -22,8 +22,9 @@ struct ArrangementOptions {
   double settled = 0.01;
   /// standard deviations over RMS of the torque; prior of a joint's own columns, each alone; hand
   double own_share = 3;
-  /// share of the largest RMS velocity; a joint with less does not move; hand
-  double standstill = 1e-3;
+  /// share of what the URDF lets a joint go; one that covers less does not move; hand: 2 mrad of a whole turn, more than
+  /// a controller that holds a load sags by
+  double standstill = 2e-4;
   /// nats; what another arrangement must gain; hand: none of the twelve sound robots tried got a finding
   double gain = 15;
   /// share of the error of the joint that feels it most; where more is left, it is a warning; hand
@@ -31,6 +32,8 @@ struct ArrangementOptions {
   /// share of the error of the joint that feels it most; a finding leaves no more where the URDF has not all masses;
   /// hand
   double vague_leaves = 0.5;
+  /// -; see ArrangementEvidence; hand: of a hundred URDFs one has limits that are ten times too narrow
+  double beyond = 2;
   /// rad | m; range of a joint without limits; hand: four turns, or a long rail
   double widest = 25;
   /// m; a slide that covers less may be in km or its URDF in mm; hand

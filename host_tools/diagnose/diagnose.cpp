@@ -121,7 +121,9 @@ class Diagnoser {
     logs_ = sessions(data_.logs, baseline_, session_, options.session);
     for (std::size_t j = 0; j < joints(); ++j) {
       if (!still_[j]) continue;
-      for (const std::string_view effect : joint_effect_names()) never_.push_back({std::string(effect), j, {}});
+      for (const std::string_view effect : joint_effect_names()) {
+        if (!find_effect(effect)->curve) never_.push_back({std::string(effect), j, {}});
+      }
     }
   }
 

@@ -53,6 +53,7 @@ MotionScales scales_of(const Linearised& problem, std::size_t joint) {
     s.structural = std::max(s.structural, inside(problem.robot_columns(l).structural()).cwiseAbs().maxCoeff());
     last = std::max(last, entry.age_s + entry.log.step_s * static_cast<double>(entry.log.samples()));
   }
+  s.lowest = lower;
   s.range = upper - lower;
   s.seconds = last;
   return s;
@@ -74,7 +75,7 @@ std::vector<Group> dictionary(const Linearised& problem, const std::vector<Effec
     inertia[j] = least_inertia(problem.log_columns().current(), j, positions);
   }
   for (const EffectInfo& info : effect_infos()) {
-    if (info.nominal || info.of_spectrum() || info.unites_others()) continue;
+    if (!info.sought() || info.of_spectrum()) continue;
     if (info.needs_peers && n < 2) continue;
     for (std::size_t j = 0; j < (info.acts_on == ActsOn::body ? 1 : n); ++j) {
       const bool skipped = std::any_of(skip.begin(), skip.end(), [&](const EffectCandidate& c) {

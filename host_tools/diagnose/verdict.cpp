@@ -169,7 +169,9 @@ class ReportWriter {
 
   JointDiagnosis still(std::size_t j) {
     JointDiagnosis out{joint_of(j).name, joint_of(j).torque_unit(), j + 1, Verdict::not_excited};
-    for (const std::string_view effect : joint_effect_names()) out.not_identifiable.emplace_back(effect);
+    for (const std::string_view effect : joint_effect_names()) {
+      if (!find_effect(effect)->curve) out.not_identifiable.emplace_back(effect);
+    }
     advise(fmt::format("record a log in which joint {} moves", j + 1));
     return out;
   }

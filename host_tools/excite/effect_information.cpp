@@ -67,7 +67,7 @@ std::vector<EffectCandidate> catalogue_of(const Robot& robot, const std::vector<
   }
   std::vector<EffectCandidate> out;
   for (const EffectInfo& info : effect_infos()) {
-    if (info.nominal || info.unites_others()) continue;  // what shows those shows it
+    if (!info.sought()) continue;  // laws that unite others are shown by what shows those
     for (std::size_t j = 0; j < (info.acts_on == ActsOn::body ? 1 : robot.size()); ++j) {
       for (const auto& shape : typical_shapes(info.name, j, robot, motions, torque, structural))
         out.push_back({std::string(info.name), j, shape});
@@ -208,10 +208,15 @@ std::vector<std::vector<double>> typical_shapes(std::string_view effect, std::si
   scales.torque = largest_of(torque, joint);
   scales.structural = largest_of(structural, joint);
   const auto col = static_cast<Index>(joint);
+  double lowest = motions.front().q(0, col), highest = lowest;
   for (const Motion& motion : motions) {
+    lowest = std::min(lowest, motion.q.col(col).minCoeff());
+    highest = std::max(highest, motion.q.col(col).maxCoeff());
     scales.speed = std::max(scales.speed, motion.dq.col(col).cwiseAbs().maxCoeff());
     scales.seconds = std::max(scales.seconds, motion.step_s * static_cast<double>(motion.q.rows()));
   }
+  scales.lowest = lowest;
+  scales.range = highest - lowest;
   std::vector<std::vector<double>> values;
   for (const ParameterInfo& shape : info->shape) {
     scales.upper = upper_bound(*info, shape, motions.front().step_s);

@@ -7,6 +7,7 @@
 #include "host_tools/numbers/formats.hpp"
 #include "host_tools/numbers/run_time_fixed.hpp"
 #include "model/broad_learning.hpp"
+#include "model/effects/curve.hpp"
 #include "model/math.hpp"
 #include "model/numbers.hpp"
 
@@ -411,5 +412,62 @@ inline WholeAndRest<BoundedNumbers::Of<Quantity::unit>> split_count(BoundedNumbe
   const auto parts = split_count(x.value.low);  // a parameter: one value
   return {parts.whole, {{parts.rest, parts.rest, x.value.error}}};
 }
+
+/// A free curve over an interval: weights are never negative and always add up to 3/2, so the curve is between 3/2 of
+/// the least and of the largest height whose bump reaches the interval. It is no steeper than 3/2 of the largest
+/// difference between neighbours a knot distance.
+template <>
+struct Curve<BoundedNumbers> {
+  Bound x{}, factor{1, 1, 0};
+  bool multiplied = false;
+
+  static Curve at(BoundedNumbers::Of<Quantity::argument> place) {
+    Bound x = place.value.cut(0, static_cast<double>(curve_pieces));
+    x.error = std::fmin(x.error, static_cast<double>(curve_pieces));
+    return {x};
+  }
+  Curve times(BoundedNumbers::Of<Quantity::unit> by) const { return {x, by.value, true}; }
+  template <class Emit>
+  void each(Emit&& emit) const {
+    for (std::size_t i = 0; i < curve_heights; ++i)
+      emit(as<Quantity::unit>, i, BoundedNumbers::Of<Quantity::unit>{scaled(bump(static_cast<double>(i) - 1), 1)});
+  }
+  BoundedWide sum(Words<BoundedNumbers> heights) const {
+    const auto last_piece = static_cast<double>(curve_pieces - 1);
+    const auto piece = [&](double at) { return static_cast<std::size_t>(std::fmin(std::floor(at), last_piece)); };
+    const std::size_t from = piece(x.low), to = piece(x.high) + 3;
+    const auto height = [&](std::size_t i) { return heights.coefficient<Quantity::unit>(i).value; };
+    Bound all = height(from);
+    double largest = 0, steepest = 0;
+    for (std::size_t i = 0; i < curve_heights; ++i) {
+      if (i >= from && i <= to) all = Bound::hull(all, height(i));
+      largest = std::fmax(largest, height(i).magnitude() + height(i).error);
+      if (i > 0) steepest = std::fmax(steepest, (height(i) - height(i - 1)).magnitude());
+    }
+    const Bound out{1.5 * all.low, 1.5 * all.high,
+                    1.5 * all.error + 1.5 * steepest * x.error + 4 * own_error() * largest};
+    return {scaled(out, 4 * largest)};
+  }
+
+ private:
+  /// Of a weight, beside that of x.
+  static double own_error() { return detail::rounding() ? std::ldexp(3.0, -unit_bits) : 0; }
+  /// @param roundings how much a unit of the narrowed products matters
+  Bound scaled(Bound value, double roundings) const {
+    if (!multiplied) return value;
+    Bound out = value * factor;
+    if (detail::rounding()) out.error += std::ldexp(0.5, -unit_bits) * roundings;
+    return out;
+  }
+  Bound bump(double middle) const {
+    const auto at = [](double d) {
+      if (d >= 2) return 0.0;
+      return d >= 1 ? (2 - d) * (2 - d) * (2 - d) / 4 : 1 - d * d * (1.5 - 0.75 * d);
+    };
+    const double a = x.low - middle, b = x.high - middle;
+    const double nearest = a <= 0 && b >= 0 ? 0 : std::fmin(std::fabs(a), std::fabs(b));
+    return {at(std::fmax(std::fabs(a), std::fabs(b))), at(nearest), x.error + own_error()};  // the steepest slope is 1
+  }
+};
 
 }  // namespace fxdyn

@@ -218,6 +218,11 @@ inline WholeAndRest<RunTimeNumbers::Of<Quantity::unit>> split_count(RunTimeNumbe
   const auto parts = raw::split_count(x.raw);
   return {parts.whole, {parts.rest}};
 }
+inline WholeAndRest<RunTimeNumbers::Of<Quantity::unit>> split_argument(RunTimeNumbers::Of<Quantity::argument> x,
+                                                                       std::uint32_t last) {
+  const auto parts = raw::split_argument(x.raw, last);
+  return {parts.whole, {parts.rest}};
+}
 
 /// The nearest fixed-point number with `bits` fractional bits; saturates.
 inline std::int32_t to_raw(double value, int bits) {

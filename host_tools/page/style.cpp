@@ -51,6 +51,7 @@ thead th { background: var(--head); font-weight: 600; overflow-wrap: normal; } t
 td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; } td.n { white-space: nowrap; }
 td.bad { background: var(--bad); } td.good { background: var(--good); } td.amber { background: var(--amber); }
 .scroll { overflow-x: auto; }
+@media screen and (min-width: 641px) { td, tbody th { overflow-wrap: break-word; } }
 @media screen and (max-width: 640px) {
   body { padding: .8em; } .overview { grid-template-columns: minmax(0, 1fr); } .sketch { max-height: 300px; }
   table, caption, tbody, tr, td, tbody th { display: block; max-width: none; } thead { display: none; }

@@ -12,6 +12,7 @@
 #include "host_tools/identify/payload.hpp"
 #include "host_tools/identify/payload_result.hpp"
 #include "host_tools/pipeline/log_check.hpp"
+#include "host_tools/project/log_entries.hpp"
 #include "host_tools/regression/metrics_result.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
@@ -39,7 +40,8 @@ Log read_log_for(const IdentifiedModel& model, const fs::path& file, std::option
                  std::optional<double> to_s, bool torque_required) {
   std::vector<bool> revolute;
   for (const Joint& joint : model.robot.joints) revolute.push_back(joint.type == JointType::revolute);
-  Log log = read_log(file, model.robot.size(), revolute, format_of(model, file), from_s, to_s, torque_required);
+  const LogFormat format = with_joint_names(file, format_of(model, file), model.robot);
+  Log log = read_log(file, model.robot.size(), revolute, format, from_s, to_s, torque_required);
   if (!log.time_note.empty()) fmt::print(stderr, "note: {}\n", log.time_note);
   return log;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "host_tools/signals/log_reader.hpp"
 #include "host_tools/support/files.hpp"
 
 namespace fxdyn {
@@ -13,6 +14,12 @@ namespace fs = std::filesystem;
 
 fs::path log_file(const LogEntry& entry, const fs::path& directory) {
   return entry.scenario ? directory / "logs" / entry.scenario->stem() / (entry.scenario_log + ".csv") : entry.file;
+}
+
+LogFormat with_joint_names(const fs::path& file, const LogFormat& format, const Robot& robot) {
+  std::vector<std::string> names;
+  for (const Joint& joint : robot.joints) names.push_back(joint.name);
+  return with_joint_names(file, format, names);
 }
 
 bool share_time(const LogEntry& a, const LogEntry& b) {

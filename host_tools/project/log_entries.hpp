@@ -15,6 +15,10 @@ std::filesystem::path log_file(const LogEntry& entry, const std::filesystem::pat
 /// @throws InputError
 LogFormat columns_of(const std::string& text, const Robot& robot);
 
+/// The columns of the robot's joints where a file names them, as a bag does; of other files, the format as it is. See
+/// signals/log_reader.hpp.
+LogFormat with_joint_names(const std::filesystem::path& file, const LogFormat& format, const Robot& robot);
+
 /// Whether the windows of two logs have a moment in common.
 bool share_time(const LogEntry& a, const LogEntry& b);
 

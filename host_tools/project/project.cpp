@@ -14,6 +14,7 @@
 #include "host_tools/effects/effect_library.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/project/log_entries.hpp"
+#include "host_tools/signals/log_reader.hpp"
 #include "host_tools/signals/time_unit.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
@@ -225,6 +226,7 @@ class ProjectReader {
       }
       columns->finish();
     }
+    if (const auto topic = table.find("topic")) format.columns[topic_key] = topic->string();
     if (const auto unit = table.find("time_unit"))
       format.time_unit_s = 1 / time_unit(unit->name(unit_names, "unit of time")).per_second;
     set(format.torque_gain, table.find("torque_gain"), [this](const Value& v) {
@@ -441,6 +443,7 @@ class ProjectReader {
     if (entry.from_s && entry.to_s && !(*entry.from_s < *entry.to_s)) table.place().fail("from_s is not below to_s");
     entry.format = read_format(table, default_format_);
     entry.own_format = entry.format != default_format_;
+    if (!entry.scenario) entry.format = with_joint_names(entry.file, entry.format, project_.robot);
     if (auto payload = table.table("payload")) {
       Load load;
       if (const auto mass = payload->find("mass")) {

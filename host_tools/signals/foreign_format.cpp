@@ -27,14 +27,14 @@ constexpr std::array formats{
     Format{"\x89HDF\r\n"sv, "is HDF5 (a .mat file of MATLAB 7.3 is, too): write its signals as columns of a CSV"},
     Format{"MATLAB 5.0"sv, "is a MATLAB file: write it as CSV, as in writetable(..., 'OUT.csv') there"},
     Format{"\x93NUMPY"sv, "is a numpy array: write it as CSV, as in numpy.savetxt('OUT.csv', array, delimiter=',')"},
-    Format{"#ROSBAG"sv, "is a ROS bag: export /joint_states as CSV"},
-    Format{"\x89MCAP0"sv, "is an MCAP recording: export its joint states as CSV"},
-    Format{"SQLite format 3"sv, "is an SQLite database (a ROS 2 bag is): export its joint states as CSV"},
+    Format{"#ROSBAG"sv, "is a bag of ROS 1: convert it to ROS 2, as in rosbags-convert --src IN.bag --dst OUT"},
+    Format{"\x89MCAP0"sv, "is an MCAP recording: name its file, it can't come through a pipe"},
+    Format{"SQLite format 3"sv, "is an SQLite database (a ROS 2 bag): name its file, it can't come through a pipe"},
     Format{"BZh"sv, "is compressed by bzip2: unpack it with bunzip2"},
     Format{"\xFD"
            "7zXZ"sv,
            "is compressed by xz: unpack it with unxz"},
-    Format{"\x28\xB5\x2F\xFD"sv, "is compressed by zstd: unpack it with unzstd"},
+    Format{"\x28\xB5\x2F\xFD"sv, "is compressed by zstd twice: unpack it with unzstd"},
     Format{"%PDF"sv, "is a PDF: a log is a table of numbers (CSV)"},
     Format{"\x7F"
            "ELF"sv,

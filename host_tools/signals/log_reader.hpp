@@ -4,7 +4,9 @@
 #include <filesystem>
 #include <limits>
 #include <span>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "host_tools/signals/log.hpp"
 
@@ -38,20 +40,48 @@ struct RecordedLog {
   bool time_is_known = false;
 };
 
+/// What a file has whose columns carry the joints' names, as in "elbow.effort": of each topic.
+struct LogColumns {
+  std::string topic;
+  std::vector<std::string> names;
+};
+
+/// The entry of LogFormat::columns that says which topic of a recording is meant; none: the one that has the joints.
+inline constexpr const char* topic_key = "topic";
+
 /// A file format. One more: a file with its `read`, and a line in log_reader.cpp.
 struct LogReader {
   std::string_view name;
   std::string_view extension;  ///< of the files that it reads, in small letters: ".csv"
   /// @throws InputError naming file, line and column, see read_log()
   RecordedLog (*read)(const LogRequest& request);
+  /// Whether a file is its own, by its first bytes; it may have any name. nullptr: the extension says it.
+  bool (*knows)(const std::filesystem::path& file) = nullptr;
+  /// Of a format that names the joints; the topic that serves best first. nullptr: a line of the text names the
+  /// columns.
+  /// @throws InputError: it has none
+  std::vector<LogColumns> (*columns)(const std::filesystem::path& file) = nullptr;
 };
 
 /// All formats.
 std::span<const LogReader> log_readers();
-/// By the file's extension, capitals or not; the last reader for all that no other knows.
+/// By the file's first bytes, else by its extension, capitals or not; the last reader for all that no other knows.
 const LogReader& reader_of(const std::filesystem::path& file, std::span<const LogReader> readers = log_readers());
 
 /// Comma separated values under a line of names.
 RecordedLog read_csv(const LogRequest& request);
+/// A bag of ROS 2, see bags/bag.hpp: a topic of sensor_msgs/msg/JointState or
+/// control_msgs/msg/JointTrajectoryControllerState. Its columns are "t" [s since the topic's first message],
+/// "JOINT.position", ".velocity", ".acceleration", ".effort"; of a controller also "JOINT.reference." and
+/// "JOINT.command." with these. Two ends of a recording that carry no numbers are left out, and told.
+RecordedLog read_bag_log(const LogRequest& request);
+std::vector<LogColumns> bag_columns(const std::filesystem::path& file);
+
+/// The format for a file that names its joints: the columns of the robot's joints, for all signals that the format does
+/// not say. Of other files, the format as it is.
+/// @param joints their names in the URDF, in the order of the chain
+LogFormat with_joint_names(const std::filesystem::path& file, LogFormat format, const std::vector<std::string>& joints);
+/// Such columns: "elbow.position" of q.
+std::vector<std::string> joint_columns_of(const std::string& signal, const std::vector<std::string>& joints);
 
 }  // namespace fxdyn

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <memory>
 
+#include "host_tools/bags/unpack.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/pipes.hpp"
 
@@ -18,7 +19,7 @@ namespace fxdyn {
 namespace {
 
 /// What gzip has packed; several packed files in one follow each other.
-std::string unpack(std::string_view packed, const std::string& path) {
+std::string unpack_gzip(std::string_view packed, const std::string& path) {
   constexpr std::size_t piece = std::size_t{1} << 20;
   constexpr int gzip = 16 + MAX_WBITS;
   z_stream stream{};
@@ -50,7 +51,12 @@ std::string unpack(std::string_view packed, const std::string& path) {
   return text;
 }
 
-bool is_packed(std::string_view bytes) { return bytes.starts_with("\x1F\x8B"); }
+bool is_gzip(std::string_view bytes) { return bytes.starts_with("\x1F\x8B"); }
+bool is_packed(std::string_view bytes) { return is_gzip(bytes) || is_zstd(bytes); }
+
+std::string unpack(std::string_view packed, const std::string& path) {
+  return is_gzip(packed) ? unpack_gzip(packed, path) : unpack_zstd(packed, path);
+}
 
 }  // namespace
 

@@ -6,7 +6,7 @@
 
 namespace fxdyn {
 
-/// A file in memory: mapped, or, of a pipe ("-": standard input) and of a file compressed by gzip, its text.
+/// A file in memory: mapped, or, of a pipe ("-": standard input) and of a file compressed by gzip or zstd, its text.
 class MappedFile {
  public:
   /// @throws InputError: it can't be read, or ends in the middle of what is compressed

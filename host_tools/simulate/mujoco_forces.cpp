@@ -25,6 +25,22 @@ constexpr std::array<std::string_view, 14> elsewhere{
     "lugre",      "maxwell_slip", "viscous", "coulomb",      "rotor_inertia", "elasticity", "backlash",
     "presliding", "eccentricity", "payload", "gravity_tilt", "torque_gain",   "saturation", "delay"};
 
+/// Cox's and de Boor's recursion: spline i of this degree over knots at the whole numbers, from i to i + degree + 1.
+double spline(int i, int degree, double x) {
+  if (degree == 0) return x >= i && x < i + 1 ? 1 : 0;
+  return ((x - i) * spline(i, degree - 1, x) + (i + degree + 1 - x) * spline(i + 1, degree - 1, x)) / degree;
+}
+
+/// A free curve of the fit's heights, of which equal ones of 1 make 3/2.
+double free_curve(const EffectFit& fit, double x) {
+  const double pieces = static_cast<double>(fit.linear.size()) - 3;
+  const double place = std::clamp((x - fit.shape[0]) / fit.shape[1] * pieces, 0.0, pieces);
+  double sum = 0;
+  for (std::size_t i = 0; i < fit.linear.size(); ++i)
+    sum += 1.5 * fit.linear[i] * spline(static_cast<int>(i) - 3, 3, place);
+  return sum;
+}
+
 /// Torque of an effect with no memory on joint j [N*m | N].
 /// @throws InputError: an effect that this plant has no formula for
 double force(const EffectFit& fit, const JointFit& joint, Index j, const DriveState& now,
@@ -43,6 +59,10 @@ double force(const EffectFit& fit, const JointFit& joint, Index j, const DriveSt
   if (name == "spring") return p[0] > 0 ? 0 : p[0] * q + p[1];  // MuJoCo's where it pulls back
   if (name == "gravity_compensator") return p[0] * std::cos(q) + p[1] * std::sin(q);
   if (name == "friction_drift") return (1 - std::exp(-now.time_s / fit.shape[0])) * (p[0] * sign + p[1] * v);
+  if (name == "position_curve") return free_curve(fit, q);
+  if (name == "velocity_curve") return free_curve(fit, v);
+  if (name == "load_curve") return free_curve(fit, now.load[j]);
+  if (name == "friction_over_position") return free_curve(fit, q) * sign;
   if (name == "joint_coupling") {
     const double other = now.dq[peer()];
     return p[0] * soft_sign(other, joints_of(plant)[static_cast<std::size_t>(peer())].sign_width) + p[1] * other;

@@ -53,7 +53,7 @@ void show_eccentricity(const IdentifiedModel& plant, PlantRun& run) {
 
 bool depends_on_load(const IdentifiedModel& plant) {
   for (const JointFit& joint : joints_of(plant)) {
-    for (const char* name : {"load_friction", "elasticity", "backlash"}) {
+    for (const char* name : {"load_friction", "load_curve", "elasticity", "backlash"}) {
       if (joint.find(name) != nullptr) return true;
     }
   }

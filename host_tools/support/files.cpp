@@ -1,9 +1,11 @@
 #include "host_tools/support/files.hpp"
 
 #include <fmt/format.h>
+
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
@@ -92,6 +94,17 @@ class Fnv1a {
   std::uint64_t hash_ = 14695981039346656037ULL;
 };
 
+/// Of the recordings that are a folder: names and hashes of its files.
+std::string hash_of_folder(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    if (entry.is_regular_file()) files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  Fnv1a hash;
+  for (const std::filesystem::path& file : files) hash.add(file.filename().string() + ' ' + hash_of_file(file) + '\n');
+  return hash.text();
+}
+
 }  // namespace
 
 std::string hash_of(std::string_view content) {
@@ -102,6 +115,7 @@ std::string hash_of(std::string_view content) {
 
 std::string hash_of_file(const std::filesystem::path& file) {
   if (const std::string* bytes = piped(file)) return hash_of(*bytes);
+  if (std::filesystem::is_directory(file)) return hash_of_folder(file);
   std::ifstream stream(file, std::ios::binary);
   std::vector<char> piece(std::size_t{1} << 20);
   Fnv1a hash;

@@ -244,9 +244,8 @@ TEST(Campaign, ListsAreComplete) {
     wanted.insert(one.effects.front().effect);
   }
   for (const std::string_view effect : effect_names()) {
-    const bool nominal = effect == "viscous" || effect == "coulomb" || effect == "offset" || effect == "rotor_inertia";
     // What unites others has no cases of its own: its plant has other formulas (lugre_plant_test, identify_test).
-    EXPECT_EQ(wanted.contains(std::string(effect)), !nominal && !find_effect(effect)->unites_others()) << effect;
+    EXPECT_EQ(wanted.contains(std::string(effect)), find_effect(effect)->sought()) << effect;
   }
 }
 

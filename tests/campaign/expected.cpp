@@ -56,8 +56,7 @@ std::vector<std::pair<EffectCandidate, std::string>> rivals(const Plan& plan, co
   std::vector<std::pair<EffectCandidate, std::string>> list;
   for (const EffectInfo& info : effect_infos()) {
     const std::string name(info.name);
-    const bool nominal = find_effect(name)->nominal;
-    if (nominal || info.unites_others() || std::find(names.begin(), names.end(), name) != names.end()) continue;
+    if (!info.sought() || std::find(names.begin(), names.end(), name) != names.end()) continue;
     // A sine of one chosen wavenumber explains no other effect; free ones would have to be searched.
     if (name == "ripple") continue;
     for (const auto& shape : typical_shapes(name, joint, plan.healthy.robot, plan.motions, plan.torque, structural))

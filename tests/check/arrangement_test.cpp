@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <kdl/chainidsolver_recursive_newton_euler.hpp>
 #include <numbers>
 
@@ -19,11 +21,11 @@ constexpr double degree = std::numbers::pi / 180;
 /// Samples of a robot with KDL's inverse dynamics and a friction of another form than the check's, noise of 1 %. The
 /// URDF that the check gets has masses that are up to 30 % off.
 struct Recorded {
-  Robot robot = read_urdf(test::puma560);
+  Robot robot;
   TorqueSamples samples;
 
   /// @param locked a joint whose brake is on
-  explicit Recorded(Index locked = -1) {
+  explicit Recorded(Index locked = -1, const std::filesystem::path& urdf = test::puma560) : robot(read_urdf(urdf)) {
     const KDL::Chain chain = test::to_kdl(robot);
     const Eigen::Vector3d g = robot.gravity;
     KDL::ChainIdSolver_RNE solver(chain, KDL::Vector(g.x(), g.y(), g.z()));
@@ -35,9 +37,10 @@ struct Recorded {
       const auto size = static_cast<unsigned>(robot.size());
       KDL::JntArray q(size), dq(size), ddq(size), tau(size);
       for (unsigned j = 0; j < robot.size(); ++j) {
-        q(j) = random.uniform(-2, 2);
-        dq(j) = random.uniform(-1.5, 1.5);
-        ddq(j) = random.uniform(-5, 5);
+        const double size = robot.joints[j].type == JointType::revolute ? 1 : 0.05;
+        q(j) = random.uniform(-2, 2) * size;
+        dq(j) = random.uniform(-1.5, 1.5) * size;
+        ddq(j) = random.uniform(-5, 5) * size;
         if (static_cast<Index>(j) != locked) continue;
         q(j) = 0.4;
         dq(j) = ddq(j) = 0;
@@ -140,6 +143,42 @@ TEST(Arrangement, GainsAndUnitsAreFound) {
   Recorded degrees;
   degrees.scale_motion(2, 1 / degree);
   expect_alone(degrees.check(), Mistake::position_unit, 2);
+}
+
+// A slide in mm is a thousand times as fast as the joints that turn. They move all the same.
+TEST(Arrangement, ASlideInMillimetresIsFound) {
+  Recorded recorded(-1, std::filesystem::path(FXDYN_SOURCE_DIR) / "tests/campaign/scara.urdf");
+  EXPECT_TRUE(recorded.check().empty());
+  const auto slide = std::find_if(recorded.robot.joints.begin(), recorded.robot.joints.end(),
+                                  [](const Joint& joint) { return joint.type == JointType::prismatic; });
+  ASSERT_NE(slide, recorded.robot.joints.end());
+  const auto at = static_cast<Index>(slide - recorded.robot.joints.begin());
+  recorded.scale_motion(at, 1000);
+  const ArrangementEvidence evidence(recorded.robot, recorded.samples, {});
+  for (Index j = 0; j < static_cast<Index>(recorded.robot.size()); ++j) EXPECT_TRUE(evidence.moves(j)) << j;
+  const auto found = recorded.check();
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(to_string(found[0].move.mistake), "position_unit");
+  EXPECT_EQ(found[0].move.joint, at);
+  EXPECT_DOUBLE_EQ(found[0].move.value, 1e-3);
+}
+
+// What tells a slide in mm from one whose torque is a thousand times too small is the length of its rail alone: there is
+// nothing else on it, and nothing hangs from it.
+TEST(Arrangement, TheWayThatAJointGoesIsPartOfTheEvidence) {
+  Recorded recorded(-1, std::filesystem::path(FXDYN_SOURCE_DIR) / "tests/campaign/scara.urdf");
+  Arrangement wide = as_given(recorded.robot);
+  wide.motion_gain[2] = 1000;
+  ArrangementOptions options;
+  const ArrangementEvidence with(recorded.robot, recorded.samples, options);
+  options.beyond = 0;
+  const ArrangementEvidence without(recorded.robot, recorded.samples, options);
+  const auto [lower, upper] = with.range(2);
+  const Limits& limits = *recorded.robot.joints[2].limits;
+  const double excess = std::log(1000 * (upper - lower) / (2 * (limits.upper - limits.lower)));
+  EXPECT_NEAR(with.excess(wide, 2), excess, 1e-12);
+  EXPECT_NEAR(with(wide).nats - without(wide).nats, ArrangementOptions().beyond * excess, 1e-9);
+  EXPECT_DOUBLE_EQ(with(as_given(recorded.robot)).nats, without(as_given(recorded.robot)).nats);
 }
 
 TEST(Arrangement, AJointThatIsLockedIsNotExchangedForAnother) { EXPECT_TRUE(Recorded(2).check().empty()); }

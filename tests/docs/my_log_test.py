@@ -11,6 +11,8 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / 'tests/support'))
+import ros2_bags
 PAGE = ROOT / 'docs/guide/my-log.md'
 DEMO = ROOT / 'host_tools/demo'
 JOINTS = 6
@@ -83,13 +85,15 @@ def staubli(folder, rows):
 
 
 def ros_2(folder, rows):
-    names = joint_names()
-    pick = lambda values: [f'{values[j]:.10g}' for j in ROS_ORDER]
-    lines = []
+    names = [joint_names()[j] for j in ROS_ORDER]
+    pick = lambda values: [values[j] for j in ROS_ORDER]
+    (folder / 'my_bag').mkdir()
+    (folder / 'my_bag/metadata.yaml').write_text('rosbag2_bagfile_information:\n  relative_file_paths:\n    - my_bag_0.db3\n')
+    messages = []
     for (t, q, tau), dq in zip(rows, velocities(rows)):
-        whole = 1700000000 + int(t)
-        lines.append(','.join([str(whole), str(round((t - int(t)) * 1e9)), '', *[names[j] for j in ROS_ORDER], *pick(q), *pick(dq), *pick(tau)]))
-    (folder / 'states.csv').write_text('\n'.join(lines) + '\n')
+        stamp = 1700000000 * 10**9 + round(t * 1e9)
+        messages.append((stamp + 200000, ros2_bags.joint_state(stamp, names, pick(q), pick(dq), pick(tau))))
+    ros2_bags.database(folder / 'my_bag/my_bag_0.db3', messages)
 
 
 def odrive(folder, rows):
@@ -117,7 +121,7 @@ def can_sniffer(folder, rows):
 
 
 KINDS = {'Universal Robots (RTDE)': universal_robots, 'Franka (libfranka)': franka, 'KUKA (RSI)': kuka, 'Staubli': staubli,
-         'ROS 2 JointState': ros_2, 'ODrive': odrive, 'moteus': moteus, 'A CAN sniffer (CiA 402)': can_sniffer}
+         'ROS 2': ros_2, 'ODrive': odrive, 'moteus': moteus, 'A CAN sniffer (CiA 402)': can_sniffer}
 
 
 def commands_of(page):

@@ -33,12 +33,33 @@ import zipfile
 import good
 
 HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "support"))
+import ros2_bags
 TIMEOUT_S = 60
+
+
+def make_bag(kind, text):
+    """The log's rows as messages of a ROS 2 bag."""
+    begin, names = 1700000000 * 10**9, ["shoulder", "elbow"] if kind != "of another robot" else ["joint_a", "joint_b"]
+    messages = []
+    for k, line in enumerate(text.splitlines()[1:]):
+        t, *values = map(float, line.split(","))
+        at = begin + round(t * 1e9)
+        stamp = round(t * 1e9) + 10**9 if kind == "of two clocks" and k < 500 else at
+        effort = values[2:] if kind != "without torque" else []
+        if kind == "with NaN" and k == 700:
+            effort = [effort[0], float("nan")]
+        messages.append((at, ros2_bags.joint_state(stamp, names, values[:2], [], effort)))
+    topic = {"without joint states": ("/tf", "tf2_msgs/msg/TFMessage")}.get(kind, ("/joint_states", ros2_bags.JOINT_STATE))
+    data = ros2_bags.database(":memory:", messages, *topic)
+    return data[:len(data) // 2] if kind == "cut" else data
 
 
 def make_bytes(kind, text, file):
     """The log's text as other programs would store it; None: `file` was written."""
     data = text.encode()
+    if kind.startswith("bag "):
+        return make_bag(kind.removeprefix("bag "), text)
     if kind == "gzip":
         return gzip.compress(data, 1)
     if kind == "gzip, cut":
@@ -53,7 +74,9 @@ def make_bytes(kind, text, file):
         return None
     magic = {"parquet": b"PAR1\x15\x04\x15\x80", "hdf5": b"\x89HDF\r\n\x1a\n\0\0", "matlab": b"MATLAB 5.0 MAT-file\0",
              "ros bag": b"#ROSBAG V2.0\n\x45\0\0\0", "sqlite": b"SQLite format 3\0", "numpy": b"\x93NUMPY\x01\0v\0",
-             "zstd": b"\x28\xb5\x2f\xfd\x04\x58"}
+             "zstd": b"\x28\xb5\x2f\xfd\x04\x58",
+             # a block of the type that the format reserves
+             "zstd, damaged": b"\x28\xb5\x2f\xfd\x20\x05\x07\x00\x00t,q1\n"}
     if kind in magic:
         return magic[kind] + bytes(range(256)) * 8
     return {"utf-16": lambda: text.encode("utf-16"), "utf-16 without mark": lambda: text.encode("utf-16-le"),

@@ -35,9 +35,12 @@ TEST(EffectDeclarations, ListsAreThoseOfTheTraits) {
   EXPECT_EQ(named([](const EffectInfo& info) { return info.several; }), (Names{"ripple", "joint_coupling"}));
   EXPECT_EQ(named([](const EffectInfo& info) { return info.share; }), (Names{"saturation", "delay"}));
   EXPECT_EQ(named([](const EffectInfo& info) { return info.unites_others(); }), (Names{"lugre", "maxwell_slip"}));
+  EXPECT_EQ(named([](const EffectInfo& info) { return info.curve; }),
+            (Names{"position_curve", "velocity_curve", "load_curve", "friction_over_position"}));
   EXPECT_EQ(named([](const EffectInfo& info) { return info.friction; }),
             (Names{"viscous", "coulomb", "offset", "stribeck", "presliding", "asymmetric_friction", "viscous_quadratic",
-                   "viscous_cubic", "load_friction", "friction_drift", "lugre", "maxwell_slip"}))
+                   "viscous_cubic", "load_friction", "friction_drift", "lugre", "maxwell_slip", "velocity_curve",
+                   "friction_over_position"}))
       << "differs from day to day";
 }
 
@@ -144,6 +147,19 @@ constexpr std::array promises = std::to_array<Promise>({
     {"maxwell_slip", "force_3", "N*m", 0, unbounded},
     {"maxwell_slip", "force_4", "N*m", 0, unbounded},
     {"maxwell_slip", "force_5", "N*m", 0, unbounded},
+    {"position_curve", "from", "rad", -1e3, 1e3},
+    {"position_curve", "span", "rad", 1e-4, 1e3},
+    {"position_curve", "height_1", "N*m", -unbounded, unbounded},
+    {"position_curve", "height_12", "N*m", -unbounded, unbounded},
+    {"velocity_curve", "from", "rad/s", -1e3, 1e3},
+    {"velocity_curve", "span", "rad/s", 1e-4, 1e3},
+    {"velocity_curve", "height_12", "N*m", -unbounded, unbounded},
+    {"load_curve", "from", "N*m", -1e6, 1e6},
+    {"load_curve", "span", "N*m", 1e-4, 1e6},
+    {"load_curve", "height_12", "N*m", -unbounded, unbounded},
+    {"friction_over_position", "from", "rad", -1e3, 1e3},
+    {"friction_over_position", "span", "rad", 1e-4, 1e3},
+    {"friction_over_position", "height_12", "N*m", -unbounded, unbounded},
     {"payload", "mass", "kg", 0, unbounded},
     {"payload", "com_x", "m", -10, 10},
     {"payload", "com_y", "m", -10, 10},

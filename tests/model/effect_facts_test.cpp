@@ -27,7 +27,7 @@ template <class E>
 std::vector<double> run(double structural, double total, double peer, std::set<std::size_t>* numbers = nullptr) {
   std::array<Real::Word, 3> shape{};
   for (std::size_t i = 0; i < E::shape.size(); ++i) {
-    const double value = E::shape[i].name == "joint" ? 1 : 0.02;
+    const double value = E::shape[i].name == "joint" ? 1 : E::shape[i].name == "span" ? 3 : 0.02;
     shape[i] = E::stored_shape(i, value, 0.002);
   }
   const std::array<JointInput<Real>, 2> peers{{{0.1, peer, 2 * peer, 0.5 * peer}, {0.2, 0.3, 0.4, 0.5}}};

@@ -36,11 +36,11 @@ TEST(EffectRoles, AreFoundOnAJoint) {
   EXPECT_EQ(compliance_of(joint), &joint.effects[2]);
 }
 
-/// What the fit leaves alone: choices from a list, and a time constant that one session can't show.
-TEST(EffectRoles, ListedShapesAreThoseOfCouplings) {
+/// What the fit leaves alone: choices from a list, a curve's knots, and a time constant that one session can't show.
+TEST(EffectRoles, ListedShapesAreThoseOfCouplingsAndCurves) {
   for (const EffectInfo& info : effect_infos()) {
     for (const ParameterInfo& shape : info.shape)
-      EXPECT_EQ(shape.values.search == ShapeSearch::list, shape.name == "joint" || shape.name == "ratio")
+      EXPECT_EQ(shape.values.search == ShapeSearch::list, shape.name == "joint" || shape.name == "ratio" || info.curve)
           << info.name << " " << shape.name;
     EXPECT_EQ(info.drifts(), info.name == "friction_drift") << info.name;
   }

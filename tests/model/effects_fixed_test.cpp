@@ -62,9 +62,20 @@ constexpr double lsb(Quantity quantity) {
 struct Case {
   std::string_view effect;
   std::array<double, 2> shape;
-  std::array<double, 5> tolerance;
+  std::array<double, 12> tolerance;
 };
 constexpr double exact = 0, torque = lsb(Quantity::torque);
+constexpr double curve_span = 4;
+// A bump is nowhere steeper than 1 a knot distance: a place rounded twice, and a few units of the weights.
+constexpr double of_curve(double span, Quantity quantity) {
+  return 4e-9 + 9 / span * lsb(quantity) + lsb(Quantity::argument);
+}
+constexpr std::array<double, 12> all_bumps(double tolerance) {
+  std::array<double, 12> out{};
+  out.fill(tolerance);
+  return out;
+}
+
 constexpr std::array cases{
     Case{"viscous", {}, {exact}},
     Case{"coulomb", {}, {exact}},
@@ -95,6 +106,10 @@ constexpr std::array cases{
     Case{"motor_coupling",
          {1, 4},
          {1.6e-6 + 20 * lsb(Quantity::velocity), 0.51 * lsb(Quantity::velocity), 0.51 * lsb(Quantity::acceleration)}},
+    Case{"position_curve", {-3.5, 1}, all_bumps(of_curve(curve_span, Quantity::position))},
+    Case{"velocity_curve", {-16, 10}, all_bumps(of_curve(curve_span, Quantity::velocity))},
+    Case{"load_curve", {-260, 100}, all_bumps(of_curve(curve_span, Quantity::torque))},
+    Case{"friction_over_position", {-3.5, 1}, all_bumps(of_curve(curve_span, Quantity::position))},
 };
 
 /// Null: it has none.
@@ -147,6 +162,7 @@ std::vector<double> run(const std::vector<Tick>& ticks, double varied) {
   for (std::size_t i = 0; i < E::shape.size(); ++i) {
     const double shape = i == 0 ? varied
                                 : (E::shape[i].name == "ratio"   ? -0.7
+                                   : E::shape[i].name == "span"  ? curve_span
                                    : E::shape[i].name == "share" ? 0.95
                                                                  : 0.05);
     const std::int32_t raw = to_raw(E::stored_shape(i, shape, step_s), Fixed32::bits(E::shape[i].quantity));

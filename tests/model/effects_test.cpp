@@ -44,6 +44,21 @@ JointSeries random_series(std::uint64_t seed, int samples = 2000) {
   return s;
 }
 
+/// Cox's and de Boor's recursion over knots at the whole numbers.
+double recursion(int i, int degree, double x) {
+  if (degree == 0) return x >= i && x < i + 1 ? 1 : 0;
+  return ((x - i) * recursion(i, degree - 1, x) + (i + degree + 1 - x) * recursion(i + 1, degree - 1, x)) / degree;
+}
+
+/// The twelve bumps of a free curve between two knots at x.
+std::vector<double> bumps(double x, double from, double to, double factor = 1) {
+  std::vector<double> out;
+  // the recursion's last piece is open at its end
+  const double place = std::min(std::clamp((x - from) / (to - from), 0.0, 1.0) * 9, 9 - 1e-14);
+  for (int i = -3; i < 9; ++i) out.push_back(1.5 * recursion(i, 3, place) * factor);
+  return out;
+}
+
 /// What each effect should give, written a second time on purpose and in another way where there is one: states by
 /// their closed-form solutions.
 std::vector<double> expected(std::string_view effect, const JointSeries& s, int k, double& z) {
@@ -109,6 +124,10 @@ std::vector<double> expected(std::string_view effect, const JointSeries& s, int 
   }
   if (effect == "backlash") return {1 - 2 / (1 + std::exp(2 * structural / 5))};
   if (effect == "eccentricity") return {std::polar(1.0, q).imag(), std::polar(1.0, q).real()};
+  if (effect == "position_curve") return bumps(q, -0.1, 0.15);
+  if (effect == "velocity_curve") return bumps(dq, -0.1, 0.2);
+  if (effect == "load_curve") return bumps(structural, -0.5, 0.3);
+  if (effect == "friction_over_position") return bumps(q, -0.1, 0.15, sign);
   if (effect == "motor_coupling") {
     const double other = -0.8 * s.peers_dq(k, 1);
     return {1 - 2 / (1 + std::exp(2 * (dq + other) / 0.05)), other, -0.8 * s.peers_ddq(k, 1)};
@@ -130,6 +149,9 @@ std::vector<double> shape_of(std::string_view effect) {
   if (effect == "elasticity") return {0.01};
   if (effect == "backlash") return {5};
   if (effect == "motor_coupling") return {2, -0.8, 0.05};
+  if (effect == "position_curve" || effect == "friction_over_position") return {-0.1, 0.25};
+  if (effect == "velocity_curve") return {-0.1, 0.3};
+  if (effect == "load_curve") return {-0.5, 0.8};  // within the load of one_joint()
   const std::size_t count = find_effect(effect)->shape.size();
   if (count > 0) ADD_FAILURE() << "no values for the shape of " << effect << ": write them into shape_of()";
   return std::vector<double>(count, 0.1);

@@ -42,6 +42,8 @@ double shape_value(const ParameterInfo& shape, bool strong) {
   if (shape.name == "ratio") return strong ? -3 : 1;
   if (shape.name == "time_constant") return strong ? 1e4 : 20;
   if (shape.name == "wavenumber") return strong ? 100 : 6;
+  if (shape.name == "from") return strong ? -0.5 : -2;
+  if (shape.name == "span") return strong ? 0.3 : 4;
   if (shape.name == "limit" || shape.name == "torque_scale") return strong ? 1 : 10;
   return std::clamp(strong ? 0.002 : 0.02, shape.lower, shape.upper);
 }

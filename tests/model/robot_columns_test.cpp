@@ -49,6 +49,8 @@ std::vector<double> shape_of(std::string_view effect, std::size_t joint) {
   if (effect == "delay") return {0.0071};
   if (effect == "elasticity") return {0.01};
   if (effect == "backlash") return {5};
+  if (effect == "position_curve" || effect == "friction_over_position") return {-0.2, 1};
+  if (effect == "velocity_curve") return {-1, 2};
   return std::vector<double>(find_effect(effect)->shape.size(), 1);
 }
 
@@ -63,14 +65,14 @@ EffectFit fit_of(std::string_view effect, std::vector<double> shape, std::vector
 MatrixXd torque_of(const IdentifiedModel& model, const Motion& m) { return predict(model, m.q, m.dq, m.ddq, m.step_s); }
 
 /// The torque change by a finite effect, central: the error of the column is that of the difference, not its own.
-MatrixXd central(const IdentifiedModel& model, std::string_view effect, std::size_t joint, std::size_t parameter,
-                 double theta, const Motion& motion) {
+MatrixXd central(const IdentifiedModel& model, std::string_view effect, const std::vector<double>& shape,
+                 std::size_t joint, std::size_t parameter, double theta, const Motion& motion) {
   const auto changed = [&](double value) {
     IdentifiedModel m = model;
     std::vector<double> linear(find_effect(effect)->linear.size());
     linear[parameter] = value;
     const bool on_body = find_effect(effect)->acts_on == ActsOn::body;
-    (on_body ? m.body : m.joints[joint].effects).push_back(fit_of(effect, shape_of(effect, joint), linear));
+    (on_body ? m.body : m.joints[joint].effects).push_back(fit_of(effect, shape, linear));
     return torque_of(m, motion);
   };
   return (changed(theta) - changed(-theta)) / (2 * theta);
@@ -82,12 +84,17 @@ void expect_slopes(const IdentifiedModel& model) {
   for (const EffectInfo& info : effect_infos()) {
     if (info.name == Payload::name) continue;  // not linear in its parameters: below
     const std::size_t joint = 1;
-    const EffectColumns out = columns({std::string(info.name), joint, shape_of(info.name, joint)});
+    std::vector<double> shape = shape_of(info.name, joint);
+    if (info.name == "load_curve") {  // over the loads that occur: every height shows
+      const Eigen::VectorXd load = columns.structural().col(static_cast<Index>(joint));
+      shape = {load.minCoeff(), load.maxCoeff() - load.minCoeff()};
+    }
+    const EffectColumns out = columns({std::string(info.name), joint, shape});
     ASSERT_EQ(out.joints.size(), 6U);
     for (std::size_t i = 0; i < info.linear.size(); ++i) {
       // Deflections: small beside the motion, far from rounding. Torques and tilts: linear to first order anyway.
       const double theta = info.name == "elasticity" ? 1e-7 : info.acts_on == ActsOn::position ? 1e-5 : 1e-4;
-      const MatrixXd slope = central(model, info.name, joint, i, theta, motion);
+      const MatrixXd slope = central(model, info.name, shape, joint, i, theta, motion);
       const double size = slope.cwiseAbs().maxCoeff();
       EXPECT_GT(size, 0) << info.name;
       for (Index j = 0; j < 6; ++j) {

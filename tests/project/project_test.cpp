@@ -237,7 +237,7 @@ TEST(Project, ItsHashIsOfWhatTheModelDependsOn) {
   };
   const std::string plain = hash("");
   EXPECT_EQ(hash("[target]\naccept_error = 0.03\n"), plain);  // of the export alone
-  EXPECT_EQ(hash("[report]\ngood_enough = 0.02\n"), plain);  // of the page alone
+  EXPECT_EQ(hash("[report]\ngood_enough = 0.02\n"), plain);   // of the page alone
   EXPECT_EQ(hash("# a word\n"), plain);
   EXPECT_NE(hash("[target]\ntick_s = 0.001\n"), plain);
   EXPECT_NE(hash("[train]\nseed = 2\n"), plain);
