@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "host_tools/page/compact_svg.hpp"
 #include "host_tools/page/live_plot.hpp"
 #include "host_tools/page/style.hpp"
 
@@ -77,46 +78,9 @@ std::string Table::html(std::string_view caption) const {
                      caption.empty() ? "table" : escape(caption), bare_html(caption));
 }
 
-namespace {
-
-/// How gnuplot begins most groups; in a page it is the class k.
-constexpr std::string_view usual_group =
-    "<g fill=\"none\" color=\"black\" stroke=\"currentColor\" stroke-width=\"1.00\" stroke-linecap=\"butt\" "
-    "stroke-linejoin=\"miter\">";
-
-/// The same picture in fewer bytes: without blanks that begin lines and groups with nothing in them.
-std::string compact(std::string_view svg) {
-  constexpr const char* blanks = " \t\r\n";
-  std::string out;
-  for (std::size_t i = 0; i < svg.size(); ++i) {
-    const std::string_view rest = svg.substr(i);
-    if (rest.starts_with(usual_group)) {
-      out += "<g class=\"k\">";
-      i += usual_group.size() - 1;
-    } else if (rest.starts_with("</g>")) {
-      out.erase(out.find_last_not_of(blanks) + 1);
-      const std::size_t tag = out.rfind('<');
-      const bool empty = tag != std::string::npos && out.back() == '>' && out.compare(tag, 2, "<g") == 0;
-      if (empty)
-        out.erase(tag);
-      else
-        out += "</g>";
-      i += 3;
-    } else if (svg[i] == '\n') {
-      out += '\n';
-      i = std::min(svg.size(), svg.find_first_not_of(blanks, i)) - 1;
-    } else {
-      out += svg[i];
-    }
-  }
-  return out;
-}
-
-}  // namespace
-
 std::string figure(std::string_view svg, std::string_view caption) {
   const std::string words = escape(caption);
-  std::string picture = compact(svg);
+  std::string picture = compact_svg(svg);
   for (const char* key : {"xmlns=\"", "xmlns:xlink=\""}) {  // of a file of its own; HTML needs none
     const std::size_t at = picture.find(key),
                       end = picture.find('"', at == std::string::npos ? at : at + std::strlen(key));

@@ -32,7 +32,8 @@ ol.joints { list-style: none; margin: 0; padding: 0; } ol.joints li { display: f
 .word { font-size: .85em; font-weight: 600; color: var(--unknown-mark); } .word.good { color: var(--good-mark); }
 .word.amber { color: var(--amber-mark); } .word.bad { color: var(--bad-mark); }
 svg { display: block; width: 100%; height: auto; }
-.plot g.k { fill: none; color: #000; stroke: currentColor; stroke-width: 1; }
+.plot g.k { fill: none; color: #000; stroke: currentColor; stroke-width: 1; } .plot .t { stroke: none; fill: #333; font-family: sans-serif; }
+.plot .b { fill: #000; } .plot .r { stroke: #e4e4e4; } .plot .a { stroke: #888; }
 .sketch { max-height: 430px; } .sketch line { stroke: var(--quiet); stroke-linecap: round; }
 .sketch .link { stroke-width: 9; opacity: .45; } .sketch .ground { stroke-width: 4; } .sketch .axis { stroke-width: 1.5; stroke-dasharray: 5 3; }
 .sketch .leader { stroke-width: 1; } .disc { fill: var(--unknown-mark); } .disc.good { fill: var(--good-mark); }

@@ -24,24 +24,28 @@ constexpr const char* data_cloud = "#b82e6fb7";
 constexpr const char* effect_colour = "#e4572e";
 constexpr const char* effect_band = "#a0e4572e";
 
-/// Some samples as thin lines in their order in time; where x jumps, as from the end of a period to its beginning, a
-/// line ends.
+/// Some samples as short thin lines in their order in time: of every few strides the samples of one, as longer lines
+/// would cut through what lies between. Where x jumps, as from the end of a period to its beginning, a line ends.
 Curve cloud(const VectorXd& x, const VectorXd& y, Index points) {
-  const Index stride = std::max<Index>(1, (x.size() + points - 1) / points);
+  constexpr Index run = 4;  // points of a line
+  constexpr double gap = std::numeric_limits<double>::quiet_NaN();
+  const Index stride = std::max<Index>(1, (x.size() + points - 1) / points), step = (stride + run - 1) / run;
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (const double value : x) {
     low = std::fmin(low, value);
     high = std::fmax(high, value);
   }
   std::vector<double> xs, ys;
-  for (Index k = 0; k < x.size(); k += stride) {
-    const bool jumps = !xs.empty() && std::fabs(x[k] - xs.back()) > (high - low) / 2;
-    if (jumps) {
-      xs.push_back(x[k]);
-      ys.push_back(std::numeric_limits<double>::quiet_NaN());
+  const auto add = [&](double to_x, double to_y) {
+    xs.push_back(to_x);
+    ys.push_back(to_y);
+  };
+  for (Index from = 0; from < x.size(); from += run * stride) {
+    for (Index k = from; k < std::min(x.size(), from + run * step); k += step) {
+      if (k > from && std::fabs(x[k] - xs.back()) > (high - low) / 2) add(x[k], gap);
+      add(x[k], y[k]);
     }
-    xs.push_back(x[k]);
-    ys.push_back(y[k]);
+    add(xs.back(), gap);
   }
   return {Eigen::Map<VectorXd>(xs.data(), static_cast<Index>(xs.size())),
           Eigen::Map<VectorXd>(ys.data(), static_cast<Index>(ys.size())),
@@ -98,9 +102,9 @@ std::string findings_section(const ReportInput& input, const nlohmann::json&) {
   const std::vector<FindingPicture> all =
       finding_pictures(input.fitted, shown_logs(input), diagnosis ? &*diagnosis : nullptr);
   if (all.empty()) return "";
-  // Two clouds a picture, about 12 bytes a point.
+  // Two clouds a picture, about 8 bytes a point. A curve of a chart has at most 600, with the gaps.
   constexpr Index most_points = 12'000;
-  const Index points = std::clamp<Index>(most_points / static_cast<Index>(all.size()), 150, 500);
+  const Index points = std::clamp<Index>(most_points / static_cast<Index>(all.size()), 150, 400);
   const std::vector<Joint>& joints = robot_of(input.fitted).joints;
   std::vector<std::vector<Chart>> charts;
   for (const FindingPicture& one : all) charts.push_back(charts_of(one, joints[one.joint].torque_unit(), points));

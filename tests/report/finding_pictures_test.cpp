@@ -87,12 +87,12 @@ TEST(FindingPictures, ARippleIsDrawnWithinItsPeriod) {
 
 TEST(FindingPictures, SeveralAtOneJointAndAtOthersAreToldApart) {
   IdentifiedModel model = puma();
-  const auto add = [&](std::size_t joint, const char* effect, double value) {
-    model.joints[joint].effects.push_back(found(test::effect(effect, {}, {value})));
+  const auto add = [&](std::size_t joint, const EffectFit& effect) {
+    model.joints[joint].effects.push_back(found(effect));
   };
-  add(0, "viscous_cubic", 0.5);
-  add(0, "spring", 4);
-  add(3, "spring", 7);
+  add(0, test::effect("viscous_cubic", {}, {0.5}));
+  add(0, test::effect("spring", {}, {4, 0}));
+  add(3, test::effect("spring", {}, {7, 0}));
   const Drawn drawn(model, model);
   ASSERT_EQ(drawn.pictures.size(), 3U);
   const auto slope = [](const FindingPicture& of) {  // of a straight line, by its ends
@@ -101,9 +101,9 @@ TEST(FindingPictures, SeveralAtOneJointAndAtOthersAreToldApart) {
   };
   EXPECT_EQ(drawn.pictures[0].over.name, "velocity");
   EXPECT_EQ(drawn.pictures[1].over.name, "position");
-  EXPECT_NEAR(std::fabs(slope(drawn.pictures[1])), 4, 0.05);
+  EXPECT_NEAR(slope(drawn.pictures[1]), 4, 0.05);
   EXPECT_EQ(drawn.pictures[2].joint, 3U);
-  EXPECT_NEAR(std::fabs(slope(drawn.pictures[2])), 7, 0.05);
+  EXPECT_NEAR(slope(drawn.pictures[2]), 7, 0.05);
 }
 
 TEST(FindingPictures, APayloadIsDrawnAtTheJointThatFeelsMostOfIt) {
@@ -120,7 +120,7 @@ TEST(FindingPictures, WhatIsUndecidedHasItsNamesAndWhatIsUnknownHasNone) {
   IdentifiedModel model = puma(), truth = model;
   model.joints[0].effects.push_back(test::effect("coulomb", {}, {1.5}));
   truth.joints[0].effects = model.joints[0].effects;
-  truth.joints[4].effects.push_back(test::effect("spring", {}, {3}));
+  truth.joints[4].effects.push_back(test::effect("spring", {}, {3, 0}));
   DiagnosisResult diagnosis;
   for (std::size_t j = 0; j < model.joints.size(); ++j) {
     JointDiagnosis joint;

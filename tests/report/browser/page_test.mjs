@@ -163,8 +163,12 @@ async function checkFirstScreen(page, name, joints) {
   }
 }
 
+/// Live plots follow the page's width a frame later.
+const drawn = (page) => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done, 0)))));
+
 async function checkPhone(page, name) {
   await page.setViewport(phone);
+  await drawn(page);
   const edge = await page.evaluate(beyondTheEdge);
   check(edge.page <= phone.width && edge.shown === phone.width, `${name}: ${edge.page} px wide at ${phone.width} px`);
   check(edge.wide.length === 0, `${name}: beyond the edge at ${phone.width} px: ${edge.wide.join('; ')}`);
