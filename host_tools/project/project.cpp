@@ -264,12 +264,9 @@ class ProjectReader {
       const std::string name = library->string();
       if (name.empty() || name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_") != std::string::npos)
         library->place().fail("lower case letters, digits and _ make a name, that of fxdyn_add_effects()");
-      if (name != effect_library())
-        throw OtherEffectLibrary(library->place().message(fmt::format(
-                                     "there is no program fxdyn-{} beside fxdyn: build it by `cmake --build "
-                                     "--preset host --target {}` (docs/guide/effects.md)",
-                                     name, name)),
-                                 name);
+      const std::string missing =
+          fmt::format("there is no program fxdyn-{0} beside fxdyn: `cmake --build --preset host --target {0}`", name);
+      if (name != effect_library()) throw OtherEffectLibrary(library->place().message(missing), name);
     }
     table.finish();
   }

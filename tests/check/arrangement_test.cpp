@@ -163,8 +163,8 @@ TEST(Arrangement, ASlideInMillimetresIsFound) {
   EXPECT_DOUBLE_EQ(found[0].move.value, 1e-3);
 }
 
-// What tells a slide in mm from one whose torque is a thousand times too small is the length of its rail alone: there is
-// nothing else on it, and nothing hangs from it.
+// What tells a slide in mm from one whose torque is a thousand times too small is the length of its rail alone: there
+// is nothing else on it, and nothing hangs from it.
 TEST(Arrangement, TheWayThatAJointGoesIsPartOfTheEvidence) {
   Recorded recorded(-1, std::filesystem::path(FXDYN_SOURCE_DIR) / "tests/campaign/scara.urdf");
   Arrangement wide = as_given(recorded.robot);

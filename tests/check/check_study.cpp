@@ -97,7 +97,7 @@ std::vector<Planted> plant(const Robot& robot, const TorqueSamples& samples, Ran
 }
 
 struct Tally {
-  int told = 0, right = 0, found = 0, all = 0, hidden = 0, wrong = 0, hidden_told = 0;
+  int told = 0, right = 0, found = 0, all = 0, hidden = 0, wrong = 0;
   std::vector<double> ratios;  ///< RMS error after over before, of the right ones
 };
 
@@ -110,15 +110,8 @@ bool is_right(const ArrangementMove& move, const Planted& planted) {
 void judge_columns(Project project, const Robot& robot, const fs::path& data, const std::vector<ProcessedLog>& logs,
                    std::uint64_t wanted_seed, const ArrangementOptions& options, std::map<std::string, Tally>& counts) {
   project.robot = robot;
-  const auto count = [&](const std::string& name, bool found, bool right, const std::string& seen,
-                         bool shows = true) {
+  const auto count = [&](const std::string& name, bool found, bool right, const std::string& seen) {
     Tally& tally = counts[name];
-    if (!shows) {
-      ++tally.hidden;
-      tally.wrong += found && !right;
-      tally.hidden_told += right;
-      return;
-    }
     ++tally.all;
     tally.found += found;
     tally.right += right;
@@ -129,18 +122,10 @@ void judge_columns(Project project, const Robot& robot, const fs::path& data, co
   count("sound times", told.has_value(), !told, told ? fmt::format("{:.3g} s", told->seconds) : "");
   Random random(wanted_seed * 31 + 7);
   const double off = random.uniform(0.02, 0.08) * (random.next() % 2 == 0 ? 1 : -1);
-  // What the right times would gain: see below.
-  const double gained =
-      torque_lead_nats(project, logs, off, options) - torque_lead_nats(project, logs, 0, options);
   project.signals.torque_lead_s = off;
   const auto late = find_long_torque_lead(project, logs, options);
   count("late torque", late.has_value(), late && std::fabs(late->seconds) < 0.01,
-        fmt::format("{:.3g} s off, told {:.3g}", off, late ? late->seconds : 0),
-        gained >= options.gain);
-  fmt::print("LEAD {} off {:.3g} gained {:.1f} sound [{:.3g} {:.3g} {:.3g} {:.1f}] late [{:.3g} {:.3g} {:.3g} {:.1f}]\n",
-             data.parent_path().filename().string(), off, gained, told ? told->seconds : 0, told ? told->before : 0,
-             told ? told->after : 0, told ? told->nats : 0, late ? late->seconds : 0, late ? late->before : 0,
-             late ? late->after : 0, late ? late->nats : 0);
+        fmt::format("{:.3g} s off, told {:.3g}", off, late ? late->seconds : 0));
   project.signals.torque_lead_s.reset();
   std::vector<Log> train = read_logs(project, Role::train, data);
   const bool sound = are_exchanged(project, train, options);
@@ -174,10 +159,6 @@ int run(int argc, char** argv) {
   app.add_option("--masses", share, "off by up to this share")->capture_default_str();
   app.add_option("--gain", options.gain)->capture_default_str();
   app.add_option("--independent", options.independent)->capture_default_str();
-  app.add_option("--lead-leaves", options.lead_leaves)->capture_default_str();
-  app.add_option("--beyond", options.beyond)->capture_default_str();
-  std::vector<std::string> only;
-  app.add_option("--only", only, "names of cases; else all");
   app.add_option("--mass-error", options.mass_errors[0])->capture_default_str();
   CLI11_PARSE(app, argc, argv);
 
@@ -201,7 +182,6 @@ int run(int argc, char** argv) {
     cases.push_back({"sound", robot, samples});
     const double sound = ArrangementEvidence(robot, samples, options)(as_given(robot)).nats;
     for (const Planted& one : cases) {
-      if (!only.empty() && std::find(only.begin(), only.end(), one.name) == only.end()) continue;
       const ArrangementEvidence evidence(one.robot, one.samples, options);
       // What the right columns would gain: less than that, and no method of this kind can tell.
       const double gained = evidence(as_given(one.robot)).nats - sound;
