@@ -152,7 +152,8 @@ class Moves {
     const double range = std::fabs(now_.motion_gain[j]) * (upper - lower);
     const bool turns = joint(j).type == JointType::revolute;
     std::vector<double> factors;
-    if (evidence_.excess(now_, j) > 0) factors = turns ? std::vector<double>{pi / 180} : std::vector<double>{1e-3, 0.01};
+    if (evidence_.excess(now_, j) > 0)
+      factors = turns ? std::vector<double>{pi / 180} : std::vector<double>{1e-3, 0.01};
     if (!turns && range < options_.shortest_slide) factors.push_back(1e3);
     for (const double factor : factors) {
       ArrangementMove& move = add(Mistake::position_unit, j);

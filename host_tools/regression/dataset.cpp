@@ -26,7 +26,7 @@ using Eigen::VectorXd;
 /// Samples beside a block that differences of sixth order look at, its one-sided ends included.
 constexpr Index halo = 8;
 /// Torque band over the frequency that holds 99.9 % of the motion: friction reverses faster than the motion.
-constexpr double torque_band = 8;
+constexpr double torque_band = 5;
 constexpr double lowest_position_hz = 5;  ///< whatever the noise is, friction reverses as fast
 
 /// Rows [from, from + count) of q and its derivatives; what is measured is not differentiated.
