@@ -22,8 +22,8 @@ struct ArrangementOptions {
   double settled = 0.01;
   /// standard deviations over RMS of the torque; prior of a joint's own columns, each alone; hand
   double own_share = 3;
-  /// share of what the URDF lets a joint go; one that covers less does not move; hand: 2 mrad of a whole turn, more than
-  /// a controller that holds a load sags by
+  /// share of what the URDF lets a joint go; one that covers less does not move; hand: 2 mrad of a whole turn, more
+  /// than a controller that holds a load sags by
   double standstill = 2e-4;
   /// nats; what another arrangement must gain; hand: none of the twelve sound robots tried got a finding
   double gain = 15;

@@ -17,7 +17,7 @@ ClassMeans class_means(const VectorXd& x, const VectorXd& y, Index classes) {
   std::sort(order.begin(), order.end(), [&](Index a, Index b) { return x[a] < x[b]; });
   const auto count = static_cast<Index>(order.size()), bins = std::min(classes, count);
   ClassMeans out{VectorXd::Zero(bins), VectorXd::Zero(bins), VectorXd::Zero(bins)};
-  double within = 0, mean = 0, whole = 0;
+  double within = 0, mean = 0, whole = 0, square = 0;
   for (const Index k : order) mean += y[k] / static_cast<double>(count);
   for (Index b = 0; b < bins; ++b) {
     const Index from = b * count / bins, to = (b + 1) * count / bins;
@@ -31,8 +31,13 @@ ClassMeans class_means(const VectorXd& x, const VectorXd& y, Index classes) {
     out.spread[b] = std::sqrt(squares / static_cast<double>(to - from));
     within += squares;
   }
-  for (const Index k : order) whole += std::pow(y[k] - mean, 2);
-  out.explained = whole > 0 ? 1 - within / whole : 0;
+  for (const Index k : order) {
+    whole += std::pow(y[k] - mean, 2);
+    square += y[k] * y[k];
+  }
+  // what a constant differs from its mean by is rounding
+  constexpr double rounding = 1e-24;
+  out.explained = whole > rounding * square ? 1 - within / whole : 0;
   return out;
 }
 

@@ -131,12 +131,12 @@ class ProjectReader {
     return text.replace(from, to - from + 1, set != nullptr ? set : inner.substr(split + 2));
   }
 
-  /// `pipes`: "-" (standard input) and a FIFO are files, too.
-  fs::path path(const Value& value, bool pipes = false) const {
+  /// `log`: "-" (standard input), a FIFO and the folder of a bag are files, too.
+  fs::path path(const Value& value, bool log = false) const {
     const std::string text = with_home(expand(value));
-    if (pipes && text == "-") return text;
+    if (log && text == "-") return text;
     const fs::path path = (project_.file.parent_path() / text).lexically_normal();
-    if (!fs::is_regular_file(path) && !(pipes && is_pipe(path))) {
+    if (!fs::is_regular_file(path) && !(log && (is_pipe(path) || fs::is_directory(path)))) {
       value.place().fail(fmt::format("no file '{}'; paths are relative to the project file", path.string()));
     }
     return path;
