@@ -203,8 +203,8 @@ std::string time_label(const std::string& axis, double origin) {
 
 std::vector<std::string> draw(const std::vector<TorquePlot>& plots) {
   if (plots.empty()) return {};
-  // Three curves a plot, in a page about 8 bytes a point (compact_svg) beside 6 kB of frame a plot: a page of six joints
-  // and seven logs stays below 2 MB.
+  // Three curves a plot, in a page about 8 bytes a point (compact_svg) beside 6 kB of frame a plot: a page of six
+  // joints and seven logs stays below 2 MB.
   const auto points = std::clamp<Eigen::Index>(310'000 / (24 * static_cast<Eigen::Index>(plots.size())), 100, 1000);
   const TemporaryFolder directory;
   std::string script = settings;

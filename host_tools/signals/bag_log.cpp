@@ -109,7 +109,7 @@ void leave_out_absent(LogFormat& format, const JointTopic& topic) {
   for (const auto& [signal, field] : {std::pair("dq", ".velocity"), std::pair("ddq", ".acceleration")}) {
     const Names names = named(format, signal);
     const bool by_default =
-        std::all_of(names.begin(), names.end(), [&](const std::string& name) { return name.ends_with(field); });
+        std::all_of(names.begin(), names.end(), [end = field](const std::string& name) { return name.ends_with(end); });
     if (names.empty() || !by_default || missing_of(topic, names).empty()) continue;
     format.joint_columns.erase(signal);
     format.columns[signal] = "";

@@ -1,4 +1,5 @@
-// fxdyn_bag_bench FILE: seconds to read a log of six joints, and the most memory that the process had [MB]. See bags.py.
+// fxdyn_bag_bench FILE: seconds to read a log of six joints, and the most memory that the process had [MB]. See
+// bags.py.
 #include <fmt/format.h>
 #include <sys/resource.h>
 

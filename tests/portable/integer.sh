@@ -18,7 +18,7 @@ for source in "$@"; do
   clang++-14 "${flags[@]}" -c "$root/$source" -o "$object"
   objects+=("$object")
 done
-clang++-14 -fsanitize=integer,undefined "${objects[@]}" -o "$build/test" -lrapidcheck -lgtest_main -lgtest -lpthread -lfmt -lz \
+clang++-14 -fsanitize=integer,undefined "${objects[@]}" -o "$build/test" -lrapidcheck -lgtest_main -lgtest -lpthread -lfmt -lz -lzstd -llz4 -lsqlite3 \
   -Wl,--as-needed -lurdfdom_model -ltinyxml -lconsole_bridge
 rm "${objects[@]}"
 UBSAN_OPTIONS=print_stacktrace=1 RC_PARAMS=seed=1 timeout 300 "$build/test"
