@@ -88,6 +88,22 @@ TEST(Mcap, DamageIsRefused) {
   refused("t,q1\n0,1\n", {"neither MCAP nor a database"});
 }
 
+// Damage in a chunk shows whether anybody has looked into it.
+TEST(Mcap, ChunksWithoutJointsAreSkippedUnreadWhereTheIndexSaysSo) {
+  const std::string whole = small_bag().bytes(), image(1000, 'x');
+  const std::size_t beside_joints = whole.find(image), alone = whole.find(image, beside_joints + image.size());
+  const auto damaged_at = [&](std::size_t at, std::size_t size) {
+    std::string bytes = whole.substr(0, size);
+    bytes[at] = 'y';
+    return test::write("image.mcap", bytes);
+  };
+  EXPECT_EQ(read_topic(damaged_at(alone, whole.size())).messages, 5U);
+  const auto both = damaged_at(beside_joints, whole.size());
+  test::expect_refused(both, {"checksum"}, [&] { read_joint_recording(both); });
+  const auto without_index = damaged_at(alone, whole.size() - 1);
+  test::expect_refused(without_index, {"checksum"}, [&] { read_joint_recording(without_index); });
+}
+
 TEST(Mcap, OtherSchemasAndEncodingsAreTheTopicsTrouble) {
   const auto trouble = [](const std::string& definition, const std::string& encoding) {
     test::SmallBag bag;

@@ -132,7 +132,7 @@ const controller = (definition, of) => async ({ channel, add }) => {
   for (const r of rows) await add(id, r.ns, of(r));
 };
 
-/// Images of noise beside the joint states: in chunks of their own mostly, as a recorder makes them that flushes each image.
+/// Images of noise in one chunk with the joint states in front of each: the worst case, since no chunk can be skipped.
 async function camera(megabytes) {
   const noise = randomBytes(4 << 20);
   await mcap("camera.mcap", { compressChunk: (data) => data.length > 1 << 20
