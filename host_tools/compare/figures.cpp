@@ -38,7 +38,7 @@ std::string torque_label(const ComparedLog& log, Index j, const char* what) {
 
 /// A chart of every joint, two in a row.
 std::string of_joints(const ComparedLog& log, const char* what,
-                      const std::function<std::vector<Curve>(Index)>& curves) {
+                      const std::function<std::vector<Trace>(Index)>& curves) {
   std::vector<Chart> charts;
   for (Index j = 0; j < log.reference.cols(); ++j)
     charts.push_back({time_label(log), torque_label(log, j, what), curves(j)});
@@ -84,20 +84,20 @@ void write_comparison_plots(const ComparedLog& log, const std::filesystem::path&
   if (log.rigid.size() > 0) {
     const MatrixXd friction = log.reference - log.rigid, noisy = log.measured - log.rigid;
     write("compare_friction.svg", of_joints(log, "friction", [&](Index j) {
-            return std::vector<Curve>{{log.t, noisy.col(j), noise_colour, 0.7, "measured"},
+            return std::vector<Trace>{{log.t, noisy.col(j), noise_colour, 0.7, "measured"},
                                       {log.t, friction.col(j), truth_colour, 1.6, "true"},
                                       {log.t, log.learned_friction.col(j), learned_colour, 1.1, "learned"}};
           }));
     write("compare_friction_error.svg", of_joints(log, "error", [&](Index j) {
-            return std::vector<Curve>{{log.t, log.learned_friction.col(j) - friction.col(j), learned_colour, 1, {}}};
+            return std::vector<Trace>{{log.t, log.learned_friction.col(j) - friction.col(j), learned_colour, 1, {}}};
           }));
   }
   write("compare_torque.svg", of_joints(log, "torque", [&](Index j) {
-          return std::vector<Curve>{{log.t, log.reference.col(j), truth_colour, 1.6, log.reference_name},
+          return std::vector<Trace>{{log.t, log.reference.col(j), truth_colour, 1.6, log.reference_name},
                                     {log.t, predicted.col(j), learned_colour, 1, "predicted"}};
         }));
   write("compare_torque_error.svg", of_joints(log, "error", [&](Index j) {
-          return std::vector<Curve>{{log.t, predicted.col(j) - log.reference.col(j), learned_colour, 1, {}}};
+          return std::vector<Trace>{{log.t, predicted.col(j) - log.reference.col(j), learned_colour, 1, {}}};
         }));
   std::vector<Chart> charts;
   Chart errors{time_label(log), "|error|, % of rated, mean of the joints", {}};

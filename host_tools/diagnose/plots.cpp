@@ -69,7 +69,7 @@ Chart spectra(const Residuals& log, Index joint, const std::string& unit) {
               {spectrum_curve(log.before.col(joint), *log.log, before_colour, "before"),
                spectrum_curve(log.after.col(joint), *log.log, after_colour, "after")},
               true};
-  for (const Curve& noise : noise_curve(*log.log, joint)) chart.curves.push_back(noise);
+  for (const Trace& noise : noise_curve(*log.log, joint)) chart.curves.push_back(noise);
   return chart;
 }
 

@@ -252,7 +252,7 @@ std::string draw(const std::vector<Panel>& panels, const std::vector<std::string
 namespace {
 
 /// gnuplot's words for one curve, whose data it writes into the directory.
-std::string curve_command(const Curve& one, const fs::path& directory, const std::string& file, double origin) {
+std::string curve_command(const Trace& one, const fs::path& directory, const std::string& file, double origin) {
   constexpr Eigen::Index chart_points = 600;
   const std::string title = one.title.empty() ? "notitle" : "title '" + quoted(one.title) + "'";
   if (one.y_top.size() > 0) {

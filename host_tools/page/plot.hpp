@@ -30,7 +30,7 @@ std::string draw(const std::vector<Panel>& panels, const std::vector<std::string
 
 /// One curve of a chart. Of curves over a growing abscissa the extremes of what is left out are kept; a `path` may go
 /// back and forth; every n-th point of it is drawn, and NaN in y breaks the line.
-struct Curve {
+struct Trace {
   Eigen::VectorXd x, y;
   std::string colour;  ///< #RRGGBB, or #AARRGGBB with AA = 00 for solid .. ff for nothing
   double width = 1.2;
@@ -41,7 +41,7 @@ struct Curve {
 
 struct Chart {
   std::string x_label, y_label;  ///< with unit
-  std::vector<Curve> curves;
+  std::vector<Trace> curves;
   bool logarithmic = false;     ///< y
   double y_from = 0, y_to = 0;  ///< the axis; equal: as the curves need
 };

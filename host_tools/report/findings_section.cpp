@@ -26,7 +26,7 @@ constexpr const char* effect_band = "#a0e4572e";
 
 /// Some samples as short thin lines in their order in time: of every few strides the samples of one, as longer lines
 /// would cut through what lies between. Where x jumps, as from the end of a period to its beginning, a line ends.
-Curve cloud(const VectorXd& x, const VectorXd& y, Index points) {
+Trace cloud(const VectorXd& x, const VectorXd& y, Index points) {
   constexpr Index run = 4;  // points of a line
   constexpr double gap = std::numeric_limits<double>::quiet_NaN();
   const Index stride = std::max<Index>(1, (x.size() + points - 1) / points), step = (stride + run - 1) / run;
@@ -55,7 +55,7 @@ Curve cloud(const VectorXd& x, const VectorXd& y, Index points) {
           true};
 }
 
-Curve mean(const FindingPicture& of, const VectorXd& y, const char* title) {
+Trace mean(const FindingPicture& of, const VectorXd& y, const char* title) {
   const ClassMeans means = class_means(of.over.x, y);
   return {means.x, means.y, data_colour, 2.2, title};
 }

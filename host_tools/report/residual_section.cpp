@@ -37,7 +37,7 @@ std::vector<Chart> charts_of(const std::vector<ShownLog>& logs, const Joint& joi
                  fmt::format("residual [{}/Hz^0.5]", joint.torque_unit()),
                  {spectrum_curve(longest.residual.col(k), *longest.log, line, "residual")},
                  true};
-  for (const Curve& noise : noise_curve(*longest.log, k)) spectrum.curves.push_back(noise);
+  for (const Trace& noise : noise_curve(*longest.log, k)) spectrum.curves.push_back(noise);
   return {over(fmt::format("velocity [{}/s]", joint.position_unit()), joined(logs, &ShownLog::dq, k), left, residual),
           over(fmt::format("position [{}]", joint.position_unit()), joined(logs, &ShownLog::q, k), left, residual),
           over(fmt::format("load [{}]", joint.torque_unit()), joined(logs, &ShownLog::load, k), left, residual),

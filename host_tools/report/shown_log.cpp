@@ -57,13 +57,13 @@ VectorXd joined(const std::vector<ShownLog>& logs, MatrixXd ShownLog::*of, Index
   return joined(columns);
 }
 
-Curve spectrum_curve(const VectorXd& residual, const ProcessedLog& log, const char* colour, const char* title) {
+Trace spectrum_curve(const VectorXd& residual, const ProcessedLog& log, const char* colour, const char* title) {
   constexpr double shown_cutoffs = 1.5;
   const Spectrum spectrum = welch(residual, log.step_s);
   const Index bins =
       std::min(spectrum.density.size() - 1,
                static_cast<Index>(shown_cutoffs * log.filter.torque_cutoff_hz / spectrum.resolution_hz) + 1);
-  Curve out{VectorXd(bins), VectorXd(bins), colour, 1.4, title};
+  Trace out{VectorXd(bins), VectorXd(bins), colour, 1.4, title};
   for (Index k = 0; k < bins; ++k) {
     out.x[k] = spectrum.frequency(k + 1);
     out.y[k] = std::sqrt(std::max(spectrum.density[k + 1], 1e-30));
@@ -71,7 +71,7 @@ Curve spectrum_curve(const VectorXd& residual, const ProcessedLog& log, const ch
   return out;
 }
 
-std::vector<Curve> noise_curve(const ProcessedLog& log, Index joint) {
+std::vector<Trace> noise_curve(const ProcessedLog& log, Index joint) {
   const double noise = log.torque_noise.size() > joint ? log.torque_noise[joint] : 0;
   const double cutoff = log.filter.torque_cutoff_hz;
   if (!(noise > 0) || !(cutoff > 0)) return {};

@@ -35,8 +35,8 @@ Eigen::VectorXd joined(const std::vector<ShownLog>& logs, Eigen::MatrixXd ShownL
 Eigen::VectorXd joined(const std::vector<Eigen::VectorXd>& columns);
 
 /// Root of a residual's power spectral density up to 1.5 times the torque's cut-off [N*m/Hz^0.5 | N/Hz^0.5].
-Curve spectrum_curve(const Eigen::VectorXd& residual, const ProcessedLog& log, const char* colour, const char* title);
+Trace spectrum_curve(const Eigen::VectorXd& residual, const ProcessedLog& log, const char* colour, const char* title);
 /// The joint's noise as white noise below the cut-off: noise^2 = density * cut-off. No curve where it is not known.
-std::vector<Curve> noise_curve(const ProcessedLog& log, Eigen::Index joint);
+std::vector<Trace> noise_curve(const ProcessedLog& log, Eigen::Index joint);
 
 }  // namespace fxdyn

@@ -313,12 +313,12 @@ void read_robot(Table& root, const fs::path& file, Scenario& scenario) {
 }  // namespace
 
 double plant_step(const Scenario& scenario) {
-  constexpr double longest_step = 0.0005;  // under a controller
-  constexpr int substeps = 4;              // of a sample: friction states are stepped so
+  constexpr double longest_controlled_step = 0.0005;  // under a controller
+  constexpr int substeps = 4;                         // of a sample: friction states are stepped so
   double step = scenario.sample_s / substeps;
   if (scenario.motion == Scenario::Motion::closed_loop) {
     const double tick = scenario.control.tick_s;
-    return tick / std::max(1.0, std::ceil(tick / std::min(step, longest_step) - 1e-9));
+    return tick / std::max(1.0, std::ceil(tick / std::min(step, longest_controlled_step) - 1e-9));
   }
   const double remembered = remembering_step(scenario.plant);
   // Stamps off the grid are interpolated, which wants a finer one.
