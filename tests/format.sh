@@ -13,11 +13,12 @@ case ${1:-} in
     sources | xargs clang-format-14 --dry-run -Werror
     ;;
   tidy)
-    # gcc's precompiled headers are not clang's
+    # File by file, whatever the build does, with what it has made; gcc's precompiled headers are not clang's.
     commands=$(mktemp -d)
     trap 'rm -r "$commands"' EXIT
     database=$commands/compile_commands.json
-    sed 's/-Winvalid-pch -include [^ ]*cmake_pch.hxx//' "$2/compile_commands.json" >"$database"
+    cmake --preset host -B "$commands" -DCMAKE_UNITY_BUILD=OFF >/dev/null
+    sed -i "s/-Winvalid-pch -include [^ ]*cmake_pch.hxx//; s|$commands|$(realpath "$2")|g" "$database"
     # most changed first
     mapfile -t files < <(git diff --numstat -M --diff-filter=AM "${3:-HEAD~1}" -- '*.cpp' 2>/dev/null | sort -rn | cut -f3)
     done=0 failed=0

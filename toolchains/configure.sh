@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# configure.sh PRESET: configures build/PRESET. A build folder that came along with a copy of the sources is of another
+# configure.sh PRESET [OPTION...]: configures build/PRESET. A build folder that came along with a copy of the sources is of another
 # place: CMake refuses it, so it is configured anew here.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -9,4 +9,4 @@ if [ -f "$cache" ] && ! grep -qxF "CMAKE_HOME_DIRECTORY:INTERNAL=$(pwd -P)" "$ca
   echo "configure: build/$1 was made for $(sed -n 's/^CMAKE_HOME_DIRECTORY:INTERNAL=//p' "$cache"): configured anew" >&2
   fresh=(--fresh)
 fi
-cmake --preset "$1" "${fresh[@]}" >/dev/null
+cmake --preset "$1" "${fresh[@]}" "${@:2}" >/dev/null
