@@ -9,6 +9,7 @@
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/solver.hpp"
+#include "host_tools/signals/whole.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
@@ -109,6 +110,29 @@ void back_to_start(Outcome& outcome, const Models& start, const std::vector<Sess
   }
   found.current = start.current;
   add_deviations(found, *outcome.problem);
+}
+
+VectorXd diluted_weights(const Linearised& problem) {
+  std::vector<Index> columns = problem.columns_of(in_model(problem));
+  const LinearFit fit = problem.solver().solve(columns);
+  VectorXd weights = problem.solver().weights();
+  for (std::size_t j = 0; j < problem.joints(); ++j) {
+    const VectorXd e = problem.solver().residual(j, fit);
+    double r0 = 0, sum = 0;
+    for (const std::size_t i : problem.blocks().fit) {
+      const Block& b = problem.blocks().all[i];
+      const VectorXd x = e.segment(b.first, b.count);
+      r0 += x.squaredNorm();
+      // Bartlett's window over two seconds
+      const ProcessedLog& log = problem.logs()[b.log].log;
+      const auto span = std::min<Index>(b.count, whole(2 / (log.step_s * static_cast<double>(log.decimation))));
+      for (Index lag = 1; lag < span; ++lag)
+        sum += 2 * (1 - static_cast<double>(lag) / static_cast<double>(span)) *
+               x.head(b.count - lag).dot(x.tail(b.count - lag));
+    }
+    if (r0 > 0) weights[static_cast<Index>(j)] /= std::max(1.0, 1 + sum / r0);
+  }
+  return weights;
 }
 
 }  // namespace fxdyn::diagnosis

@@ -18,6 +18,11 @@ void add_deviations(Models& models, const Linearised& problem);
 /// 1e300.
 std::vector<double> deviations_off_nothing(const Linearised& problem, const std::vector<std::size_t>& groups);
 
+/// One over the variances of the joints' residuals, less where these have structure: neighbouring rows then say the
+/// same, and a column counts as the residual's slowest part does,
+///   variance of a mean / that of white noise = S(0) / r(0) (Bartlett's window over two seconds).
+Eigen::VectorXd diluted_weights(const Linearised& problem);
+
 /// For a search of which no name is left: the models that it began with, with their standard deviations. What the
 /// search left otherwise (a rotor given up, an effect that stayed without a name) is dropped with its problem: the
 /// problem's unknowns have to be those of the model that the deviations are written into.

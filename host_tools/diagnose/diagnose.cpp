@@ -11,6 +11,7 @@
 #include "host_tools/diagnose/changes.hpp"
 #include "host_tools/diagnose/deflection.hpp"
 #include "host_tools/diagnose/deviations.hpp"
+#include "host_tools/diagnose/free_curves.hpp"
 #include "host_tools/diagnose/gate.hpp"
 #include "host_tools/diagnose/recording_faults.hpp"
 #include "host_tools/diagnose/refit.hpp"
@@ -67,31 +68,6 @@ IdentifiedModel nominal_model(Project project, GateData& data, bool healthy, Pro
     joint.flexible.reset();
   }
   return model;
-}
-
-/// In residuals with structure neighbouring rows say the same: a column counts as the residual's slowest part does.
-///   variance of a mean / that of white noise = S(0) / r(0)
-VectorXd diluted(const Linearised& problem) {
-  std::vector<Index> columns = problem.columns_of(in_model(problem));
-  const LinearFit fit = problem.solver().solve(columns);
-  VectorXd weights = problem.solver().weights();
-  for (std::size_t j = 0; j < problem.joints(); ++j) {
-    const VectorXd e = problem.solver().residual(j, fit);
-    double r0 = 0, sum = 0;
-    for (const std::size_t i : problem.blocks().fit) {
-      const Block& b = problem.blocks().all[i];
-      const VectorXd x = e.segment(b.first, b.count);
-      r0 += x.squaredNorm();
-      // Bartlett's window over two seconds
-      const ProcessedLog& log = problem.logs()[b.log].log;
-      const auto span = std::min<Index>(b.count, whole(2 / (log.step_s * static_cast<double>(log.decimation))));
-      for (Index lag = 1; lag < span; ++lag)
-        sum += 2 * (1 - static_cast<double>(lag) / static_cast<double>(span)) *
-               x.head(b.count - lag).dot(x.tail(b.count - lag));
-    }
-    if (r0 > 0) weights[static_cast<Index>(j)] /= std::max(1.0, 1 + sum / r0);
-  }
-  return weights;
 }
 
 /// One diagnosis, step by step.
@@ -181,9 +157,10 @@ class Diagnoser {
       result.model = concluded(outcome, gate);
     }
     if (models_.has_baseline) add_notes(changed_parameters(*outcome.problem));
+    const auto curves = curves_of_the_rest(outcome, result.model);
     const auto impacts = find_impacts(result.model, data_.logs, outcome.models.healthy, baseline_, options().impact);
-    result.report = verdicts(
-        {result.nominal, result.model, outcome, gate, likely, deflections_, impacts, still_, data_.logs, test_});
+    result.report = verdicts({result.nominal, result.model, outcome, gate, likely, deflections_, impacts, curves,
+                              still_, data_.logs, test_});
     for (std::size_t j = 0; j < joints(); ++j) {
       // What stands still has no friction that these logs show.
       if (!still_[j]) continue;
@@ -218,13 +195,34 @@ class Diagnoser {
       refit(in_band, logs_, plain(), 4);
       if (!is_worse_anywhere(found.current, in_band.current)) found = std::move(in_band);
       Linearised problem(found, logs_, plain());
-      problem.solver().set_weights(diluted(problem));
+      problem.solver().set_weights(diluted_weights(problem));
       add_deviations(found, problem);
     } else {
       add_deviations(found, *outcome.problem);
     }
     mark_named(found.current, outcome);
     return finished(found.current);
+  }
+  /// What is left without a name gets a curve, where that harms no joint of the model as it is exported. By joint.
+  std::vector<std::optional<CurveResult>> curves_of_the_rest(const Outcome& outcome, IdentifiedModel& model) const {
+    std::vector<std::optional<CurveResult>> out(joints());
+    Models models = outcome.models;
+    for (const Finding& finding : outcome.found) effect_of(models.current, finding.id).named = true;
+    const std::vector<FreeCurve> found = add_free_curves(models, outcome, logs_, still_);
+    if (found.empty()) return out;
+    for (const FreeCurve& curve : found) out[curve.effect.joint] = drawn(models, curve, logs_);
+    Linearised problem(models, logs_, plain());
+    problem.solver().set_weights(diluted_weights(problem));
+    add_deviations(models, problem);
+    mark_named(models.current, outcome);
+    for (const FreeCurve& curve : found) effect_of(models.current, curve.id).named = false;
+    IdentifiedModel with = finished(models.current);
+    if (is_worse_anywhere(model, with)) return std::vector<std::optional<CurveResult>>(joints());
+    model = std::move(with);
+    return out;
+  }
+  static EffectFit& effect_of(IdentifiedModel& model, const EffectId& id) {
+    return id.body ? model.body[id.effect] : model.joints[id.joint].effects[id.effect];
   }
   /// A fault of the recording would get the name of an effect.
   void refuse_faulty_recordings(const Models& nominal, const Outcome& outcome) const {
@@ -423,9 +421,7 @@ class Diagnoser {
   /// same.
   static void mark_named(IdentifiedModel& model, const Outcome& outcome) {
     for (const Finding& finding : outcome.found) {
-      const EffectId& id = finding.id;
-      EffectFit& fit = id.body ? model.body[id.effect] : model.joints[id.joint].effects[id.effect];
-      fit.named = finding.evidence.certainty == Certainty::established;
+      effect_of(model, finding.id).named = finding.evidence.certainty == Certainty::established;
     }
     for (JointFit& joint : model.joints) let_it_brake(joint);  // around less than it was fitted beside
   }

@@ -150,6 +150,14 @@ struct GateOptions {
   double least_felt = 6;
 };
 
+/// Free curves of what has no name.
+struct CurveOptions {
+  /// times the RMS of what is left; deviation of a curve's heights beforehand; hand: a bump that is narrow
+  double height = 10;
+  /// share of the error's power on what judges; a curve takes away; hand: for less twelve numbers are too many
+  double least_share = 0.1;
+};
+
 /// Impacts that are shorter than the torque's band shows.
 struct ImpactOptions {
   /// standard deviations; an impact; theory: noise at 500 Hz does so once in 12 days, 2 Phi(-6) = 2e-9
@@ -223,6 +231,7 @@ struct Options {
   SearchOptions search;
   LackOfFitOptions lack_of_fit;
   GateOptions gate;
+  CurveOptions curve;
   ImpactOptions impact;
   DeflectionOptions deflection;
   ReportOptions report;

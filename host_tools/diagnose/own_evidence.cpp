@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host_tools/diagnose/curve_squares.hpp"
 #include "host_tools/diagnose/features.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/joint_fit.hpp"
-#include "host_tools/regression/solver.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn::diagnosis {
@@ -79,65 +79,6 @@ class Curves {
   MatrixXd all_;
 };
 
-/// Squared residual of one joint on a fold's judge, columns of the problem and curves of the joint fitted to the rest.
-double judged(const Linearised& problem, std::size_t joint, const std::vector<Index>& columns, const MatrixXd& curves,
-              double prior, const Fold& fold) {
-  const BlockSolver& solver = problem.solver();
-  const JointRows& rows = solver.rows(joint);
-  const double w = solver.weights()[static_cast<Index>(joint)];
-  MatrixXd gram;
-  VectorXd projection;
-  solver.normal(columns, fold.fit, gram, projection);
-  const Index p = gram.rows(), c = curves.cols();
-  MatrixXd whole = MatrixXd::Zero(p + c, p + c);
-  VectorXd right(p + c);
-  whole.topLeftCorner(p, p) = gram;
-  right.head(p) = projection;
-  right.tail(c).setZero();
-  if (c > 0) {
-    for (const std::size_t b : fold.fit) {
-      const Block& block = problem.blocks().all[b];
-      if (block.healthy) continue;
-      const auto f = curves.middleRows(block.first, block.count);
-      whole.bottomRightCorner(c, c).noalias() += w * f.transpose() * f;
-      right.tail(c).noalias() += w * f.transpose() * rows.y.segment(block.first, block.count);
-      for (Index i = 0; i < p; ++i) {
-        const Index local = rows.place(columns[static_cast<std::size_t>(i)]);
-        if (local < 0) continue;
-        const VectorXd product = w * f.transpose() * rows.x.col(local).segment(block.first, block.count);
-        whole.block(p, i, c, 1) += product;
-        whole.block(i, p, 1, c) += product.transpose();
-      }
-    }
-    const auto f = curves.bottomRows(curves.rows() - rows.y.size());
-    if (f.rows() > 0) {
-      whole.bottomRightCorner(c, c).noalias() += w * f.transpose() * f;
-      right.tail(c).noalias() += w * f.transpose() * rows.extra_y;
-      for (Index i = 0; i < p; ++i) {
-        const Index local = rows.place(columns[static_cast<std::size_t>(i)]);
-        if (local < 0) continue;
-        const VectorXd product = w * f.transpose() * rows.extra_x.col(local);
-        whole.block(p, i, c, 1) += product;
-        whole.block(i, p, 1, c) += product.transpose();
-      }
-    }
-    whole.bottomRightCorner(c, c).diagonal().array() += prior;
-  }
-  const VectorXd x = SymmetricSolver(whole).solve(right);
-  double sum = 0;
-  for (const std::size_t b : fold.judge) {
-    const Block& block = problem.blocks().all[b];
-    if (block.healthy) continue;
-    VectorXd e = rows.y.segment(block.first, block.count) - curves.middleRows(block.first, block.count) * x.tail(c);
-    for (Index i = 0; i < p; ++i) {
-      const Index local = rows.place(columns[static_cast<std::size_t>(i)]);
-      if (local >= 0) e -= x[i] * rows.x.col(local).segment(block.first, block.count);
-    }
-    sum += w * e.squaredNorm();
-  }
-  return sum;
-}
-
 /// One joint's groups.
 class AtJoint {
  public:
@@ -169,7 +110,7 @@ class AtJoint {
     const MatrixXd curves = curves_.of(families);
     double sum = 0;
     for (const Fold& fold : problem_.blocks().folds)
-      sum += diagnosis::judged(problem_, joint_, problem_.columns_of(groups), curves, prior_, fold);
+      sum += judged_with_curves(problem_, joint_, problem_.columns_of(groups), curves, prior_, fold);
     return sum;
   }
   OwnEvidence of(const std::vector<std::size_t>& own, std::size_t i) const {

@@ -187,6 +187,8 @@ class Builder {
         u.prior = 1;
         u.prior_std = models_.options.prior.share;
       }
+      // Equal heights are an offset, or friction without a curve: those have no prior, and take it.
+      if (info.curve) u.prior_std = models_.curve_size.at(id.joint);
       out_.all.push_back(u);
       group.lower.push_back(info.linear[i].lower);
     }

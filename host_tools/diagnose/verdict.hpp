@@ -22,6 +22,7 @@ struct Conclusion {
   const std::vector<Likely>& likely;
   const Deflections& deflections;
   const std::vector<std::optional<Impacts>>& impacts;
+  const std::vector<std::optional<CurveResult>>& curves;  ///< by joint
   const std::vector<bool>& still;
   const std::vector<ProcessedLog>& now;   ///< train and validate
   const std::vector<ProcessedLog>& test;  ///< for figures only

@@ -114,6 +114,46 @@ std::vector<NamedEffect> effects_of(const json& list) {
   return out;
 }
 
+json to_json(const std::optional<CurveResult>& curve) {
+  if (!curve) return nullptr;
+  json x = json::array(), y = json::array(), std = json::array();
+  for (const CurveResult::Point& point : curve->points) {
+    x.push_back(point.x);
+    y.push_back(point.y);
+    std.push_back(point.std);
+  }
+  return {{"effect", curve->effect},
+          {"signal", curve->signal},
+          {"unit", curve->unit},
+          {"friction", curve->friction},
+          {"sentence", curve->sentence},
+          {"log10_odds_nothing", curve->odds_nothing},
+          {"log10_odds_rival", or_null(curve->odds_rival)},
+          {"rival", curve->rival.empty() ? json(nullptr) : json(curve->rival)},
+          {"closes", curve->closes},
+          {"x", x},
+          {"y", y},
+          {"std", std}};
+}
+
+std::optional<CurveResult> curve_of(const json& file) {
+  if (!file.is_object()) return {};
+  CurveResult out;
+  out.effect = file.at("effect");
+  out.signal = file.at("signal");
+  out.unit = file.at("unit");
+  out.friction = file.at("friction");
+  out.sentence = file.at("sentence");
+  out.odds_nothing = number_of(file.at("log10_odds_nothing"));
+  out.odds_rival = optional_of(file.at("log10_odds_rival"));
+  if (file.at("rival").is_string()) out.rival = file.at("rival");
+  out.closes = number_of(file.at("closes"));
+  for (std::size_t i = 0; i < file.at("x").size(); ++i)
+    out.points.push_back(
+        {number_of(file.at("x").at(i)), number_of(file.at("y").at(i)), number_of(file.at("std").at(i))});
+  return out;
+}
+
 json to_json(const JointDiagnosis& joint) {
   return {{"joint", joint.joint},
           {"index", joint.index},
@@ -130,6 +170,7 @@ json to_json(const JointDiagnosis& joint) {
           {"where", to_json(joint.where)},
           {"effects", to_json(joint.effects)},
           {"undecided", joint.undecided},
+          {"curve", to_json(joint.curve)},
           {"not_identifiable", joint.not_identifiable},
           {"lack_of_fit", {{"state_p", or_null(joint.state_p)}, {"time_p", or_null(joint.time_p)}}}};
 }
@@ -152,6 +193,7 @@ JointDiagnosis joint_of(const json& file) {
   out.where = place_of(file.at("where"));
   out.effects = effects_of(file.at("effects"));
   out.undecided = file.at("undecided");
+  out.curve = curve_of(file.value("curve", json()));  // files of earlier versions have none
   out.not_identifiable = strings_of(file.at("not_identifiable"));
   const json& lack = file.at("lack_of_fit");
   out.state_p = optional_of(lack.at("state_p"));

@@ -62,6 +62,24 @@ struct NamedEffect {
   std::optional<std::vector<std::size_t>> joints;  ///< on the robot: those that feel it, from 1
 };
 
+/// A free curve of what has no name at a joint: its variable is an answer, its form has no name.
+struct CurveResult {
+  struct Point {
+    double x = 0;           ///< of the variable
+    double y = 0, std = 0;  ///< [N*m | N]; the mean over the logs is the offset's, or plain dry friction's
+  };
+  std::string effect;                ///< position_curve, velocity_curve, load_curve, friction_over_position
+  std::string signal;                ///< its variable: q, dq, load
+  std::string unit;                  ///< of the variable
+  bool friction = false;             ///< y is friction, and turns with the direction
+  std::string sentence;              ///< "friction rises by 0.8 N*m between 0.85 and 1.05 rad"
+  double odds_nothing = 0;           ///< log10, on data that did not fit it
+  std::optional<double> odds_rival;  ///< .. against the best curve of another variable; none: there is none
+  std::string rival;
+  double closes = 0;  ///< share of the error's power, on data that did not fit it
+  std::vector<Point> points;
+};
+
 struct JointDiagnosis {
   std::string joint, unit;
   std::size_t index = 0;  ///< from 1
@@ -79,6 +97,7 @@ struct JointDiagnosis {
   /// Sets of which one effect is there for sure, and the data don't tell which. The model has the first, without a
   /// name.
   std::vector<std::vector<std::string>> undecided{};
+  std::optional<CurveResult> curve{};  ///< of what is left, in the model without a name
   std::vector<std::string> not_identifiable{};
   std::optional<double> state_p{}, time_p{};  ///< lack of fit
 };

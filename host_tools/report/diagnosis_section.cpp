@@ -69,6 +69,7 @@ std::string joint_table(const std::vector<JointDiagnosis>& joints, const std::ve
     std::string found_where = joint.where.sentence;
     for (const auto& set : joint.undecided)
       found_where += (found_where.empty() ? "" : "; ") + words::either(set) + " is there";
+    if (joint.curve) found_where += (found_where.empty() ? "" : "; ") + words::curve(*joint.curve);
     table.add({{joint.joint},
                {joint.unit},
                {words::verdict(joint.verdict), css_class(answers.at(joint.index - 1).mood)},

@@ -109,6 +109,15 @@ std::string where_lines(const std::vector<JointDiagnosis>& joints) {
   return out.empty() ? "" : "where the gap sits\n" + out;
 }
 
+/// What has no name, but a variable.
+std::string curve_lines(const std::vector<JointDiagnosis>& joints) {
+  std::string out;
+  for (const JointDiagnosis& joint : joints) {
+    if (joint.curve) out += indented(joint.joint, words::curve(*joint.curve));
+  }
+  return out.empty() ? "" : "no name, but a curve\n" + out;
+}
+
 /// "presliding or lugre" of each set in which one effect is there.
 std::string undecided_lines(const DiagnosisResult& diagnosis) {
   std::string out;
@@ -193,7 +202,7 @@ std::string diagnosis_table(const DiagnosisResult& diagnosis) {
   if (const std::string those = words::not_borne_out(diagnosis); !those.empty())
     out += indented("the test logs disagree, the error rises", those);
   out += clamped_lines(diagnosis) + joint_rows(diagnosis.joints) + robot_lines(diagnosis) +
-         where_lines(diagnosis.joints) + undecided_lines(diagnosis) + alternative_lines(diagnosis) +
+         where_lines(diagnosis.joints) + curve_lines(diagnosis.joints) + undecided_lines(diagnosis) + alternative_lines(diagnosis) +
          hidden_lines(diagnosis);
   if (diagnosis.evidence) out += evidence_lines(*diagnosis.evidence);
   if (!diagnosis.next_experiment.empty()) out += indented("next", diagnosis.next_experiment);

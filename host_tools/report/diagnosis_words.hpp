@@ -21,6 +21,9 @@ std::string share(std::optional<double> value);
 std::string left(const std::optional<GapLeft>& of);
 /// "established: 10^12 to 1", "likely: 80 to 1 against presliding".
 std::string certainty(const NamedEffect& effect);
+/// "friction rises by 0.8 N*m between 0.85 and 1.05 rad (friction_over_position, 10^12 to 1): closes 83 %"; with the
+/// other variable where the logs don't tell which.
+std::string curve(const CurveResult& of);
 /// "presliding or lugre" of a list of names.
 std::string either(const std::vector<std::string>& names);
 /// "stribeck amplitude 2.1+-0.05 N*m, velocity 0.03 rad/s"; `plus_minus`: "+-" or " ± ".

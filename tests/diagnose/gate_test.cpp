@@ -65,6 +65,7 @@ TEST_F(NamesAtTheGate, OnlyWhatBringsSomethingStays) {
 
   const Deflections no_deflections;
   const std::vector<std::optional<Impacts>> no_impacts(6);
+  const std::vector<std::optional<CurveResult>> no_curves(6);
   const std::vector<ProcessedLog> no_test;
   const json report = to_json(verdicts({nominal_,
                                         outcome_.models.current,
@@ -73,6 +74,7 @@ TEST_F(NamesAtTheGate, OnlyWhatBringsSomethingStays) {
                                         {},
                                         no_deflections,
                                         no_impacts,
+                                        no_curves,
                                         still_,
                                         processed_,
                                         no_test}));
@@ -111,9 +113,19 @@ TEST_F(NamesAtTheGate, ANameThatTheTestLogsDoNotBearOutIsToldWithBothErrors) {
     robot.joints[1].effects.push_back(test::effect("ripple", {14}, {ripple, 0.4 * ripple}));
     const std::vector<ProcessedLog> test{test::small_session_log(robot, Role::test, 3).log};
     const std::vector<std::optional<Impacts>> no_impacts(6);
+    const std::vector<std::optional<CurveResult>> no_curves(6);
     const Deflections no_deflections;
-    return to_json(verdicts(
-        {nominal_, outcome_.models.current, outcome_, gate, {}, no_deflections, no_impacts, still_, processed_, test}));
+    return to_json(verdicts({nominal_,
+                             outcome_.models.current,
+                             outcome_,
+                             gate,
+                             {},
+                             no_deflections,
+                             no_impacts,
+                             no_curves,
+                             still_,
+                             processed_,
+                             test}));
   };
   const json other = joint(-0.5), same = joint(0.5);
   const json &shows = other.at("joints").at(1), &bears_out = same.at("joints").at(1);

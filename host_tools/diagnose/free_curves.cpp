@@ -1,0 +1,290 @@
+#include "host_tools/diagnose/free_curves.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "host_tools/diagnose/curve_squares.hpp"
+#include "host_tools/diagnose/deviations.hpp"
+#include "host_tools/diagnose/dictionary.hpp"
+#include "host_tools/diagnose/features.hpp"
+#include "host_tools/diagnose/gate.hpp"
+#include "host_tools/diagnose/refit.hpp"
+#include "host_tools/diagnose/where_words.hpp"
+#include "host_tools/effects/effects.hpp"
+#include "host_tools/regression/solver.hpp"
+#include "host_tools/support/parallel.hpp"
+#include "model/effects/curve.hpp"
+#include "model/numbers.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double variances_per_decade = 2 * std::numbers::ln10;
+/// Parts of the motion over which the knots may be: the whole, halves, .. that overlap by half.
+constexpr int finest_part = 8;
+/// Where a curve is drawn: four points a piece.
+constexpr Index drawn_points = 4 * static_cast<Index>(curve_pieces) + 1;
+
+std::vector<VectorXd> white(std::size_t joints) { return std::vector<VectorXd>(joints, VectorXd::Zero(1)); }
+
+std::vector<EffectCandidate> candidates(const Linearised& problem, std::size_t joint) {
+  const MotionScales scales = scales_of(problem, joint);
+  std::vector<EffectCandidate> out;
+  for (const EffectInfo& info : effect_infos()) {
+    if (!info.curve) continue;
+    const double from = info.shape[0].values.tried(scales)[0], span = info.shape[1].values.tried(scales)[0];
+    for (int parts = 1; parts <= finest_part; parts *= 2) {
+      const double length = span / parts;
+      if (length < info.shape[1].lower) break;
+      for (int half = 0; half <= 2 * (parts - 1); ++half)
+        out.push_back({std::string(info.name), joint, {from + half * length / 2, length}});
+    }
+  }
+  return out;
+}
+
+/// What a curve leaves on what judges.
+struct Tried {
+  EffectCandidate effect;
+  double left = 1e300;
+};
+
+/// The best curve of each variable, the best first.
+std::vector<Tried> best_of_each(const Linearised& problem, std::size_t joint, const std::vector<Index>& columns,
+                                double prior) {
+  const std::vector<EffectCandidate> all = candidates(problem, joint);
+  std::vector<double> left(all.size());
+  parallel_for(all.size(), [&](std::size_t i) {
+    Group group;
+    group.candidate = all[i];
+    const MatrixXd curve = problem.make(group)[joint];
+    left[i] = 0;
+    for (const Fold& fold : problem.blocks().folds)
+      left[i] += judged_with_curves(problem, joint, columns, curve, prior, fold);
+  });
+  std::vector<Tried> out;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (out.empty() || out.back().effect.effect != all[i].effect) out.push_back({all[i]});
+    if (left[i] < out.back().left) out.back() = {all[i], left[i]};
+  }
+  std::sort(out.begin(), out.end(), [](const Tried& a, const Tried& b) { return a.left < b.left; });
+  return out;
+}
+
+/// What functions of another joint's position, or of the others' velocities, leave at best: then it is none of this
+/// joint's variables.
+double left_by_others(const Linearised& problem, std::size_t joint, const std::vector<Index>& columns, double prior) {
+  double least = 1e300;
+  if (problem.joints() < 2) return least;
+  const std::vector<Family> all = families(problem.joints());
+  const MatrixXd functions = features(problem, joint);
+  for (std::size_t f = 0; f < problem.joints(); ++f) {  // theirs come first
+    MatrixXd of_family = functions.middleCols(all[f].first, all[f].count);
+    if (const Background* background = problem.background(joint)) of_family = background->eliminate(of_family);
+    double left = 0;
+    for (const Fold& fold : problem.blocks().folds)
+      left += judged_with_curves(problem, joint, columns, of_family, prior, fold);
+    least = std::min(least, left);
+  }
+  return least;
+}
+
+/// The curve that explains most at a joint, where it is sure and worth its numbers.
+std::optional<FreeCurve> best_at(const Linearised& problem, std::size_t joint, double size) {
+  const Options& options = problem.options();
+  const std::vector<Index> columns = problem.columns_of(in_model(problem));
+  const auto j = static_cast<Index>(joint);
+  const double dilution = problem.solver().weights()[j] / diluted_weights(problem)[j];
+  double before = 0, rows = 0;
+  for (const Fold& fold : problem.blocks().folds) {
+    before += judged_with_curves(problem, joint, columns, MatrixXd(problem.solver().rows(joint).x.rows(), 0), 0, fold);
+    rows += problem.solver().row_count(fold.judge)[j] / dilution;
+  }
+  const double prior = 1 / (size * size);
+  const std::vector<Tried> tried = best_of_each(problem, joint, columns, prior);
+  if (tried.empty() || left_by_others(problem, joint, columns, prior) < tried[0].left) return {};
+  const auto odds = [&](double without, double with) {
+    return rows * std::log(without / std::max(with, 1e-300)) / variances_per_decade;
+  };
+  FreeCurve out;
+  out.effect = tried[0].effect;
+  out.closes = 1 - tried[0].left / before;
+  const auto many = static_cast<double>(candidates(problem, joint).size());
+  out.odds_nothing = odds(before, tried[0].left) - std::log10(many);
+  if (tried.size() > 1) {
+    out.odds_rival = odds(tried[1].left, tried[0].left);
+    out.rival = tried[1].effect.effect;
+  }
+  if (out.odds_nothing < options.gate.established || out.closes < options.curve.least_share) return {};
+  return out;
+}
+
+/// Appends a curve of height 0.
+EffectId put(Models& models, const EffectCandidate& effect) {
+  Group group;
+  group.candidate = effect;
+  return name(models, group, VectorXd::Zero(static_cast<Index>(curve_heights)));
+}
+
+/// The heights' factors at values of the variable, values x heights.
+MatrixXd bumps(const std::vector<double>& shape, const VectorXd& values) {
+  MatrixXd out = MatrixXd::Zero(values.size(), static_cast<Index>(curve_heights));
+  const auto pieces = static_cast<double>(curve_pieces);
+  for (Index i = 0; i < values.size(); ++i) {
+    const double x = std::clamp(pieces * (values[i] - shape[0]) / shape[1], 0.0, pieces);
+    Curve<Real>::at(x).each(
+        [&](auto, std::size_t height, double weight) { out(i, static_cast<Index>(height)) = weight; });
+  }
+  return out;
+}
+
+/// What a curve's variable is, as in GapRegion.
+std::string variable_of(const EffectInfo& info) {
+  switch (info.shape[0].quantity) {
+    case Quantity::velocity:
+      return "dq";
+    case Quantity::torque:
+      return "load";
+    default:
+      return "q";
+  }
+}
+
+VectorXd values_of(const std::string& variable, const Linearised& problem, std::size_t log, std::size_t joint) {
+  const auto j = static_cast<Index>(joint);
+  if (variable == "dq") return problem.motion(log).dq.col(j);
+  if (variable == "load") return problem.robot_columns(log).structural().col(j);
+  return problem.motion(log).q.col(j);
+}
+
+/// Mean of the heights' factors over the logs that fit.
+Eigen::RowVectorXd mean_bumps(const Linearised& problem, const FreeCurve& curve, const std::string& variable) {
+  Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(static_cast<Index>(curve_heights));
+  double samples = 0;
+  for (std::size_t l = 0; l < problem.logs().size(); ++l) {
+    const SessionLog& entry = problem.logs()[l];
+    if (entry.healthy || !entry.fits) continue;
+    const VectorXd all = values_of(variable, problem, l, curve.effect.joint);
+    const Index count = entry.log.last - entry.log.first;
+    sum += bumps(curve.effect.shape, all.segment(entry.log.first, count)).colwise().sum();
+    samples += static_cast<double>(count);
+  }
+  return sum / std::max(samples, 1.0);
+}
+
+/// "friction rises by 0.8 N*m between 0.85 and 1.05 rad": the largest way off the curve's median, and where it is more
+/// than half of that; over more than half of the interval it is no place.
+std::string sentence_of(const CurveResult& curve, const Robot& robot, std::size_t joint,
+                        const std::vector<SessionLog>& logs) {
+  const std::vector<CurveResult::Point>& p = curve.points;
+  std::vector<double> sorted;
+  for (const CurveResult::Point& point : p) sorted.push_back(point.y);
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
+  const double median = sorted[sorted.size() / 2];
+  std::size_t peak = 0;
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    if (std::fabs(p[i].y - median) > std::fabs(p[peak].y - median)) peak = i;
+  }
+  const double height = p[peak].y - median;
+  std::size_t from = peak, to = peak;
+  const auto high = [&](std::size_t i) { return (p[i].y - median) / height > 0.5; };
+  while (from > 0 && high(from - 1)) --from;
+  while (to + 1 < p.size() && high(to + 1)) ++to;
+  const std::string unit = robot.joints[joint].torque_unit();
+  const std::string what = curve.friction ? "friction" : "torque";
+  std::vector<const ProcessedLog*> shown;
+  for (const SessionLog& log : logs) shown.push_back(&log.log);
+  GapRegion region;
+  region.signal = curve.signal;
+  region.from = p[from].x;
+  region.to = p[to].x;
+  if (2 * (to - from) <= p.size())
+    return fmt::format("{} {} by {:.2g} {} {}", what, height > 0 ? "rises" : "falls", std::fabs(height), unit,
+                       words_of(region, robot, joint, shown));
+  const auto [least, most] = std::minmax_element(
+      p.begin(), p.end(), [](const CurveResult::Point& a, const CurveResult::Point& b) { return a.y < b.y; });
+  region.from = p.front().x;
+  region.to = p.back().x;
+  return fmt::format("{} changes by {:.2g} {} {}", what, most->y - least->y, unit,
+                     words_of(region, robot, joint, shown));
+}
+
+}  // namespace
+
+std::vector<FreeCurve> add_free_curves(Models& models, const Outcome& outcome, const std::vector<SessionLog>& logs,
+                                       const std::vector<bool>& still) {
+  const std::size_t n = models.current.joints.size();
+  std::vector<FreeCurve> found;
+  const Models before = models;
+  if (!outcome.structured()) return found;
+  {
+    const Linearised problem(models, logs, white(n));
+    models.curve_size.assign(n, 0);
+    for (std::size_t j = 0; j < n; ++j) {
+      if (still[j] || !outcome.structured(j)) continue;
+      models.curve_size[j] = models.options.curve.height / std::sqrt(problem.solver().weights()[static_cast<Index>(j)]);
+      if (auto curve = best_at(problem, j, models.curve_size[j])) found.push_back(*curve);
+    }
+  }
+  const std::vector<double> size = models.curve_size;
+  while (!found.empty()) {
+    models = before;
+    models.curve_size = size;
+    for (FreeCurve& curve : found) curve.id = put(models, curve.effect);
+    refit(models, logs, white(n), 4);
+    const std::vector<bool> harmed = harmed_joints(models.options.gate, before.current, models.current, logs);
+    const bool any = std::find(harmed.begin(), harmed.end(), true) != harmed.end();
+    if (!any) return found;
+    const auto its = [&](const FreeCurve& curve) { return harmed[curve.effect.joint]; };
+    // Harm at joints without a curve comes from one of the others: the least sure goes.
+    if (std::erase_if(found, its) == 0) {
+      found.erase(std::min_element(found.begin(), found.end(), [](const FreeCurve& a, const FreeCurve& b) {
+        return a.odds_nothing < b.odds_nothing;
+      }));
+    }
+  }
+  models = before;
+  return found;
+}
+
+CurveResult drawn(const Models& models, const FreeCurve& curve, const std::vector<SessionLog>& logs) {
+  const EffectInfo& info = *find_effect(curve.effect.effect);
+  const bool turns = models.current.robot.joints[curve.effect.joint].type == JointType::revolute;
+  Linearised problem(models, logs, white(models.current.joints.size()));
+  problem.solver().set_weights(diluted_weights(problem));
+  const LinearFit fit = problem.solver().solve(problem.unknown_columns());
+  const MatrixXd covariance = SymmetricSolver(fit.information).inverse();
+  const auto heights = static_cast<Index>(curve_heights);
+  Index first = -1;
+  for (const Group& group : problem.groups()) {
+    if (group.in_model && group.id == curve.id) first = group.first;
+  }
+  CurveResult out;
+  out.effect = curve.effect.effect;
+  out.signal = variable_of(info);
+  out.unit = turns ? info.shape[0].unit : info.shape[0].unit_prismatic;
+  out.friction = info.friction;
+  out.odds_nothing = curve.odds_nothing;
+  out.odds_rival = curve.odds_rival;
+  out.rival = curve.rival;
+  out.closes = curve.closes;
+  const std::vector<double>& shape = curve.effect.shape;
+  const VectorXd x = VectorXd::LinSpaced(drawn_points, shape[0], shape[0] + shape[1]);
+  const MatrixXd factors = bumps(shape, x).rowwise() - mean_bumps(problem, curve, out.signal);
+  const std::vector<double>& linear = models.current.joints[curve.effect.joint].effects[curve.id.effect].linear;
+  const VectorXd y = factors * Eigen::Map<const VectorXd>(linear.data(), heights);
+  const MatrixXd spread = factors * covariance.block(first, first, heights, heights) * factors.transpose();
+  for (Index i = 0; i < drawn_points; ++i) out.points.push_back({x[i], y[i], std::sqrt(std::max(spread(i, i), 0.0))});
+  const Robot& robot = models.current.robot;
+  out.sentence = sentence_of(out, robot, curve.effect.joint, logs);
+  return out;
+}
+
+}  // namespace fxdyn::diagnosis

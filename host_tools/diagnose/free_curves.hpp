@@ -1,0 +1,36 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host_tools/diagnose/explore.hpp"
+#include "host_tools/report/diagnosis_result.hpp"
+
+namespace fxdyn::diagnosis {
+
+/// A free curve (model/effects/curve.hpp) of what has no name at a joint.
+struct FreeCurve {
+  EffectId id;                         ///< of Models::current
+  EffectCandidate effect;              ///< its variable, and over which interval its knots are
+  double odds_nothing = 0;             ///< log10, on data that did not fit it
+  std::optional<double> odds_rival{};  ///< .. against the best curve of another variable; none: there is none
+  std::string rival{};
+  double closes = 0;  ///< share of the error's power on what judges that it takes away
+};
+
+/// Where structure is left at a joint, the free curve that explains most of it: of every variable (the own position,
+/// velocity, load; friction over the position), with knots over the whole motion and over halves, quarters and eighths
+/// of it, each judged by a fit of the others' folds with all that the model has. Rows count as diluted_weights() says;
+/// the number of curves tried is taken off the odds. None
+/// where functions of another joint's motion explain more. Fits all of them together, and gives up those that harm a
+/// joint.
+/// @param models those of the outcome; the curves are added, as named effects
+std::vector<FreeCurve> add_free_curves(Models& models, const Outcome& outcome, const std::vector<SessionLog>& logs,
+                                       const std::vector<bool>& still);
+
+/// The curve over its interval with its deviation, as the models have it. What it shares with the offset or with plain
+/// dry friction is not its own: its mean over the logs that fit is taken off.
+CurveResult drawn(const Models& models, const FreeCurve& curve, const std::vector<SessionLog>& logs);
+
+}  // namespace fxdyn::diagnosis

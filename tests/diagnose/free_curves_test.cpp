@@ -1,0 +1,108 @@
+// What has no name gets a curve of the right variable, whose band holds the truth; noise gets none.
+
+#include "host_tools/diagnose/free_curves.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "tests/diagnose/small_problem.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::ArrayXd;
+
+/// A torque of the second joint, of its own position and velocity and of the fourth joint's position.
+using Torque = std::function<ArrayXd(const ArrayXd& q, const ArrayXd& dq, const ArrayXd& other)>;
+
+struct Answer {
+  std::vector<FreeCurve> curves;
+  std::optional<CurveResult> drawn;
+  Models before, after;
+  std::vector<SessionLog> logs;
+
+  /// Share of the joint's squared error on the validate log that is left.
+  double left(Eigen::Index joint) const {
+    return plain_error(after.current, logs)[joint] / plain_error(before.current, logs)[joint];
+  }
+};
+
+Answer answer(const Torque& torque) {
+  const IdentifiedModel nominal = test::fitted_puma();
+  Answer out;
+  for (const auto& [role, seed] : {std::pair{Role::train, 1}, std::pair{Role::validate, 2}}) {
+    out.logs.push_back(test::small_session_log(nominal, role, static_cast<std::uint64_t>(seed)));
+    ProcessedLog& log = out.logs.back().log;
+    const MotionRows motion = log.motion(0, log.samples());
+    log.tau.col(1).array() += torque(motion.q.col(1).array(), motion.dq.col(1).array(), motion.q.col(3).array());
+  }
+  Outcome outcome;
+  outcome.models = test::around(nominal);
+  outcome.whitening = test::no_whitening();
+  outcome.look_again(out.logs);
+  out.before = out.after = outcome.models;
+  out.curves = add_free_curves(out.after, outcome, out.logs, std::vector<bool>(6, false));
+  if (!out.curves.empty()) out.drawn = drawn(out.after, out.curves.front(), out.logs);
+  return out;
+}
+
+ArrayXd bump(const ArrayXd& x, double at, double width) { return (-((x - at) / width).square()).exp(); }
+
+/// Of the points, those whose band of 95 % holds the truth, whose mean over the points is taken off both.
+double held(const CurveResult& curve, const std::function<double(double)>& truth) {
+  double mean = 0;
+  for (const CurveResult::Point& p : curve.points)
+    mean += (truth(p.x) - p.y) / static_cast<double>(curve.points.size());
+  double inside = 0;
+  for (const CurveResult::Point& p : curve.points) inside += std::fabs(truth(p.x) - mean - p.y) <= 1.96 * p.std;
+  return inside / static_cast<double>(curve.points.size());
+}
+
+TEST(FreeCurves, ATightSpotIsFrictionOverThePosition) {
+  const Answer a = answer(
+      [](const ArrayXd& q, const ArrayXd& dq, const ArrayXd&) -> ArrayXd { return 2 * bump(q, 0.2, 0.2) * dq.sign(); });
+  ASSERT_EQ(a.curves.size(), 1U);
+  EXPECT_EQ(a.curves[0].effect.joint, 1U);
+  EXPECT_EQ(a.curves[0].effect.effect, "friction_over_position");
+  EXPECT_GT(a.curves[0].odds_nothing, 10);
+  ASSERT_TRUE(a.curves[0].odds_rival);
+  EXPECT_GT(*a.curves[0].odds_rival, 3);
+  EXPECT_LT(a.left(1), 0.3);
+  EXPECT_NE(a.drawn->sentence.find("friction rises by"), std::string::npos) << a.drawn->sentence;
+  EXPECT_NE(a.drawn->sentence.find("between"), std::string::npos) << a.drawn->sentence;
+  EXPECT_GE(held(*a.drawn, [](double q) { return 2 * std::exp(-std::pow((q - 0.2) / 0.2, 2)); }), 0.8);
+}
+
+TEST(FreeCurves, ACoverThatPressesIsATorqueOverThePosition) {
+  const Answer a =
+      answer([](const ArrayXd& q, const ArrayXd&, const ArrayXd&) -> ArrayXd { return 1.5 * bump(q, -0.3, 0.1); });
+  ASSERT_EQ(a.curves.size(), 1U);
+  EXPECT_EQ(a.curves[0].effect.effect, "position_curve");
+  EXPECT_LT(a.left(1), 0.3);
+  EXPECT_NE(a.drawn->sentence.find("torque rises by"), std::string::npos) << a.drawn->sentence;
+}
+
+TEST(FreeCurves, AResonanceAtOneSpeedIsACurveOfTheVelocity) {
+  const Answer a =
+      answer([](const ArrayXd&, const ArrayXd& dq, const ArrayXd&) -> ArrayXd { return 2 * bump(dq, 0.8, 0.15); });
+  ASSERT_EQ(a.curves.size(), 1U);
+  EXPECT_EQ(a.curves[0].effect.effect, "velocity_curve");
+  EXPECT_LT(a.left(1), 0.3);
+}
+
+TEST(FreeCurves, WhatAnotherJointsPositionDoesIsNoneOfThem) {
+  const Answer a =
+      answer([](const ArrayXd&, const ArrayXd&, const ArrayXd& other) -> ArrayXd { return 2 * (3 * other).sin(); });
+  EXPECT_TRUE(a.curves.empty()) << a.curves[0].effect.effect;
+}
+
+TEST(FreeCurves, NoiseGetsNone) {
+  const Answer a =
+      answer([](const ArrayXd& q, const ArrayXd&, const ArrayXd&) -> ArrayXd { return ArrayXd::Zero(q.size()); });
+  EXPECT_TRUE(a.curves.empty());
+  EXPECT_EQ(a.after.current.joints[1].effects.size(), a.before.current.joints[1].effects.size());
+}
+
+}  // namespace
+}  // namespace fxdyn::diagnosis
