@@ -6,6 +6,7 @@
 
 #include <functional>
 
+#include "host_tools/diagnose/gate.hpp"
 #include "tests/diagnose/small_problem.hpp"
 
 namespace fxdyn::diagnosis {
