@@ -12,10 +12,21 @@ mkdir -p "$build"
 flags=(-std=c++20 -O1 -g1 -fsanitize=integer,undefined -fno-sanitize-recover=all
   -fsanitize-ignorelist=tests/portable/not_checked.txt -I"$root" -isystem /usr/include/eigen3
   -DFXDYN_SOURCE_DIR="\"$root\"" -DFXDYN_TABLES_HEADER="\"$model/tables.hpp\"" -DFXDYN_VECTORS_HEADER="\"$model/vectors.hpp\"")
-objects=()
+# A folder of host_tools in one go: most of the time goes into headers.
+sources=()
 for source in "$@"; do
+  if [[ $source == host_tools/* ]]; then
+    together=$build/$(dirname "$source" | tr / _).cpp
+    [[ " ${sources[*]-} " == *" $together "* ]] || { sources+=("$together") && : >"$together"; }
+    echo "#include \"$source\"" >>"$together"
+  else
+    sources+=("$root/$source")
+  fi
+done
+objects=()
+for source in "${sources[@]}"; do
   object=$build/$(basename "$source" .cpp).o
-  clang++-14 "${flags[@]}" -c "$root/$source" -o "$object"
+  clang++-14 "${flags[@]}" -c "$source" -o "$object"
   objects+=("$object")
 done
 clang++-14 -fsanitize=integer,undefined "${objects[@]}" -o "$build/test" -lrapidcheck -lgtest_main -lgtest -lpthread -lfmt -lz -lzstd -llz4 -lsqlite3 \
