@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -9,6 +10,7 @@
 
 #include "host_tools/effects/model_parts.hpp"
 #include "host_tools/page/page.hpp"
+#include "host_tools/report/diagnosis_words.hpp"
 #include "host_tools/report/finding_pictures.hpp"
 #include "host_tools/report/section.hpp"
 
@@ -16,6 +18,7 @@ namespace fxdyn {
 namespace {
 
 using namespace page;
+namespace words = diagnosis_words;
 using Eigen::Index;
 using Eigen::VectorXd;
 
@@ -23,6 +26,8 @@ constexpr const char* data_colour = "#2e6fb7";
 constexpr const char* data_cloud = "#b82e6fb7";
 constexpr const char* effect_colour = "#e4572e";
 constexpr const char* effect_band = "#a0e4572e";
+/// Standard deviations to either side of a normal distribution's 95 %.
+constexpr double deviations_of_95 = 1.96;
 
 /// Some samples as short thin lines in their order in time: of every few strides the samples of one, as longer lines
 /// would cut through what lies between. Where x jumps, as from the end of a period to its beginning, a line ends.
@@ -86,6 +91,22 @@ std::vector<Chart> charts_of(const FindingPicture& of, const std::string& unit, 
   return {before, after};
 }
 
+/// A free curve with its band.
+Chart chart_of(const CurveResult& curve, const std::string& unit) {
+  const auto n = static_cast<Index>(curve.points.size());
+  VectorXd x(n), y(n), band(n);
+  for (Index i = 0; i < n; ++i) {
+    const CurveResult::Point& point = curve.points[static_cast<std::size_t>(i)];
+    x[i] = point.x;
+    y[i] = point.y;
+    band[i] = deviations_of_95 * point.std;
+  }
+  const std::string variable = curve.signal == "dq" ? "velocity" : curve.signal == "load" ? "load" : "position";
+  return {fmt::format("{} [{}]", variable, curve.unit),
+          fmt::format("{} [{}]", curve.friction ? "friction" : "torque", unit),
+          {{x, y - band, effect_band, 0, "95 % band", false, y + band}, {x, y, effect_colour, 1.6, "curve"}}};
+}
+
 std::string caption_of(const FindingPicture& of, const std::string& joint) {
   if (of.effect.empty())
     return fmt::format("{}: unknown, what no finding explains over {} ({:.0f} % of it is a function of it)", joint,
@@ -101,17 +122,26 @@ std::string findings_section(const ReportInput& input, const nlohmann::json&) {
   const auto diagnosis = file.is_null() ? std::nullopt : std::optional(diagnosis_of(file));
   const std::vector<FindingPicture> all =
       finding_pictures(input.fitted, shown_logs(input), diagnosis ? &*diagnosis : nullptr);
-  if (all.empty()) return "";
+  std::vector<JointDiagnosis> curved;
+  if (diagnosis) {
+    std::copy_if(diagnosis->joints.begin(), diagnosis->joints.end(), std::back_inserter(curved),
+                 [](const JointDiagnosis& joint) { return joint.curve.has_value(); });
+  }
+  if (all.empty() && curved.empty()) return "";
   // Two clouds a picture, about 8 bytes a point. A curve of a chart has at most 600, with the gaps.
   constexpr Index most_points = 12'000;
-  const Index points = std::clamp<Index>(most_points / static_cast<Index>(all.size()), 150, 400);
+  const Index points = std::clamp<Index>(most_points / std::max<Index>(1, static_cast<Index>(all.size())), 150, 400);
   const std::vector<Joint>& joints = robot_of(input.fitted).joints;
   std::vector<std::vector<Chart>> charts;
   for (const FindingPicture& one : all) charts.push_back(charts_of(one, joints[one.joint].torque_unit(), points));
+  for (const JointDiagnosis& joint : curved) charts.push_back({chart_of(*joint.curve, joint.unit)});
   const std::vector<std::string> pictures = draw(charts, 2);
   std::vector<std::string> shown;
   for (std::size_t i = 0; i < all.size(); ++i)
     shown.push_back(figure(pictures[i], caption_of(all[i], joints[all[i].joint].name)));
+  for (std::size_t i = 0; i < curved.size(); ++i)
+    shown.push_back(figure(pictures[all.size() + i], fmt::format("{}: no name, but a curve: {}", curved[i].joint,
+                                                                 words::curve(*curved[i].curve))));
   return section("What was found, in pictures") +
          paragraph(
              "Left: what the model leaves when this effect is taken out and nothing is fitted again, and the effect's "

@@ -63,6 +63,17 @@ DiagnosisResult example() {
                   {{"q", 2, -0.05, 0.05, 0.61, 0.08, ""}, {"t", 0, 3, 3.1, {}, {}, "b.csv"}}};
   moving.effects = {stribeck, bends};
   moving.undecided = {{"presliding", "lugre"}};
+  moving.curve.emplace();
+  moving.curve->effect = "friction_over_position";
+  moving.curve->signal = "q";
+  moving.curve->unit = "rad";
+  moving.curve->friction = true;
+  moving.curve->sentence = "friction rises by 0.8 N*m between 0.85 and 1.05 rad";
+  moving.curve->odds_nothing = 12;
+  moving.curve->odds_rival = 2.1;
+  moving.curve->rival = "position_curve";
+  moving.curve->closes = 0.6;
+  moving.curve->points = {{0.8, -0.1, 0.02}, {0.95, 0.7, 0.03}};
   moving.not_identifiable = {"spring"};
   moving.state_p = 1e-12;
   moving.time_p = 0.3;
