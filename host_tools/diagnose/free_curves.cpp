@@ -27,28 +27,12 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double variances_per_decade = 2 * std::numbers::ln10;
-/// Parts of the motion over which the knots may be: the whole, halves, .. that overlap by half.
-constexpr int finest_part = 8;
+/// Parts of the motion over which the knots may be: the whole and halves for every variable, down to eighths.
+constexpr int coarsest_parts = 2, finest_parts = 8;
 /// Where a curve is drawn: four points a piece.
 constexpr Index drawn_points = 4 * static_cast<Index>(curve_pieces) + 1;
 
 std::vector<VectorXd> white(std::size_t joints) { return std::vector<VectorXd>(joints, VectorXd::Zero(1)); }
-
-std::vector<EffectCandidate> candidates(const Linearised& problem, std::size_t joint) {
-  const MotionScales scales = scales_of(problem, joint);
-  std::vector<EffectCandidate> out;
-  for (const EffectInfo& info : effect_infos()) {
-    if (!info.curve) continue;
-    const double from = info.shape[0].values.tried(scales)[0], span = info.shape[1].values.tried(scales)[0];
-    for (int parts = 1; parts <= finest_part; parts *= 2) {
-      const double length = span / parts;
-      if (length < info.shape[1].lower) break;
-      for (int half = 0; half <= 2 * (parts - 1); ++half)
-        out.push_back({std::string(info.name), joint, {from + half * length / 2, length}});
-    }
-  }
-  return out;
-}
 
 /// What a curve leaves on what judges.
 struct Tried {
@@ -56,27 +40,69 @@ struct Tried {
   double left = 1e300;
 };
 
-/// The best curve of each variable, the best first.
-std::vector<Tried> best_of_each(const Linearised& problem, std::size_t joint, const std::vector<Index>& columns,
-                                double prior) {
-  const std::vector<EffectCandidate> all = candidates(problem, joint);
-  std::vector<double> left(all.size());
-  parallel_for(all.size(), [&](std::size_t i) {
-    Group group;
-    group.candidate = all[i];
-    const MatrixXd curve = problem.make(group)[joint];
-    left[i] = 0;
-    for (const Fold& fold : problem.blocks().folds)
-      left[i] += judged_with_curves(problem, joint, columns, curve, prior, fold);
-  });
-  std::vector<Tried> out;
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    if (out.empty() || out.back().effect.effect != all[i].effect) out.push_back({all[i]});
-    if (left[i] < out.back().left) out.back() = {all[i], left[i]};
+/// Curves of one joint.
+class Trials {
+ public:
+  Trials(const Linearised& problem, std::size_t joint, const std::vector<Index>& columns, double prior)
+      : problem_(problem), joint_(joint), columns_(columns), prior_(prior), scales_(scales_of(problem, joint)) {}
+
+  /// The best curve of each variable, the best first. Fine parts are tried of the two best variables only.
+  std::vector<Tried> best_of_each() {
+    std::vector<EffectCandidate> coarse;
+    for (const EffectInfo& info : effect_infos()) {
+      for (int parts = 1; info.curve && parts <= coarsest_parts; parts *= 2) add(info, parts, coarse);
+    }
+    std::vector<Tried> out = best(coarse);
+    std::vector<EffectCandidate> fine;
+    for (std::size_t i = 0; i < std::min<std::size_t>(2, out.size()); ++i) {
+      for (int parts = 2 * coarsest_parts; parts <= finest_parts; parts *= 2)
+        add(*find_effect(out[i].effect.effect), parts, fine);
+    }
+    for (const Tried& one : best(fine)) {
+      const auto same = std::find_if(out.begin(), out.end(),
+                                     [&](const Tried& other) { return other.effect.effect == one.effect.effect; });
+      if (one.left < same->left) *same = one;
+    }
+    std::sort(out.begin(), out.end(), less);
+    return out;
   }
-  std::sort(out.begin(), out.end(), [](const Tried& a, const Tried& b) { return a.left < b.left; });
-  return out;
-}
+  std::size_t count() const { return count_; }
+
+ private:
+  static bool less(const Tried& a, const Tried& b) { return a.left < b.left; }
+  /// Knots over each of so many parts of the motion, and over those between.
+  void add(const EffectInfo& info, int parts, std::vector<EffectCandidate>& to) const {
+    const double from = info.shape[0].values.tried(scales_)[0], span = info.shape[1].values.tried(scales_)[0];
+    const double length = span / parts;
+    for (int half = 0; length >= info.shape[1].lower && half <= 2 * (parts - 1); ++half)
+      to.push_back({std::string(info.name), joint_, {from + half * length / 2, length}});
+  }
+  std::vector<Tried> best(const std::vector<EffectCandidate>& all) {
+    std::vector<double> left(all.size());
+    parallel_for(all.size(), [&](std::size_t i) {
+      Group group;
+      group.candidate = all[i];
+      const MatrixXd curve = problem_.make(group)[joint_];
+      for (const Fold& fold : problem_.blocks().folds)
+        left[i] += judged_with_curves(problem_, joint_, columns_, curve, prior_, fold);
+    });
+    count_ += all.size();
+    std::vector<Tried> out;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (out.empty() || out.back().effect.effect != all[i].effect) out.push_back({all[i]});
+      if (left[i] < out.back().left) out.back() = {all[i], left[i]};
+    }
+    std::sort(out.begin(), out.end(), less);
+    return out;
+  }
+
+  const Linearised& problem_;
+  std::size_t joint_;
+  const std::vector<Index>& columns_;
+  double prior_;
+  MotionScales scales_;
+  std::size_t count_ = 0;
+};
 
 /// What functions of another joint's position, or of the others' velocities, leave at best: then it is none of this
 /// joint's variables.
@@ -108,7 +134,8 @@ std::optional<FreeCurve> best_at(const Linearised& problem, std::size_t joint, d
     rows += problem.solver().row_count(fold.judge)[j] / dilution;
   }
   const double prior = 1 / (size * size);
-  const std::vector<Tried> tried = best_of_each(problem, joint, columns, prior);
+  Trials trials(problem, joint, columns, prior);
+  const std::vector<Tried> tried = trials.best_of_each();
   if (tried.empty() || left_by_others(problem, joint, columns, prior) < tried[0].left) return {};
   const auto odds = [&](double without, double with) {
     return rows * std::log(without / std::max(with, 1e-300)) / variances_per_decade;
@@ -116,8 +143,7 @@ std::optional<FreeCurve> best_at(const Linearised& problem, std::size_t joint, d
   FreeCurve out;
   out.effect = tried[0].effect;
   out.closes = 1 - tried[0].left / before;
-  const auto many = static_cast<double>(candidates(problem, joint).size());
-  out.odds_nothing = odds(before, tried[0].left) - std::log10(many);
+  out.odds_nothing = odds(before, tried[0].left) - std::log10(static_cast<double>(trials.count()));
   if (tried.size() > 1) {
     out.odds_rival = odds(tried[1].left, tried[0].left);
     out.rival = tried[1].effect.effect;
