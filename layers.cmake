@@ -32,7 +32,7 @@ function(fxdyn_layer name)
   target_link_libraries(fxdyn_${name} PUBLIC ${ARG_LINKS} PRIVATE fxdyn_warnings ${ARG_PRIVATE})
   # The heavy headers are read once instead of in every file: half the build time. One such file for all libraries.
   if(name STREQUAL support)
-    target_precompile_headers(fxdyn_support PRIVATE <Eigen/Dense> <filesystem> <string> <vector>)
+    target_precompile_headers(fxdyn_support PRIVATE <Eigen/Dense> <fmt/format.h> <nlohmann/json.hpp> <filesystem> <functional> <optional> <string> <vector>)
   else()
     target_precompile_headers(fxdyn_${name} REUSE_FROM fxdyn_support)
   endif()

@@ -205,6 +205,42 @@ Eigen::RowVectorXd mean_bumps(const Linearised& problem, const FreeCurve& curve,
   return sum / std::max(samples, 1.0);
 }
 
+/// Variance of what a curve of twelve heights can't follow: that of the residual's means over the variable's classes,
+/// less what noise makes of them.
+/// @param residual of the joint, all rows
+double misfit(const Linearised& problem, const FreeCurve& curve, const CurveResult& of, const VectorXd& residual) {
+  const std::vector<double>& shape = curve.effect.shape;
+  VectorXd sum = VectorXd::Zero(drawn_points), count = VectorXd::Zero(drawn_points);
+  double square = 0;
+  for (std::size_t l = 0; l < problem.logs().size(); ++l) {
+    const SessionLog& entry = problem.logs()[l];
+    if (entry.healthy || !entry.fits) continue;
+    const Block& block = problem.blocks().of_log[l];
+    const VectorXd x = entry.log.decimate(values_of(of.signal, problem, l, curve.effect.joint));
+    const VectorXd dq = entry.log.decimate(values_of("dq", problem, l, curve.effect.joint));
+    for (Index row = 0; row < block.count; ++row) {
+      const double place = (x[row] - shape[0]) / shape[1];
+      if (place < 0 || place > 1) continue;
+      const double e = residual[block.first + row] * (of.friction && dq[row] < 0 ? -1 : 1);
+      const auto bin = static_cast<Index>(std::lround(place * static_cast<double>(drawn_points - 1)));
+      sum[bin] += e;
+      count[bin] += 1;
+      square += e * e;
+    }
+  }
+  double of_means = 0;
+  Index bins = 0;
+  for (Index bin = 0; bin < drawn_points; ++bin) {
+    if (count[bin] == 0) continue;
+    of_means += sum[bin] * sum[bin] / count[bin];
+    ++bins;
+  }
+  const double rows = count.sum();
+  if (rows <= static_cast<double>(bins)) return 0;
+  const double noise = (square - of_means) / (rows - static_cast<double>(bins));
+  return std::max(0.0, (of_means - static_cast<double>(bins) * noise) / rows);
+}
+
 /// "friction rises by 0.8 N*m between 0.85 and 1.05 rad": the largest way off the curve's median, and where it is more
 /// than half of that; over more than half of the interval it is no place.
 std::string sentence_of(const CurveResult& curve, const Robot& robot, std::size_t joint,
@@ -307,7 +343,9 @@ CurveResult drawn(const Models& models, const FreeCurve& curve, const std::vecto
   const std::vector<double>& linear = models.current.joints[curve.effect.joint].effects[curve.id.effect].linear;
   const VectorXd y = factors * Eigen::Map<const VectorXd>(linear.data(), heights);
   const MatrixXd spread = factors * covariance.block(first, first, heights, heights) * factors.transpose();
-  for (Index i = 0; i < drawn_points; ++i) out.points.push_back({x[i], y[i], std::sqrt(std::max(spread(i, i), 0.0))});
+  const double more = misfit(problem, curve, out, problem.solver().residual(curve.effect.joint, fit));
+  for (Index i = 0; i < drawn_points; ++i)
+    out.points.push_back({x[i], y[i], std::sqrt(std::max(spread(i, i), 0.0) + more)});
   const Robot& robot = models.current.robot;
   out.sentence = sentence_of(out, robot, curve.effect.joint, logs);
   return out;

@@ -30,7 +30,8 @@ std::vector<FreeCurve> add_free_curves(Models& models, const Outcome& outcome, c
                                        const std::vector<bool>& still);
 
 /// The curve over its interval with its deviation, as the models have it. What it shares with the offset or with plain
-/// dry friction is not its own: its mean over the logs that fit is taken off.
+/// dry friction is not its own: its mean over the logs that fit is taken off. The deviation counts what twelve
+/// heights can't follow, too.
 CurveResult drawn(const Models& models, const FreeCurve& curve, const std::vector<SessionLog>& logs);
 
 }  // namespace fxdyn::diagnosis

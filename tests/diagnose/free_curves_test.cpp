@@ -7,6 +7,7 @@
 #include <functional>
 
 #include "host_tools/diagnose/gate.hpp"
+#include "host_tools/diagnose/refit.hpp"
 #include "tests/diagnose/small_problem.hpp"
 
 namespace fxdyn::diagnosis {
@@ -41,6 +42,7 @@ Answer answer(const Torque& torque) {
   Outcome outcome;
   outcome.models = test::around(nominal);
   outcome.whitening = test::no_whitening();
+  refit(outcome.models, out.logs, outcome.whitening, 4);
   outcome.look_again(out.logs);
   out.before = out.after = outcome.models;
   out.curves = add_free_curves(out.after, outcome, out.logs, std::vector<bool>(6, false));
@@ -81,6 +83,7 @@ TEST(FreeCurves, ACoverThatPressesIsATorqueOverThePosition) {
   ASSERT_EQ(a.curves.size(), 1U);
   EXPECT_EQ(a.curves[0].effect.effect, "position_curve");
   EXPECT_LT(a.left(1), 0.3);
+  EXPECT_GE(held(*a.drawn, [](double q) { return 1.5 * std::exp(-std::pow((q + 0.3) / 0.1, 2)); }), 0.8);
   EXPECT_NE(a.drawn->sentence.find("torque rises by"), std::string::npos) << a.drawn->sentence;
 }
 
@@ -89,6 +92,7 @@ TEST(FreeCurves, AResonanceAtOneSpeedIsACurveOfTheVelocity) {
       answer([](const ArrayXd&, const ArrayXd& dq, const ArrayXd&) -> ArrayXd { return 2 * bump(dq, 0.8, 0.15); });
   ASSERT_EQ(a.curves.size(), 1U);
   EXPECT_EQ(a.curves[0].effect.effect, "velocity_curve");
+  EXPECT_GE(held(*a.drawn, [](double q) { return 2 * std::exp(-std::pow((q - 0.8) / 0.15, 2)); }), 0.8);
   EXPECT_LT(a.left(1), 0.3);
 }
 
