@@ -196,6 +196,18 @@ TEST(CampaignScore, PairsOutsideAndClean) {
   EXPECT_FALSE(placed({{"signal", "dq"}, {"from", 0.3}, {"to", 0.6}}));
   EXPECT_FALSE(score(truth_with(json::array({spot})), diagnosis, {}).at("placed"));
 
+  // The curve of the right variable, there and nowhere else.
+  const auto curved = [&](std::size_t joint, const char* effect) {
+    json moved = diagnosis;
+    moved["joints"][joint - 1]["curve"] = {{"effect", effect}};
+    json of = spot;
+    of["curve"] = "friction_over_position";
+    return score(truth_with(json::array({of})), moved, {}).at("curve_right").get<bool>();
+  };
+  EXPECT_TRUE(curved(3, "friction_over_position"));
+  EXPECT_FALSE(curved(3, "velocity_curve"));
+  EXPECT_FALSE(curved(2, "friction_over_position"));
+
   // A background that was there before is no alarm.
   json quiet = truth_with(json::array());
   quiet["background"] = {

@@ -322,6 +322,7 @@ json truth_json(const Case& wanted, const Ground& ground) {
     const std::vector<std::string> stands_for = names_of_form(outside.effect);
     if (stands_for.empty()) {
       entry["outside"] = true;
+      entry["curve"] = curve_of(outside.effect);
     } else {
       entry["names"] = stands_for;
     }

@@ -51,6 +51,12 @@ bool is_outside(const std::string& effect) {
   return in(outside_effects()) || in(other_forms());
 }
 
+std::string curve_of(const std::string& effect) {
+  if (effect == "tight_spot") return "friction_over_position";
+  if (effect == "end_stop") return "position_curve";
+  return {};
+}
+
 Outside draw_outside(const std::string& effect, std::size_t joint, const Plan& plan, std::uint64_t seed) {
   Outside outside{effect, joint, 0, seed};
   Random random(seed);

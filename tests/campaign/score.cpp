@@ -88,6 +88,19 @@ bool is_placed(const json& joint, const json& place) {
          first.at("to").get<double>() >= place.at("from").get<double>();
 }
 
+/// The free curve that a joint has; "": none.
+std::string curve_at(const json& joint) {
+  const json curve = joint.value("curve", json());
+  return curve.is_object() ? curve.at("effect").get<std::string>() : std::string();
+}
+
+/// Joints with a free curve.
+std::size_t count_curves(const json& diagnosis) {
+  std::size_t count = 0;
+  for (const json& joint : diagnosis.at("joints")) count += static_cast<std::size_t>(!curve_at(joint).empty());
+  return count;
+}
+
 /// Joints, and those of them that have a sentence with a place.
 void count_places(const json& diagnosis, json& out) {
   std::size_t joints = 0, placed = 0;
@@ -111,6 +124,7 @@ json score(const json& truth, const json& diagnosis, std::optional<double> closu
   }
   out["unexplained_joints"] = unexplained;
   if (closure) out["closure"] = *closure;
+  out["curves"] = count_curves(diagnosis);
 
   const json& effects = truth.at("effects");
   // What a healthy robot has anyway may be named: it is there. Unless there is more of it.
@@ -165,6 +179,12 @@ json score(const json& truth, const json& diagnosis, std::optional<double> closu
     const bool flagged = unexplained.contains(joint);
     if (first.contains("place") && joint > 0)
       out["placed"] = is_placed(diagnosis.at("joints").at(joint - 1), first.at("place"));
+    if (first.contains("curve") && joint > 0) {
+      // Right is the form's variable at the joint and no curve elsewhere; none where no curve has the form.
+      const std::string curve = curve_at(diagnosis.at("joints").at(joint - 1));
+      out["curve"] = curve;
+      out["curve_right"] = curve == first.at("curve").get<std::string>() && count_curves(diagnosis) <= !curve.empty();
+    }
     const bool taken = any_of(named.begin(), named.end(), [&](const Named& one) { return one.joint == joint; });
     out["flagged"] = flagged;
     out["accepted"] = std::any_of(named.begin(), named.end(),

@@ -191,6 +191,7 @@ std::string ambiguous_cases(const std::vector<json>& results) {
 /// Where what has no name sits, and clean joints of which no place is told.
 std::vector<Figure> place_figures(const std::vector<json>& results, const Filter& outside) {
   const Filter known = [=](const json& r) { return outside(r) && first_effect(r)->contains("place"); };
+  const Filter curved = [=](const json& r) { return outside(r) && r.at("score").contains("curve_right"); };
   Rate quiet;
   for (const json& r : results) {
     if (!done(r) || !r.at("score").contains("joints_placed")) continue;
@@ -199,6 +200,8 @@ std::vector<Figure> place_figures(const std::vector<json>& results, const Filter
     quiet.hit += joints - r.at("score").at("joints_placed").get<std::size_t>();
   }
   return {at_least("outside the catalogue: where it sits, variable and interval", rate(results, known, "placed"), 0.9),
+          at_least("outside the catalogue: curve of the right variable and joint; none where none has the form",
+                   rate(results, curved, "curve_right"), 0.9),
           at_least("clean robots: joints without a place", quiet, 0.95)};
 }
 
