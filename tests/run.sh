@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
 # run.sh [LABEL...]: builds and runs the tests, all of them or those with one of the labels
-#   format unit target hil real diagnosis fuzz bench findings
+#   format unit target hil real diagnosis fuzz bench findings sanitizers
+# sanitizers: all unit tests with address and undefined-behaviour sanitizers, for half an hour or more.
 # findings: every figure of docs/findings made anew and compared with its page, for an hour or two. Only where it is named.
-# Without a label the unit tests also run with address and undefined-behaviour sanitizers.
+# Without a label, those unit tests run with sanitizers that read other people's bytes or exercise what runs on a drive.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
-labels=(format unit target hil real diagnosis fuzz bench findings)
+labels=(format unit target hil real diagnosis fuzz bench findings sanitizers)
 for label in "$@"; do
   if [[ " ${labels[*]} " != *" $label "* ]]; then
     echo "run.sh: unknown label '$label'; known: ${labels[*]}" >&2
@@ -27,15 +28,38 @@ build() {
   cmake --build --preset "$1" ${2:+--target "$2"}
 }
 
+# sanitize TARGET FOLDER...: what it builds of the unit tests in these folders of tests/, with sanitizers.
+sanitize() {
+  build host-asan "$1"
+  local folder
+  for folder in "${@:2}"; do
+    step "unit tests with sanitizers: $folder"
+    # Not the command line's tests from end to end, whole projects, or the page in a browser: minutes each here, of code that
+    # the others run. Nor what does not compile: its messages are of the other compiler. Nor hundreds of draws of one test, nor times.
+    ctest --test-dir "build/host-asan/tests/$folder" --parallel "$jobs" --output-on-failure --no-tests=error -L '^unit$' \
+      -E '_NOT_BUILT|_cli$|^cli$|^report_browser$|^findings_short$|^must_not_compile|^layers_against$|Seeds$|Seconds$|EveryParameterChangesATorque$'
+  done
+}
+
 step "packages"
 toolchains/setup.sh
 build host
 
+# without LABEL [LABEL...]: the labels without the first
+without() {
+  local label
+  for label in "${@:2}"; do [ "$label" = "$1" ] || printf '%s\n' "$label"; done
+}
 if [[ " $* " == *" findings "* ]]; then
   step "figures of docs/findings"
   tests/findings/figures.py --program build/host/host_tools/cli/fxdyn
-  others=()
-  for label in "$@"; do [ "$label" = findings ] || others+=("$label"); done
+  mapfile -t others < <(without findings "$@")
+  [ ${#others[@]} -gt 0 ] || exit 0
+  set -- "${others[@]}"
+fi
+if [[ " $* " == *" sanitizers "* ]]; then
+  sanitize unit_tests .
+  mapfile -t others < <(without sanitizers "$@")
   [ ${#others[@]} -gt 0 ] || exit 0
   set -- "${others[@]}"
 fi
@@ -52,9 +76,6 @@ step "tests"
 ctest --test-dir build/host --parallel "$jobs" --output-on-failure --no-tests=error ${1:+-L "$pattern"}
 [ $# -eq 0 ] || exit 0
 
-build host-asan unit_tests
-step "unit tests with sanitizers"
-# Not the command line's tests from end to end, whole projects, or the page in a browser: minutes each here, of code that
-# the others run. Nor what does not compile: its messages are of the other compiler. Nor hundreds of draws of one test, nor times.
-ctest --test-dir build/host-asan --parallel "$jobs" --output-on-failure --no-tests=error -L '^unit$' -E '_cli$|^cli$|^report_browser$|^findings_short$|^must_not_compile|^layers_against$|Seeds$|Seconds$|EveryParameterChangesATorque$'
+mapfile -t exposed <tests/exposed.txt
+sanitize exposed_unit_tests "${exposed[@]}"
 printf '\ndone in %d s\n' "$SECONDS"
