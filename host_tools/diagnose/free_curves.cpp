@@ -190,19 +190,33 @@ VectorXd values_of(const std::string& variable, const Linearised& problem, std::
   return problem.motion(log).q.col(j);
 }
 
-/// Mean of the heights' factors over the logs that fit.
-Eigen::RowVectorXd mean_bumps(const Linearised& problem, const FreeCurve& curve, const std::string& variable) {
-  Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(static_cast<Index>(curve_heights));
-  double samples = 0;
+/// What nominal effects have of a variable: an offset, or dry friction that is the same everywhere; of the velocity
+/// viscous and dry friction too, of the load a gain. Values x functions.
+MatrixXd nominal_functions(const std::string& variable, const VectorXd& values, double sign_width) {
+  MatrixXd out = MatrixXd::Ones(values.size(), variable == "q" ? 1 : variable == "dq" ? 3 : 2);
+  if (out.cols() > 1) out.col(1) = values;
+  if (out.cols() > 2) out.col(2) = (values.array() / sign_width).tanh();
+  return out;
+}
+
+/// Coefficients of the nominal functions in each height's factor, by least squares over the logs that fit.
+MatrixXd nominal_part(const Linearised& problem, const FreeCurve& curve, const std::string& variable, double width) {
+  const auto heights = static_cast<Index>(curve_heights);
+  MatrixXd gram, cross;
   for (std::size_t l = 0; l < problem.logs().size(); ++l) {
     const SessionLog& entry = problem.logs()[l];
     if (entry.healthy || !entry.fits) continue;
-    const VectorXd all = values_of(variable, problem, l, curve.effect.joint);
-    const Index count = entry.log.last - entry.log.first;
-    sum += bumps(curve.effect.shape, all.segment(entry.log.first, count)).colwise().sum();
-    samples += static_cast<double>(count);
+    const VectorXd values =
+        values_of(variable, problem, l, curve.effect.joint).segment(entry.log.first, entry.log.last - entry.log.first);
+    const MatrixXd nominal = nominal_functions(variable, values, width);
+    if (gram.size() == 0) {
+      gram = MatrixXd::Zero(nominal.cols(), nominal.cols());
+      cross = MatrixXd::Zero(nominal.cols(), heights);
+    }
+    gram += nominal.transpose() * nominal;
+    cross += nominal.transpose() * bumps(curve.effect.shape, values);
   }
-  return sum / std::max(samples, 1.0);
+  return SymmetricSolver(gram).inverse() * cross;
 }
 
 /// Variance of what a curve of twelve heights can't follow: that of the residual's means over the variable's classes,
@@ -332,14 +346,16 @@ CurveResult drawn(const Models& models, const FreeCurve& curve, const std::vecto
   out.effect = curve.effect.effect;
   out.signal = variable_of(info);
   out.unit = turns ? info.shape[0].unit : info.shape[0].unit_prismatic;
-  out.friction = info.friction;
+  out.friction = info.friction && out.signal == "q";
   out.odds_nothing = curve.odds_nothing;
   out.odds_rival = curve.odds_rival;
   out.rival = curve.rival;
   out.closes = curve.closes;
   const std::vector<double>& shape = curve.effect.shape;
   const VectorXd x = VectorXd::LinSpaced(drawn_points, shape[0], shape[0] + shape[1]);
-  const MatrixXd factors = bumps(shape, x).rowwise() - mean_bumps(problem, curve, out.signal);
+  const double width = models.current.joints[curve.effect.joint].sign_width;
+  const MatrixXd factors =
+      bumps(shape, x) - nominal_functions(out.signal, x, width) * nominal_part(problem, curve, out.signal, width);
   const std::vector<double>& linear = models.current.joints[curve.effect.joint].effects[curve.id.effect].linear;
   const VectorXd y = factors * Eigen::Map<const VectorXd>(linear.data(), heights);
   const MatrixXd spread = factors * covariance.block(first, first, heights, heights) * factors.transpose();

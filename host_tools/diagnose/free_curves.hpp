@@ -29,9 +29,9 @@ struct FreeCurve {
 std::vector<FreeCurve> add_free_curves(Models& models, const Outcome& outcome, const std::vector<SessionLog>& logs,
                                        const std::vector<bool>& still);
 
-/// The curve over its interval with its deviation, as the models have it. What it shares with the offset or with plain
-/// dry friction is not its own: its mean over the logs that fit is taken off. The deviation counts what twelve
-/// heights can't follow, too.
+/// The curve over its interval with its deviation, as the models have it. What nominal effects have of the same
+/// variable (offset, dry and viscous friction, a gain) is not its own: their part is taken off, by least squares over
+/// the logs that fit. The deviation counts what twelve heights can't follow, too.
 CurveResult drawn(const Models& models, const FreeCurve& curve, const std::vector<SessionLog>& logs);
 
 }  // namespace fxdyn::diagnosis

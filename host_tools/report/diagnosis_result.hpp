@@ -66,7 +66,7 @@ struct NamedEffect {
 struct CurveResult {
   struct Point {
     double x = 0;           ///< of the variable
-    double y = 0, std = 0;  ///< [N*m | N]; the mean over the logs is the offset's, or plain dry friction's
+    double y = 0, std = 0;  ///< [N*m | N], without the nominal effects' part of it
   };
   std::string effect;                ///< position_curve, velocity_curve, load_curve, friction_over_position
   std::string signal;                ///< its variable: q, dq, load
