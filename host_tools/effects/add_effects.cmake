@@ -35,7 +35,7 @@ function(fxdyn_add_effects name)
   set(knows_types effect_roles.cpp effects.cpp evaluator.cpp)
   list(TRANSFORM knows_types PREPEND ${PROJECT_SOURCE_DIR}/host_tools/effects/)
   add_executable(${name} $<TARGET_OBJECTS:fxdyn> ${knows_types})
-  set_target_properties(${name} PROPERTIES OUTPUT_NAME fxdyn-${name} RUNTIME_OUTPUT_DIRECTORY $<TARGET_FILE_DIR:fxdyn>)
+  set_target_properties(${name} PROPERTIES UNITY_BUILD OFF OUTPUT_NAME fxdyn-${name} RUNTIME_OUTPUT_DIRECTORY $<TARGET_FILE_DIR:fxdyn>)
   target_compile_definitions(${name} PRIVATE FXDYN_EFFECTS="${list}" FXDYN_EFFECT_LIBRARY="${name}")
   get_target_property(links fxdyn LINK_LIBRARIES)
   list(REMOVE_ITEM links CLI11::CLI11)  # headers alone, and its target is not known everywhere
