@@ -21,9 +21,9 @@ struct Models {
   std::vector<std::size_t> background;  ///< joints whose healthy session has structure that no effect explains
   std::vector<EffectCandidate> held;    ///< unnamed effects that stay what the healthy session's fit gave
   std::vector<Rotor> rotors;
-  std::vector<double> curve_size{};     ///< by joint: prior deviation of a free curve's heights [N*m | N]
-  double smallest_step_s = 1;  ///< of all logs and of the drive's tick: what bounds a delay
-  Options options;             ///< thresholds of all that is done with these models
+  std::vector<double> curve_size{};  ///< by joint: prior deviation of a free curve's heights [N*m | N]
+  double smallest_step_s = 1;        ///< of all logs and of the drive's tick: what bounds a delay
+  Options options;                   ///< thresholds of all that is done with these models
 
   const IdentifiedModel& of(bool of_healthy) const { return of_healthy ? healthy : current; }
 };

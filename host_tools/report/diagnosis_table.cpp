@@ -202,8 +202,8 @@ std::string diagnosis_table(const DiagnosisResult& diagnosis) {
   if (const std::string those = words::not_borne_out(diagnosis); !those.empty())
     out += indented("the test logs disagree, the error rises", those);
   out += clamped_lines(diagnosis) + joint_rows(diagnosis.joints) + robot_lines(diagnosis) +
-         where_lines(diagnosis.joints) + curve_lines(diagnosis.joints) + undecided_lines(diagnosis) + alternative_lines(diagnosis) +
-         hidden_lines(diagnosis);
+         where_lines(diagnosis.joints) + curve_lines(diagnosis.joints) + undecided_lines(diagnosis) +
+         alternative_lines(diagnosis) + hidden_lines(diagnosis);
   if (diagnosis.evidence) out += evidence_lines(*diagnosis.evidence);
   if (!diagnosis.next_experiment.empty()) out += indented("next", diagnosis.next_experiment);
   for (const std::string& note : diagnosis.notes) out += indented("note", note);
