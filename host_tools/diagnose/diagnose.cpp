@@ -157,7 +157,7 @@ class Diagnoser {
       result.model = concluded(outcome, gate);
     }
     if (models_.has_baseline) add_notes(changed_parameters(*outcome.problem));
-    const auto curves = curves_of_the_rest(outcome, result.model);
+    const auto curves = curves_of_the_rest(outcome);
     const auto impacts = find_impacts(result.model, data_.logs, outcome.models.healthy, baseline_, options().impact);
     result.report = verdicts({result.nominal, result.model, outcome, gate, likely, deflections_, impacts, curves,
                               still_, data_.logs, test_});
@@ -203,22 +203,13 @@ class Diagnoser {
     mark_named(found.current, outcome);
     return finished(found.current);
   }
-  /// What is left without a name gets a curve, where that harms no joint of the model as it is exported. By joint.
-  std::vector<std::optional<CurveResult>> curves_of_the_rest(const Outcome& outcome, IdentifiedModel& model) const {
+  /// What is left without a name gets a curve, by joint. It says which variable, and where; the model is left as it is.
+  std::vector<std::optional<CurveResult>> curves_of_the_rest(const Outcome& outcome) const {
     std::vector<std::optional<CurveResult>> out(joints());
     Models models = outcome.models;
     for (const Finding& finding : outcome.found) effect_of(models.current, finding.id).named = true;
-    const std::vector<FreeCurve> found = add_free_curves(models, outcome, logs_, still_);
-    if (found.empty()) return out;
-    for (const FreeCurve& curve : found) out[curve.effect.joint] = drawn(models, curve, logs_);
-    Linearised problem(models, logs_, plain());
-    problem.solver().set_weights(diluted_weights(problem));
-    add_deviations(models, problem);
-    mark_named(models.current, outcome);
-    for (const FreeCurve& curve : found) effect_of(models.current, curve.id).named = false;
-    IdentifiedModel with = finished(models.current);
-    if (is_worse_anywhere(model, with)) return std::vector<std::optional<CurveResult>>(joints());
-    model = std::move(with);
+    for (const FreeCurve& curve : add_free_curves(models, outcome, logs_, still_))
+      out[curve.effect.joint] = drawn(models, curve, logs_);
     return out;
   }
   static EffectFit& effect_of(IdentifiedModel& model, const EffectId& id) {

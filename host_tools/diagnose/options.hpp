@@ -152,7 +152,8 @@ struct GateOptions {
 
 /// Free curves of what has no name.
 struct CurveOptions {
-  /// times the RMS of what is left; deviation of a curve's heights beforehand; theory: rows by the hundred outweigh it, and what they do not decide stays small
+  /// times the RMS of what is left; deviation of a curve's heights beforehand; theory: rows by the hundred outweigh it,
+  /// and what they don't decide stays small
   double height = 1;
   /// share of the error's power on what judges; a curve takes away; hand: for less twelve numbers are too many
   double least_share = 0.1;

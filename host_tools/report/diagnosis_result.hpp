@@ -97,7 +97,7 @@ struct JointDiagnosis {
   /// Sets of which one effect is there for sure, and the data don't tell which. The model has the first, without a
   /// name.
   std::vector<std::vector<std::string>> undecided{};
-  std::optional<CurveResult> curve{};  ///< of what is left, in the model without a name
+  std::optional<CurveResult> curve{};  ///< of what is left; not in the model
   std::vector<std::string> not_identifiable{};
   std::optional<double> state_p{}, time_p{};  ///< lack of fit
 };
