@@ -28,15 +28,15 @@ build() {
   cmake --build --preset "$1" ${2:+--target "$2"}
 }
 
-# sanitize TARGET FOLDER...: what it builds of the unit tests in these folders of tests/, with sanitizers.
+# sanitize TARGET LABELS FOLDER...: what it builds of the unit tests in these folders of tests/, with sanitizers. LABELS: a|b
 sanitize() {
   build host-asan "$1"
   local folder
-  for folder in "${@:2}"; do
+  for folder in "${@:3}"; do
     step "unit tests with sanitizers: $folder"
     # Not the command line's tests from end to end, whole projects, or the page in a browser: minutes each here, of code that
     # the others run. Nor what does not compile: its messages are of the other compiler. Nor hundreds of draws of one test, nor times.
-    ctest --test-dir "build/host-asan/tests/$folder" --parallel "$jobs" --output-on-failure --no-tests=error -L '^unit$' \
+    ctest --test-dir "build/host-asan/tests/$folder" --parallel "$jobs" --output-on-failure --no-tests=error -L "^($2)\$" \
       -E '_NOT_BUILT|_cli$|^cli$|^report_browser$|^findings_short$|^must_not_compile|^layers_against$|Seeds$|Seconds$|EveryParameterChangesATorque$'
   done
 }
@@ -58,7 +58,7 @@ if [[ " $* " == *" findings "* ]]; then
   set -- "${others[@]}"
 fi
 if [[ " $* " == *" sanitizers "* ]]; then
-  sanitize unit_tests .
+  sanitize unit_tests "unit|exposed" .
   mapfile -t others < <(without sanitizers "$@")
   [ ${#others[@]} -gt 0 ] || exit 0
   set -- "${others[@]}"
@@ -77,5 +77,5 @@ ctest --test-dir build/host --parallel "$jobs" --output-on-failure --no-tests=er
 [ $# -eq 0 ] || exit 0
 
 mapfile -t exposed <tests/exposed.txt
-sanitize exposed_unit_tests "${exposed[@]}"
+sanitize exposed_unit_tests exposed "${exposed[@]}"
 printf '\ndone in %d s\n' "$SECONDS"

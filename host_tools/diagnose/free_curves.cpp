@@ -159,6 +159,11 @@ EffectId put(Models& models, const EffectCandidate& effect) {
   return name(models, group, VectorXd::Zero(static_cast<Index>(curve_heights)));
 }
 
+bool is_flat(const Models& models, const FreeCurve& curve) {
+  const std::vector<double>& heights = models.current.joints[curve.id.joint].effects[curve.id.effect].linear;
+  return std::all_of(heights.begin(), heights.end(), [](double h) { return h == 0 || !std::isfinite(h); });
+}
+
 /// The heights' factors at values of the variable, values x heights.
 MatrixXd bumps(const std::vector<double>& shape, const VectorXd& values) {
   MatrixXd out = MatrixXd::Zero(values.size(), static_cast<Index>(curve_heights));
@@ -256,39 +261,40 @@ double misfit(const Linearised& problem, const FreeCurve& curve, const CurveResu
 }
 
 /// "friction rises by 0.8 N*m between 0.85 and 1.05 rad": the largest way off the curve's median, and where it is more
-/// than half of that; over more than half of the interval it is no place.
+/// than half of that. A curve that goes as far to the other side, by half at least, changes over all of its interval.
 std::string sentence_of(const CurveResult& curve, const Robot& robot, std::size_t joint,
                         const std::vector<SessionLog>& logs) {
   const std::vector<CurveResult::Point>& p = curve.points;
   std::vector<double> sorted;
   for (const CurveResult::Point& point : p) sorted.push_back(point.y);
-  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2), sorted.end());
-  const double median = sorted[sorted.size() / 2];
-  std::size_t peak = 0;
-  for (std::size_t i = 0; i < p.size(); ++i) {
-    if (std::fabs(p[i].y - median) > std::fabs(p[peak].y - median)) peak = i;
-  }
-  const double height = p[peak].y - median;
-  std::size_t from = peak, to = peak;
-  const auto high = [&](std::size_t i) { return (p[i].y - median) / height > 0.5; };
-  while (from > 0 && high(from - 1)) --from;
-  while (to + 1 < p.size() && high(to + 1)) ++to;
+  std::sort(sorted.begin(), sorted.end());
+  const double median = sorted[sorted.size() / 2], up = sorted.back() - median, down = median - sorted.front();
   const std::string unit = robot.joints[joint].torque_unit();
   const std::string what = curve.friction ? "friction" : "torque";
+  if (2 * std::min(up, down) > std::max(up, down)) {
+    return fmt::format("{} changes by {:.2g} {} between {:.2f} and {:.2f} {}", what, up + down, unit, p.front().x,
+                       p.back().x, curve.unit);
+  }
+  const double height = up > down ? up : -down;
+  const auto share = [&](std::size_t i) { return (p[i].y - median) / height; };
+  std::size_t peak = 0;
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    if (share(i) > share(peak)) peak = i;
+  }
+  std::size_t from = peak, to = peak;
+  while (from > 0 && share(from - 1) > 0.5) --from;
+  while (to + 1 < p.size() && share(to + 1) > 0.5) ++to;
+  if (from == to) {  // the curve is known at points only
+    from -= from > 0 ? 1 : 0;
+    to += to + 1 < p.size() ? 1 : 0;
+  }
   std::vector<const ProcessedLog*> shown;
   for (const SessionLog& log : logs) shown.push_back(&log.log);
   GapRegion region;
   region.signal = curve.signal;
   region.from = p[from].x;
   region.to = p[to].x;
-  if (2 * (to - from) <= p.size())
-    return fmt::format("{} {} by {:.2g} {} {}", what, height > 0 ? "rises" : "falls", std::fabs(height), unit,
-                       words_of(region, robot, joint, shown));
-  const auto [least, most] = std::minmax_element(
-      p.begin(), p.end(), [](const CurveResult::Point& a, const CurveResult::Point& b) { return a.y < b.y; });
-  region.from = p.front().x;
-  region.to = p.back().x;
-  return fmt::format("{} changes by {:.2g} {} {}", what, most->y - least->y, unit,
+  return fmt::format("{} {} by {:.2g} {} {}", what, height > 0 ? "rises" : "falls", std::fabs(height), unit,
                      words_of(region, robot, joint, shown));
 }
 
@@ -315,6 +321,8 @@ std::vector<FreeCurve> add_free_curves(Models& models, const Outcome& outcome, c
     models.curve_size = size;
     for (FreeCurve& curve : found) curve.id = put(models, curve.effect);
     refit(models, logs, white(n), 4);
+    // A fit that took no step leaves heights of 0: then there is nothing to draw.
+    if (std::erase_if(found, [&](const FreeCurve& curve) { return is_flat(models, curve); }) > 0) continue;
     const std::vector<bool> harmed = harmed_joints(models.options.gate, before.current, models.current, logs);
     const bool any = std::find(harmed.begin(), harmed.end(), true) != harmed.end();
     if (!any) return found;

@@ -343,7 +343,7 @@ class ReportWriter {
       const Share share = left_of(conclusion_.gate.held, conclusion_.gate.gap[k], k);
       out.left = GapLeft{share.share, share.low, share.high};
     }
-    out.curve = conclusion_.curves[j];
+    if (left) out.curve = conclusion_.curves[j];
     out.not_identifiable = conclusion_.outcome.not_identifiable[j];
     out.state_p = conclusion_.outcome.lack[j].state_p;
     out.time_p = conclusion_.outcome.lack[j].time_p;

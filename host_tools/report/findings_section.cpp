@@ -142,13 +142,17 @@ std::string findings_section(const ReportInput& input, const nlohmann::json&) {
   for (std::size_t i = 0; i < curved.size(); ++i)
     shown.push_back(figure(pictures[all.size() + i], fmt::format("{}: no name, but a curve: {}", curved[i].joint,
                                                                  words::curve(*curved[i].curve))));
-  return section("What was found, in pictures") +
-         paragraph(
-             "Left: what the model leaves when this effect is taken out and nothing is fitted again, and the effect's "
-             "own torque. Right: what is left with it. Thin lines are samples, thick ones their means. The signal is "
-             "the one that tells most of the effect's torque. The band counts each parameter's standard deviation "
-             "alone.") +
-         figures(shown);
+  std::string text = section("What was found, in pictures");
+  if (!all.empty()) {
+    text += paragraph(
+        "Left: what the model leaves when this effect is taken out and nothing is fitted again, and the effect's "
+        "own torque. Right: what is left with it. Thin lines are samples, thick ones their means. The signal is "
+        "the one that tells most of the effect's torque. The band counts each parameter's standard deviation "
+        "alone.");
+  }
+  if (!curved.empty())
+    text += paragraph("A curve is what one variable explains of what is left. The model does not have it.");
+  return text + figures(shown);
 }
 
 }  // namespace fxdyn

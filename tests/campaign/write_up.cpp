@@ -191,7 +191,7 @@ std::string ambiguous_cases(const std::vector<json>& results) {
 /// Where what has no name sits, and clean joints of which no place is told.
 std::vector<Figure> place_figures(const std::vector<json>& results, const Filter& outside) {
   const Filter known = [=](const json& r) { return outside(r) && first_effect(r)->contains("place"); };
-  const Filter curved = [=](const json& r) { return outside(r) && r.at("score").contains("curve_right"); };
+  const Filter curved = [=](const json& r) { return outside(r) && first_effect(r)->contains("curve"); };
   Rate quiet;
   for (const json& r : results) {
     if (!done(r) || !r.at("score").contains("joints_placed")) continue;
