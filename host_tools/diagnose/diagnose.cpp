@@ -161,6 +161,7 @@ class Diagnoser {
     const auto impacts = find_impacts(result.model, data_.logs, outcome.models.healthy, baseline_, options().impact);
     result.report = verdicts({result.nominal, result.model, outcome, gate, likely, deflections_, impacts, curves,
                               still_, data_.logs, test_});
+    take_curves(outcome, result);
     for (std::size_t j = 0; j < joints(); ++j) {
       // What stands still has no friction that these logs show.
       if (!still_[j]) continue;
@@ -203,14 +204,45 @@ class Diagnoser {
     mark_named(found.current, outcome);
     return finished(found.current);
   }
-  /// What is left without a name gets a curve, by joint. It says which variable, and where; the model is left as it is.
+  /// What is left without a name gets a curve, by joint. It says which variable, and where.
   std::vector<std::optional<CurveResult>> curves_of_the_rest(const Outcome& outcome) const {
     std::vector<std::optional<CurveResult>> out(joints());
-    Models models = outcome.models;
-    for (const Finding& finding : outcome.found) effect_of(models.current, finding.id).named = true;
+    Models models = with_findings(outcome);
     for (const FreeCurve& curve : add_free_curves(models, outcome, logs_, still_))
       out[curve.effect.joint] = drawn(models, curve, logs_);
     return out;
+  }
+  /// The model has the curves that are told of, where validate logs confirm each: beyond the motion that fitted it, a
+  /// curve is a guess.
+  void take_curves(const Outcome& outcome, Diagnosis& result) const {
+    std::vector<JointDiagnosis>& told = result.report.joints;
+    std::vector<bool> without = still_;
+    for (std::size_t j = 0; j < joints(); ++j) without[j] = without[j] || !told[j].curve;
+    const VectorXd before = plain_error(result.model, logs_);
+    if (std::find(without.begin(), without.end(), false) == without.end() || before.sum() == 0) return;
+    Models models = with_findings(outcome);
+    const std::vector<FreeCurve> curves = add_free_curves(models, outcome, logs_, without);
+    if (curves.empty()) return;
+    Linearised problem(models, logs_, plain());
+    problem.solver().set_weights(diluted_weights(problem));
+    add_deviations(models, problem);
+    mark_named(models.current, outcome);
+    for (const FreeCurve& curve : curves) effect_of(models.current, curve.id).named = false;
+    IdentifiedModel with = finished(models.current);
+    const VectorXd after = plain_error(with, logs_);
+    const auto falls = [&](const FreeCurve& curve) {
+      const auto j = static_cast<Index>(curve.effect.joint);
+      return after[j] < before[j];
+    };
+    if (is_worse_anywhere(result.model, with) || !std::all_of(curves.begin(), curves.end(), falls)) return;
+    result.model = std::move(with);
+    for (const FreeCurve& curve : curves) told[curve.effect.joint].curve->in_model = true;
+  }
+  /// With what is likely only as what is established.
+  static Models with_findings(const Outcome& outcome) {
+    Models models = outcome.models;
+    for (const Finding& finding : outcome.found) effect_of(models.current, finding.id).named = true;
+    return models;
   }
   static EffectFit& effect_of(IdentifiedModel& model, const EffectId& id) {
     return id.body ? model.body[id.effect] : model.joints[id.joint].effects[id.effect];

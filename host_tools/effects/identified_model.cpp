@@ -76,10 +76,13 @@ json effect_json(const EffectFit& fit, const JointFit& joint, bool prismatic) {
     parameters.push_back({{"name", p.name}, {"value", p.value}, {"unit", p.unit}});
     if (p.std) parameters.back()["std"] = *p.std;
   }
+  const EffectInfo& info = *find_effect(fit.effect);
   return {{"effect", fit.effect},
-          {"origin", fit.named ? "named" : "nominal"},
+          {"origin", fit.named    ? "named"
+                     : info.curve ? "curve"
+                                  : "nominal"},
           {"side", effects_side},
-          {"equation", find_effect(fit.effect)->equation},
+          {"equation", info.equation},
           {"parameters", parameters}};
 }
 

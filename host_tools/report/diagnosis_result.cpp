@@ -131,6 +131,7 @@ json to_json(const std::optional<CurveResult>& curve) {
           {"log10_odds_rival", or_null(curve->odds_rival)},
           {"rival", curve->rival.empty() ? json(nullptr) : json(curve->rival)},
           {"closes", curve->closes},
+          {"in_model", curve->in_model},
           {"x", x},
           {"y", y},
           {"std", std}};
@@ -148,6 +149,7 @@ std::optional<CurveResult> curve_of(const json& file) {
   out.odds_rival = optional_of(file.at("log10_odds_rival"));
   if (file.at("rival").is_string()) out.rival = file.at("rival");
   out.closes = number_of(file.at("closes"));
+  out.in_model = file.at("in_model");
   for (std::size_t i = 0; i < file.at("x").size(); ++i)
     out.points.push_back(
         {number_of(file.at("x").at(i)), number_of(file.at("y").at(i)), number_of(file.at("std").at(i))});

@@ -77,6 +77,7 @@ struct CurveResult {
   std::optional<double> odds_rival;  ///< .. against the best curve of another variable; none: there is none
   std::string rival;
   double closes = 0;  ///< share of the error's power, on data that did not fit it
+  bool in_model = false;
   std::vector<Point> points;
 };
 
@@ -97,7 +98,7 @@ struct JointDiagnosis {
   /// Sets of which one effect is there for sure, and the data don't tell which. The model has the first, without a
   /// name.
   std::vector<std::vector<std::string>> undecided{};
-  std::optional<CurveResult> curve{};  ///< of what is left; not in the model
+  std::optional<CurveResult> curve{};  ///< of what is left
   std::vector<std::string> not_identifiable{};
   std::optional<double> state_p{}, time_p{};  ///< lack of fit
 };

@@ -41,8 +41,8 @@ std::string curve(const CurveResult& of) {
   constexpr double told_apart = 3;  // log10 odds, as for names
   const bool open = is_known(of.odds_rival) && *of.odds_rival < told_apart;
   const std::string which = open ? fmt::format("{} or {}", of.effect, of.rival) : of.effect;
-  return fmt::format("{} ({}, 10^{:.0f} to 1 against nothing): closes {} of the error", of.sentence, which,
-                     of.odds_nothing, share(of.closes));
+  return fmt::format("{} ({}, 10^{:.0f} to 1 against nothing): closes {} of the error{}", of.sentence, which,
+                     of.odds_nothing, share(of.closes), of.in_model ? ", in the model" : "");
 }
 
 std::string either(const std::vector<std::string>& names) { return fmt::format("{}", fmt::join(names, " or ")); }

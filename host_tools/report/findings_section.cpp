@@ -150,8 +150,7 @@ std::string findings_section(const ReportInput& input, const nlohmann::json&) {
         "the one that tells most of the effect's torque. The band counts each parameter's standard deviation "
         "alone.");
   }
-  if (!curved.empty())
-    text += paragraph("A curve is what one variable explains of what is left. The model does not have it.");
+  if (!curved.empty()) text += paragraph("A curve is what one variable explains of what is left.");
   return text + figures(shown);
 }
 

@@ -62,6 +62,8 @@ KeptEffects::KeptEffects(IdentifiedModel diagnosed, const std::vector<ProcessedL
 bool KeptEffects::is_kept(std::size_t joint, const EffectFit& fit) const {
   const EffectInfo& info = *find_effect(fit.effect);
   if (info.in_base && rotor_is_absorbed_[joint]) return true;
+  // Equal heights are an offset or dry friction: a fit without a prior can't tell them apart.
+  if (info.curve) return true;
   // What the healthy session had of an effect that grew: today's logs show the sum only.
   const auto& effects = diagnosed_.joints[joint].effects;
   const bool grew = !fit.named && std::any_of(effects.begin(), effects.end(), [&](const EffectFit& other) {

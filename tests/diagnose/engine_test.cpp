@@ -169,5 +169,38 @@ TEST(Diagnosis, DriftRunsOnThroughTheSession) {
   EXPECT_NEAR(parameter(drift, "coulomb"), -0.9, 0.3);
 }
 
+/// A worn stretch: no effect of the catalogue has its form.
+void tight_spot(Log& log) {
+  constexpr Eigen::Index across = 5;  // samples either side of a velocity
+  for (Eigen::Index k = across; k + across < log.q.rows(); ++k) {
+    const double step = log.q(k + across, 1) - log.q(k - across, 1), place = (log.q(k, 1) - 0.2) / 0.15;
+    log.tau(k, 1) += 1.2 * std::exp(-place * place) * std::tanh(step / 2e-4);
+  }
+}
+
+TEST(Diagnosis, ACurveIsInTheModelWhereLogsThatDidNotFitItConfirmIt) {
+  const std::filesystem::path out = test::diagnose_sessions("spot", {.baseline = false, .tamper = tight_spot});
+  const json joint = json::parse(read_file(out / "diagnosis.json")).at("joints").at(1);
+  ASSERT_TRUE(joint.at("curve").is_object()) << joint.dump(1);
+  EXPECT_EQ(joint.at("curve").at("effect"), "friction_over_position");
+  EXPECT_TRUE(joint.at("curve").at("in_model"));
+  const IdentifiedModel model = read_model(out / "model.json");
+  const EffectFit* curve = model.joints[1].find("friction_over_position");
+  ASSERT_NE(curve, nullptr);
+  EXPECT_FALSE(curve->named);
+  // What is fitted with it has the offset and the dry friction: the heights stay about zero.
+  for (const double height : curve->linear) EXPECT_LT(std::fabs(height), 3);
+}
+
+TEST(Diagnosis, WithoutSuchLogsACurveIsAnAnswerOnly) {
+  if (test::sanitized) GTEST_SKIP() << "other cases run the same code";
+  const std::filesystem::path out =
+      test::diagnose_sessions("spot_alone", {.baseline = false, .validate = false, .tamper = tight_spot});
+  const json joint = json::parse(read_file(out / "diagnosis.json")).at("joints").at(1);
+  ASSERT_TRUE(joint.at("curve").is_object()) << joint.dump(1);
+  EXPECT_FALSE(joint.at("curve").at("in_model"));
+  EXPECT_EQ(read_model(out / "model.json").joints[1].find("friction_over_position"), nullptr);
+}
+
 }  // namespace
 }  // namespace fxdyn
