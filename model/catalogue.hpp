@@ -3,6 +3,7 @@
 #include "model/effects/asymmetric_friction.hpp"
 #include "model/effects/backlash.hpp"
 #include "model/effects/coulomb.hpp"
+#include "model/effects/cross_position.hpp"
 #include "model/effects/delay.hpp"
 #include "model/effects/eccentricity.hpp"
 #include "model/effects/elasticity.hpp"
@@ -47,12 +48,12 @@ using UserEffects = EffectList<>;
 namespace fxdyn {
 
 /// The one list of joint effects: simulator, identifier, exporter and diagnoser walk it.
-using Catalogue =
-    Joined<EffectList<Viscous, Coulomb, Offset, RotorInertia, Stribeck, Presliding, AsymmetricFriction,
-                      ViscousQuadratic, ViscousCubic, LoadFriction, TorqueGain, Ripple, Spring, GravityCompensator,
-                      FrictionDrift, Saturation, JointCoupling, Delay, Elasticity, Backlash, Eccentricity,
-                      MotorCoupling, Lugre, MaxwellSlip, PositionCurve, VelocityCurve, LoadCurve, FrictionOverPosition>,
-           UserEffects>;
+using Catalogue = Joined<
+    EffectList<Viscous, Coulomb, Offset, RotorInertia, Stribeck, Presliding, AsymmetricFriction, ViscousQuadratic,
+               ViscousCubic, LoadFriction, TorqueGain, Ripple, Spring, GravityCompensator, FrictionDrift, Saturation,
+               JointCoupling, Delay, Elasticity, Backlash, Eccentricity, MotorCoupling, Lugre, MaxwellSlip,
+               PositionCurve, VelocityCurve, LoadCurve, FrictionOverPosition, CrossPosition>,
+    UserEffects>;
 
 /// Effects on the rigid body itself: they change its parameters and have no basis.
 using BodyEffects = EffectList<Payload, GravityTilt>;

@@ -44,7 +44,9 @@ struct Tried {
 class Trials {
  public:
   Trials(const Linearised& problem, std::size_t joint, const std::vector<Index>& columns, double prior)
-      : problem_(problem), joint_(joint), columns_(columns), prior_(prior), scales_(scales_of(problem, joint)) {}
+      : problem_(problem), joint_(joint), columns_(columns), prior_(prior) {
+    for (std::size_t j = 0; j < problem.joints(); ++j) scales_.push_back(scales_of(problem, j));
+  }
 
   /// The best curve of each variable, the best first. Fine parts are tried of the two best variables only.
   std::vector<Tried> best_of_each() {
@@ -70,12 +72,23 @@ class Trials {
 
  private:
   static bool less(const Tried& a, const Tried& b) { return a.left < b.left; }
-  /// Knots over each of so many parts of the motion, and over those between.
+  /// Of a curve over another joint's position one for each of them.
   void add(const EffectInfo& info, int parts, std::vector<EffectCandidate>& to) const {
-    const double from = info.shape[0].values.tried(scales_)[0], span = info.shape[1].values.tried(scales_)[0];
+    if (!info.needs_peers) return add(info, scales_[joint_], {}, parts, to);
+    for (std::size_t other = 0; other < scales_.size(); ++other) {
+      if (other != joint_) add(info, scales_[other], {static_cast<double>(other + 1)}, parts, to);
+    }
+  }
+  /// Knots over each of so many parts of the motion, and over those between.
+  void add(const EffectInfo& info, const MotionScales& scales, const std::vector<double>& first, int parts,
+           std::vector<EffectCandidate>& to) const {
+    const std::size_t i = first.size();
+    const double from = info.shape[i].values.tried(scales)[0], span = info.shape[i + 1].values.tried(scales)[0];
     const double length = span / parts;
-    for (int half = 0; length >= info.shape[1].lower && half <= 2 * (parts - 1); ++half)
-      to.push_back({std::string(info.name), joint_, {from + half * length / 2, length}});
+    for (int half = 0; length >= info.shape[i + 1].lower && half <= 2 * (parts - 1); ++half) {
+      to.push_back({std::string(info.name), joint_, first});
+      to.back().shape.insert(to.back().shape.end(), {from + half * length / 2, length});
+    }
   }
   std::vector<Tried> best(const std::vector<EffectCandidate>& all) {
     std::vector<double> left(all.size());
@@ -100,26 +113,21 @@ class Trials {
   std::size_t joint_;
   const std::vector<Index>& columns_;
   double prior_;
-  MotionScales scales_;
+  std::vector<MotionScales> scales_;  ///< by joint
   std::size_t count_ = 0;
 };
 
-/// What functions of another joint's position, or of the others' velocities, leave at best: then it is none of this
-/// joint's variables.
-double left_by_others(const Linearised& problem, std::size_t joint, const std::vector<Index>& columns, double prior) {
-  double least = 1e300;
-  if (problem.joints() < 2) return least;
-  const std::vector<Family> all = families(problem.joints());
-  const MatrixXd functions = features(problem, joint);
-  for (std::size_t f = 0; f < problem.joints(); ++f) {  // theirs come first
-    MatrixXd of_family = functions.middleCols(all[f].first, all[f].count);
-    if (const Background* background = problem.background(joint)) of_family = background->eliminate(of_family);
-    double left = 0;
-    for (const Fold& fold : problem.blocks().folds)
-      left += judged_with_curves(problem, joint, columns, of_family, prior, fold);
-    least = std::min(least, left);
-  }
-  return least;
+/// What functions of the other joints' velocities leave: a variable of which there is no curve.
+double left_by_velocities_of_others(const Linearised& problem, std::size_t joint, const std::vector<Index>& columns,
+                                    double prior) {
+  if (problem.joints() < 2) return 1e300;
+  const Family family = families(problem.joints())[problem.joints() - 1];  // after each other joint's position
+  MatrixXd functions = features(problem, joint).middleCols(family.first, family.count);
+  if (const Background* background = problem.background(joint)) functions = background->eliminate(functions);
+  double left = 0;
+  for (const Fold& fold : problem.blocks().folds)
+    left += judged_with_curves(problem, joint, columns, functions, prior, fold);
+  return left;
 }
 
 /// The curve that explains most at a joint, where it is sure and worth its numbers.
@@ -136,7 +144,7 @@ std::optional<FreeCurve> best_at(const Linearised& problem, std::size_t joint, d
   const double prior = 1 / (size * size);
   Trials trials(problem, joint, columns, prior);
   const std::vector<Tried> tried = trials.best_of_each();
-  if (tried.empty() || left_by_others(problem, joint, columns, prior) < tried[0].left) return {};
+  if (tried.empty() || left_by_velocities_of_others(problem, joint, columns, prior) < tried[0].left) return {};
   const auto odds = [&](double without, double with) {
     return rows * std::log(without / std::max(with, 1e-300)) / variances_per_decade;
   };
@@ -164,12 +172,20 @@ bool is_flat(const Models& models, const FreeCurve& curve) {
   return std::all_of(heights.begin(), heights.end(), [](double h) { return h == 0 || !std::isfinite(h); });
 }
 
+/// Where a curve's knots are, as its shape ends.
+struct Knots {
+  explicit Knots(const EffectCandidate& of) : from(of.shape[of.shape.size() - 2]), span(of.shape.back()) {}
+  double place(double x) const { return (x - from) / span; }  ///< 0 .. 1 between them
+
+  double from, span;
+};
+
 /// The heights' factors at values of the variable, values x heights.
-MatrixXd bumps(const std::vector<double>& shape, const VectorXd& values) {
+MatrixXd bumps(const Knots& knots, const VectorXd& values) {
   MatrixXd out = MatrixXd::Zero(values.size(), static_cast<Index>(curve_heights));
   const auto pieces = static_cast<double>(curve_pieces);
   for (Index i = 0; i < values.size(); ++i) {
-    const double x = std::clamp(pieces * (values[i] - shape[0]) / shape[1], 0.0, pieces);
+    const double x = std::clamp(pieces * knots.place(values[i]), 0.0, pieces);
     Curve<Real>::at(x).each(
         [&](auto, std::size_t height, double weight) { out(i, static_cast<Index>(height)) = weight; });
   }
@@ -178,7 +194,7 @@ MatrixXd bumps(const std::vector<double>& shape, const VectorXd& values) {
 
 /// What a curve's variable is, as in GapRegion.
 std::string variable_of(const EffectInfo& info) {
-  switch (info.shape[0].quantity) {
+  switch (info.shape[info.shape.size() - 2].quantity) {
     case Quantity::velocity:
       return "dq";
     case Quantity::torque:
@@ -186,6 +202,11 @@ std::string variable_of(const EffectInfo& info) {
     default:
       return "q";
   }
+}
+
+/// The joint that a curve's variable is of.
+std::size_t joint_of_variable(const EffectCandidate& effect) {
+  return find_effect(effect.effect)->needs_peers ? static_cast<std::size_t>(effect.shape[0]) - 1 : effect.joint;
 }
 
 VectorXd values_of(const std::string& variable, const Linearised& problem, std::size_t log, std::size_t joint) {
@@ -211,15 +232,15 @@ MatrixXd nominal_part(const Linearised& problem, const FreeCurve& curve, const s
   for (std::size_t l = 0; l < problem.logs().size(); ++l) {
     const SessionLog& entry = problem.logs()[l];
     if (entry.healthy || !entry.fits) continue;
-    const VectorXd values =
-        values_of(variable, problem, l, curve.effect.joint).segment(entry.log.first, entry.log.last - entry.log.first);
+    const VectorXd values = values_of(variable, problem, l, joint_of_variable(curve.effect))
+                                .segment(entry.log.first, entry.log.last - entry.log.first);
     const MatrixXd nominal = nominal_functions(variable, values, width);
     if (gram.size() == 0) {
       gram = MatrixXd::Zero(nominal.cols(), nominal.cols());
       cross = MatrixXd::Zero(nominal.cols(), heights);
     }
     gram += nominal.transpose() * nominal;
-    cross += nominal.transpose() * bumps(curve.effect.shape, values);
+    cross += nominal.transpose() * bumps(Knots(curve.effect), values);
   }
   return SymmetricSolver(gram).inverse() * cross;
 }
@@ -228,17 +249,17 @@ MatrixXd nominal_part(const Linearised& problem, const FreeCurve& curve, const s
 /// less what noise makes of them.
 /// @param residual of the joint, all rows
 double misfit(const Linearised& problem, const FreeCurve& curve, const CurveResult& of, const VectorXd& residual) {
-  const std::vector<double>& shape = curve.effect.shape;
+  const Knots knots(curve.effect);
   VectorXd sum = VectorXd::Zero(drawn_points), count = VectorXd::Zero(drawn_points);
   double square = 0;
   for (std::size_t l = 0; l < problem.logs().size(); ++l) {
     const SessionLog& entry = problem.logs()[l];
     if (entry.healthy || !entry.fits) continue;
     const Block& block = problem.blocks().of_log[l];
-    const VectorXd x = entry.log.decimate(values_of(of.signal, problem, l, curve.effect.joint));
+    const VectorXd x = entry.log.decimate(values_of(of.signal, problem, l, joint_of_variable(curve.effect)));
     const VectorXd dq = entry.log.decimate(values_of("dq", problem, l, curve.effect.joint));
     for (Index row = 0; row < block.count; ++row) {
-      const double place = (x[row] - shape[0]) / shape[1];
+      const double place = knots.place(x[row]);
       if (place < 0 || place > 1) continue;
       const double e = residual[block.first + row] * (of.friction && dq[row] < 0 ? -1 : 1);
       const auto bin = static_cast<Index>(std::lround(place * static_cast<double>(drawn_points - 1)));
@@ -272,8 +293,8 @@ std::string sentence_of(const CurveResult& curve, const Robot& robot, std::size_
   const std::string unit = robot.joints[joint].torque_unit();
   const std::string what = curve.friction ? "friction" : "torque";
   if (2 * std::min(up, down) > std::max(up, down)) {
-    return fmt::format("{} changes by {:.2g} {} between {:.2f} and {:.2f} {}", what, up + down, unit, p.front().x,
-                       p.back().x, curve.unit);
+    return fmt::format("{} changes by {:.2g} {} between {:.2f} and {:.2f} {}{}", what, up + down, unit, p.front().x,
+                       p.back().x, curve.unit, curve.joint > 0 ? fmt::format(" of joint {}", curve.joint) : "");
   }
   const double height = up > down ? up : -down;
   const auto share = [&](std::size_t i) { return (p[i].y - median) / height; };
@@ -292,6 +313,7 @@ std::string sentence_of(const CurveResult& curve, const Robot& robot, std::size_
   for (const SessionLog& log : logs) shown.push_back(&log.log);
   GapRegion region;
   region.signal = curve.signal;
+  region.joint = curve.joint;
   region.from = p[from].x;
   region.to = p[to].x;
   return fmt::format("{} {} by {:.2g} {} {}", what, height > 0 ? "rises" : "falls", std::fabs(height), unit,
@@ -340,7 +362,8 @@ std::vector<FreeCurve> add_free_curves(Models& models, const Outcome& outcome, c
 
 CurveResult drawn(const Models& models, const FreeCurve& curve, const std::vector<SessionLog>& logs) {
   const EffectInfo& info = *find_effect(curve.effect.effect);
-  const bool turns = models.current.robot.joints[curve.effect.joint].type == JointType::revolute;
+  const std::size_t of_joint = joint_of_variable(curve.effect);
+  const bool turns = models.current.robot.joints[of_joint].type == JointType::revolute;
   Linearised problem(models, logs, white(models.current.joints.size()));
   problem.solver().set_weights(diluted_weights(problem));
   const LinearFit fit = problem.solver().solve(problem.unknown_columns());
@@ -353,17 +376,19 @@ CurveResult drawn(const Models& models, const FreeCurve& curve, const std::vecto
   CurveResult out;
   out.effect = curve.effect.effect;
   out.signal = variable_of(info);
-  out.unit = turns ? info.shape[0].unit : info.shape[0].unit_prismatic;
+  const ParameterInfo& from = info.needs_peers ? find_effect("position_curve")->shape[0] : info.shape[0];
+  out.unit = turns ? from.unit : from.unit_prismatic;
+  if (of_joint != curve.effect.joint) out.joint = of_joint + 1;
   out.friction = info.friction && out.signal == "q";
   out.odds_nothing = curve.odds_nothing;
   out.odds_rival = curve.odds_rival;
   out.rival = curve.rival;
   out.closes = curve.closes;
-  const std::vector<double>& shape = curve.effect.shape;
-  const VectorXd x = VectorXd::LinSpaced(drawn_points, shape[0], shape[0] + shape[1]);
+  const Knots knots(curve.effect);
+  const VectorXd x = VectorXd::LinSpaced(drawn_points, knots.from, knots.from + knots.span);
   const double width = models.current.joints[curve.effect.joint].sign_width;
   const MatrixXd factors =
-      bumps(shape, x) - nominal_functions(out.signal, x, width) * nominal_part(problem, curve, out.signal, width);
+      bumps(knots, x) - nominal_functions(out.signal, x, width) * nominal_part(problem, curve, out.signal, width);
   const std::vector<double>& linear = models.current.joints[curve.effect.joint].effects[curve.id.effect].linear;
   const VectorXd y = factors * Eigen::Map<const VectorXd>(linear.data(), heights);
   const MatrixXd spread = factors * covariance.block(first, first, heights, heights) * factors.transpose();

@@ -20,11 +20,10 @@ struct FreeCurve {
 };
 
 /// Where structure is left at a joint, the free curve that explains most of it: of every variable (the own position,
-/// velocity, load; friction over the position), with knots over the whole motion and over halves, quarters and eighths
-/// of it, each judged by a fit of the others' folds with all that the model has. Rows count as diluted_weights() says;
-/// the number of curves tried is taken off the odds. None
-/// where functions of another joint's motion explain more. Fits all of them together, and gives up those that harm a
-/// joint.
+/// velocity, load; friction over the position; another joint's position), with knots over the whole motion and over
+/// halves, quarters and eighths of it, each judged by a fit of the others' folds with all that the model has. Rows
+/// count as diluted_weights() says; the number of curves tried is taken off the odds. None where functions of the other
+/// joints' velocities explain more. Fits all of them together, and gives up those that harm a joint.
 /// @param models those of the outcome; the curves are added, as named effects
 std::vector<FreeCurve> add_free_curves(Models& models, const Outcome& outcome, const std::vector<SessionLog>& logs,
                                        const std::vector<bool>& still);

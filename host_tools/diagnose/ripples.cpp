@@ -4,6 +4,7 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
+#include <utility>
 
 #include "host_tools/diagnose/dictionary.hpp"
 #include "host_tools/effects/effects.hpp"
@@ -17,7 +18,9 @@ using Eigen::VectorXd;
 /// A residual over the angle of its joint.
 struct OverAngle {
   std::vector<double> q, g;   ///< angle [rad | m] and g there
+  std::vector<double> at;     ///< how fast the joint is there [rad/s | m/s]; infinite where a log begins
   std::vector<double> speed;  ///< of every row [rad/s | m/s]
+  double cutoff_hz = 0;       ///< of the torque
 };
 
 /// The adjoint of whitening on the rows of one log.
@@ -31,7 +34,7 @@ VectorXd coloured_back(const VectorXd& e, const VectorXd& a) {
 OverAngle over_angle(const Linearised& problem, std::size_t joint, const VectorXd& residual) {
   OverAngle out;
   const auto j = static_cast<Index>(joint);
-  const double cutoff_hz = problem.logs().front().log.filter.torque_cutoff_hz;
+  out.cutoff_hz = problem.logs().front().log.filter.torque_cutoff_hz;
   for (std::size_t l = 0; l < problem.logs().size(); ++l) {
     const SessionLog& entry = problem.logs()[l];
     if (entry.healthy || !entry.fits) continue;
@@ -43,10 +46,11 @@ OverAngle over_angle(const Linearised& problem, std::size_t joint, const VectorX
     full = log.filter_columns(full);
     const auto& motion = problem.motion(l);
     // exp(i n q) g lives below the cut-off wherever the filter lets the ripple through
-    const auto stride = std::max<Index>(1, whole(1 / (log.step_s * 6 * cutoff_hz)));
+    const auto stride = std::max<Index>(1, whole(1 / (log.step_s * 6 * out.cutoff_hz)));
     for (Index k = log.first; k < log.last; k += stride) {
       out.q.push_back(motion.q(k, j));
       out.g.push_back(full[k] * static_cast<double>(stride));
+      out.at.push_back(k == log.first ? unbounded : std::fabs(motion.dq(k, j)));
     }
     for (Index r = 0; r < b.count; ++r) out.speed.push_back(std::fabs(motion.dq(log.first + r * log.decimation, j)));
   }
@@ -91,6 +95,23 @@ struct Spectrum {
   std::vector<double> n, p;
 };
 
+/// Whether the joint goes through two periods of a wave somewhere, slow enough for the filter to let it through, or is
+/// never too fast for that. What does not come back is no period: it is a torque at a reversal, of any form.
+bool comes_back(const OverAngle& data, double n) {
+  const double slow = 2 * std::numbers::pi * data.cutoff_hz / n, periods = 2 * 2 * std::numbers::pi / n;
+  if (*std::max_element(data.speed.begin(), data.speed.end()) <= slow) return true;
+  double low = 0, high = 0;
+  bool within = false;
+  for (std::size_t k = 0; k < data.q.size(); ++k) {
+    const bool was = std::exchange(within, data.at[k] <= slow);
+    if (!within) continue;
+    low = was ? std::min(low, data.q[k]) : data.q[k];
+    high = was ? std::max(high, data.q[k]) : data.q[k];
+    if (high - low >= periods) return true;
+  }
+  return false;
+}
+
 /// From `lowest` on in steps, as far as the filter lets a ripple through.
 Spectrum spectrum_of(const OverAngle& data, const ExpectedPower& power, double lowest, double step) {
   constexpr std::size_t most_wavenumbers = 2400;
@@ -104,7 +125,7 @@ Spectrum spectrum_of(const OverAngle& data, const ExpectedPower& power, double l
   Spectrum out;
   for (std::size_t i = 0; i < most_wavenumbers; ++i) {
     const double number = lowest + step * static_cast<double>(i), expected = power(number);
-    if (expected < floor) break;
+    if (expected < floor || !comes_back(data, number)) break;
     std::complex<double> sum = 0;
     for (std::size_t k = 0; k < data.q.size(); ++k) {
       sum += at_n[k];

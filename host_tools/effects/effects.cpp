@@ -24,7 +24,7 @@ void check(const EffectInfo& effect, std::span<const double> shape, const JointS
   };
   need(effect.needs_structural, series.structural, "the rigid-body torque");
   need(effect.needs_total, series.total, "the torque of the effects before it");
-  for (const Eigen::MatrixXd* peers : {&series.peers_dq, &series.peers_sign, &series.peers_ddq})
+  for (const Eigen::MatrixXd* peers : {&series.peers_q, &series.peers_dq, &series.peers_sign, &series.peers_ddq})
     need(effect.needs_peers, *peers, "the motion of the other joints");
 }
 
@@ -46,6 +46,7 @@ Eigen::MatrixXd columns_of(std::span<const double> shape, double sign_width, con
   for (Eigen::Index k = 0; k < series.q.size(); ++k) {
     for (std::size_t i = 0; i < peers.size(); ++i) {
       const auto joint = static_cast<Eigen::Index>(i);
+      peers[i].q = series.peers_q(k, joint);
       peers[i].dq = series.peers_dq(k, joint);
       peers[i].sign = series.peers_sign(k, joint);
       peers[i].ddq = series.peers_ddq(k, joint);
@@ -249,6 +250,7 @@ std::string why_not_identified(const EffectInfo& info) {
   if (info.acts_on == ActsOn::position) return reason("acts on the joint's position");
   if (info.needs_total) return reason("needs the torque of the effects before it");
   if (info.needs_structural) return reason("needs the rigid-body torque");
+  if (info.curve) return reason("is a free curve, whose knots diagnosis chooses");
   if (info.needs_peers) return {};  // the neighbours are tried
   for (const ParameterInfo& shape : info.shape) {
     if (!shape.values.fitted.given())

@@ -74,7 +74,7 @@ struct JointSeries {
   Eigen::VectorXd q, dq, ddq, structural;
   double step_s = 0;
   Eigen::VectorXd total{};
-  Eigen::MatrixXd peers_dq{}, peers_sign{}, peers_ddq{};  ///< samples x joints of the robot
+  Eigen::MatrixXd peers_dq{}, peers_sign{}, peers_ddq{}, peers_q{};  ///< samples x joints of the robot
 };
 
 /// phi of a catalogue effect over a log: samples x linear parameters. States start at rest with the log.

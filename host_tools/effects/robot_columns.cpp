@@ -112,6 +112,7 @@ MatrixXd RobotColumns::phi(const EffectCandidate& candidate) const {
   JointSeries series{motion_->q.col(j), motion_->dq.col(j), motion_->ddq.col(j), structural_.col(j), motion_->step_s};
   series.total = torque_.col(j);
   if (info.needs_peers) {
+    series.peers_q = motion_->q;
     series.peers_dq = motion_->dq;
     series.peers_ddq = motion_->ddq;
     series.peers_sign = motion_->dq;

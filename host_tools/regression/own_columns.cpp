@@ -56,6 +56,7 @@ Eigen::MatrixXd rows_with_peers(const ProcessedLog& log, std::size_t joint, cons
       const auto peer = static_cast<Eigen::Index>(k);
       series.peers_sign.col(peer) = (motion.dq.col(peer) / designs[k].sign_width).array().tanh();
     }
+    series.peers_q = std::move(motion.q);
     series.peers_dq = std::move(motion.dq);
     series.peers_ddq = std::move(motion.ddq);
     out.middleRows(block.row, block.rows) =

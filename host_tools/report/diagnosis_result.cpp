@@ -124,6 +124,7 @@ json to_json(const std::optional<CurveResult>& curve) {
   }
   return {{"effect", curve->effect},
           {"signal", curve->signal},
+          {"joint", curve->joint > 0 ? json(curve->joint) : json(nullptr)},
           {"unit", curve->unit},
           {"friction", curve->friction},
           {"sentence", curve->sentence},
@@ -143,6 +144,7 @@ std::optional<CurveResult> curve_of(const json& file) {
   out.effect = file.at("effect");
   out.signal = file.at("signal");
   out.unit = file.at("unit");
+  if (file.at("joint").is_number()) out.joint = file.at("joint");
   out.friction = file.at("friction");
   out.sentence = file.at("sentence");
   out.odds_nothing = number_of(file.at("log10_odds_nothing"));

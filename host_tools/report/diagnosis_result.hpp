@@ -68,8 +68,9 @@ struct CurveResult {
     double x = 0;           ///< of the variable
     double y = 0, std = 0;  ///< [N*m | N], without the nominal effects' part of it
   };
-  std::string effect;                ///< position_curve, velocity_curve, load_curve, friction_over_position
+  std::string effect;                ///< position_curve, velocity_curve, load_curve, ..
   std::string signal;                ///< its variable: q, dq, load
+  std::size_t joint = 0;             ///< from 1: the other joint whose q it is; 0: the joint's own variable
   std::string unit;                  ///< of the variable
   bool friction = false;             ///< y is friction, and turns with the direction
   std::string sentence;              ///< "friction rises by 0.8 N*m between 0.85 and 1.05 rad"

@@ -102,7 +102,8 @@ Chart chart_of(const CurveResult& curve, const std::string& unit) {
     band[i] = deviations_of_95 * point.std;
   }
   const std::string variable = curve.signal == "dq" ? "velocity" : curve.signal == "load" ? "load" : "position";
-  return {fmt::format("{} [{}]", variable, curve.unit),
+  const std::string of = curve.joint > 0 ? fmt::format(" of joint {}", curve.joint) : "";
+  return {fmt::format("{}{} [{}]", variable, of, curve.unit),
           fmt::format("{} [{}]", curve.friction ? "friction" : "torque", unit),
           {{x, y - band, effect_band, 0, "95 % band", false, y + band}, {x, y, effect_colour, 1.6, "curve"}}};
 }

@@ -31,10 +31,11 @@ double spline(int i, int degree, double x) {
   return ((x - i) * spline(i, degree - 1, x) + (i + degree + 1 - x) * spline(i + 1, degree - 1, x)) / degree;
 }
 
-/// A free curve of the fit's heights, of which equal ones of 1 make 3/2.
+/// A free curve of the fit's heights, of which equal ones of 1 make 3/2. Its knots' place comes last of the shape.
 double free_curve(const EffectFit& fit, double x) {
+  const double from = fit.shape[fit.shape.size() - 2], span = fit.shape.back();
   const double pieces = static_cast<double>(fit.linear.size()) - 3;
-  const double place = std::clamp((x - fit.shape[0]) / fit.shape[1] * pieces, 0.0, pieces);
+  const double place = std::clamp((x - from) / span * pieces, 0.0, pieces);
   double sum = 0;
   for (std::size_t i = 0; i < fit.linear.size(); ++i)
     sum += 1.5 * fit.linear[i] * spline(static_cast<int>(i) - 3, 3, place);
@@ -63,6 +64,7 @@ double force(const EffectFit& fit, const JointFit& joint, Index j, const DriveSt
   if (name == "velocity_curve") return free_curve(fit, v);
   if (name == "load_curve") return free_curve(fit, now.load[j]);
   if (name == "friction_over_position") return free_curve(fit, q) * sign;
+  if (name == "cross_position") return free_curve(fit, now.q[peer()]);
   if (name == "joint_coupling") {
     const double other = now.dq[peer()];
     return p[0] * soft_sign(other, joints_of(plant)[static_cast<std::size_t>(peer())].sign_width) + p[1] * other;

@@ -8,8 +8,8 @@ namespace fxdyn {
 
 /// What diagnosis found and the Fitter has no columns for: effects on position or body, those that need the structural
 /// or the total torque, a rotor that only the load's friction separates from the link, drift in a session that was warm
-/// when a log began, free curves, and what a healthy session had of an effect that grew. They stay as they are while everything else
-/// is fitted again.
+/// when a log began, free curves, and what a healthy session had of an effect that grew. They stay as they are while
+/// everything else is fitted again.
 class KeptEffects {
  public:
   /// @param logs on which is fitted

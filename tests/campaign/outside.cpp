@@ -54,6 +54,7 @@ bool is_outside(const std::string& effect) {
 std::string curve_of(const std::string& effect) {
   if (effect == "tight_spot") return "friction_over_position";
   if (effect == "end_stop") return "position_curve";
+  if (effect == "other_position") return "cross_position";
   return {};
 }
 

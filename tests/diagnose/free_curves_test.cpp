@@ -15,8 +15,9 @@ namespace {
 
 using Eigen::ArrayXd;
 
-/// A torque of the second joint, of its own position and velocity and of the fourth joint's position.
-using Torque = std::function<ArrayXd(const ArrayXd& q, const ArrayXd& dq, const ArrayXd& other)>;
+/// A torque of the second joint, of its own position and velocity and of the fourth joint's.
+using Torque =
+    std::function<ArrayXd(const ArrayXd& q, const ArrayXd& dq, const ArrayXd& other_q, const ArrayXd& other_dq)>;
 
 struct Answer {
   std::vector<FreeCurve> curves;
@@ -37,7 +38,8 @@ Answer answer(const Torque& torque) {
     out.logs.push_back(test::small_session_log(nominal, role, static_cast<std::uint64_t>(seed)));
     ProcessedLog& log = out.logs.back().log;
     const MotionRows motion = log.motion(0, log.samples());
-    log.tau.col(1).array() += torque(motion.q.col(1).array(), motion.dq.col(1).array(), motion.q.col(3).array());
+    log.tau.col(1).array() +=
+        torque(motion.q.col(1).array(), motion.dq.col(1).array(), motion.q.col(3).array(), motion.dq.col(3).array());
   }
   Outcome outcome;
   outcome.models = test::around(nominal);
@@ -63,8 +65,9 @@ double held(const CurveResult& curve, const std::function<double(double)>& truth
 }
 
 TEST(FreeCurves, ATightSpotIsFrictionOverThePosition) {
-  const Answer a = answer(
-      [](const ArrayXd& q, const ArrayXd& dq, const ArrayXd&) -> ArrayXd { return 2 * bump(q, 0.2, 0.2) * dq.sign(); });
+  const Answer a = answer([](const ArrayXd& q, const ArrayXd& dq, const ArrayXd&, const ArrayXd&) -> ArrayXd {
+    return 2 * bump(q, 0.2, 0.2) * dq.sign();
+  });
   ASSERT_EQ(a.curves.size(), 1U);
   EXPECT_EQ(a.curves[0].effect.joint, 1U);
   EXPECT_EQ(a.curves[0].effect.effect, "friction_over_position");
@@ -78,8 +81,9 @@ TEST(FreeCurves, ATightSpotIsFrictionOverThePosition) {
 }
 
 TEST(FreeCurves, ACoverThatPressesIsATorqueOverThePosition) {
-  const Answer a =
-      answer([](const ArrayXd& q, const ArrayXd&, const ArrayXd&) -> ArrayXd { return 1.5 * bump(q, -0.3, 0.1); });
+  const Answer a = answer([](const ArrayXd& q, const ArrayXd&, const ArrayXd&, const ArrayXd&) -> ArrayXd {
+    return 1.5 * bump(q, -0.3, 0.1);
+  });
   ASSERT_EQ(a.curves.size(), 1U);
   EXPECT_EQ(a.curves[0].effect.effect, "position_curve");
   EXPECT_LT(a.left(1), 0.3);
@@ -88,23 +92,41 @@ TEST(FreeCurves, ACoverThatPressesIsATorqueOverThePosition) {
 }
 
 TEST(FreeCurves, AResonanceAtOneSpeedIsACurveOfTheVelocity) {
-  const Answer a =
-      answer([](const ArrayXd&, const ArrayXd& dq, const ArrayXd&) -> ArrayXd { return 2 * bump(dq, 0.8, 0.15); });
+  const Answer a = answer([](const ArrayXd&, const ArrayXd& dq, const ArrayXd&, const ArrayXd&) -> ArrayXd {
+    return 2 * bump(dq, 0.8, 0.15);
+  });
   ASSERT_EQ(a.curves.size(), 1U);
   EXPECT_EQ(a.curves[0].effect.effect, "velocity_curve");
   EXPECT_NE(a.drawn->sentence.find("torque rises by"), std::string::npos) << a.drawn->sentence;
   EXPECT_LT(a.left(1), 0.3);
 }
 
-TEST(FreeCurves, WhatAnotherJointsPositionDoesIsNoneOfThem) {
-  const Answer a =
-      answer([](const ArrayXd&, const ArrayXd&, const ArrayXd& other) -> ArrayXd { return 2 * (3 * other).sin(); });
+TEST(FreeCurves, AHoseThatAnotherJointWindsIsACurveOfItsPosition) {
+  const Answer a = answer([](const ArrayXd&, const ArrayXd&, const ArrayXd& other, const ArrayXd&) -> ArrayXd {
+    return 2 * (3 * other).sin();
+  });
+  ASSERT_EQ(a.curves.size(), 1U);
+  EXPECT_EQ(a.curves[0].effect.effect, "cross_position");
+  EXPECT_EQ(a.curves[0].effect.shape[0], 4);
+  EXPECT_EQ(a.drawn->joint, 4U);
+  EXPECT_LT(a.left(1), 0.3);
+  // A wave has no place of its own.
+  EXPECT_NE(a.drawn->sentence.find("torque changes by"), std::string::npos) << a.drawn->sentence;
+  EXPECT_NE(a.drawn->sentence.find("of joint 4"), std::string::npos) << a.drawn->sentence;
+  EXPECT_GE(held(*a.drawn, [](double q) { return 2 * std::sin(3 * q); }), 0.8);
+}
+
+TEST(FreeCurves, WhatAnotherJointsVelocityDoesIsNoneOfThem) {
+  const Answer a = answer([](const ArrayXd&, const ArrayXd&, const ArrayXd&, const ArrayXd& speed) -> ArrayXd {
+    return 2 * (4 * speed).tanh();
+  });
   EXPECT_TRUE(a.curves.empty()) << a.curves[0].effect.effect;
 }
 
 TEST(FreeCurves, NoiseGetsNone) {
-  const Answer a =
-      answer([](const ArrayXd& q, const ArrayXd&, const ArrayXd&) -> ArrayXd { return ArrayXd::Zero(q.size()); });
+  const Answer a = answer([](const ArrayXd& q, const ArrayXd&, const ArrayXd&, const ArrayXd&) -> ArrayXd {
+    return ArrayXd::Zero(q.size());
+  });
   EXPECT_TRUE(a.curves.empty());
   EXPECT_EQ(a.after.current.joints[1].effects.size(), a.before.current.joints[1].effects.size());
 }

@@ -5,6 +5,10 @@
 #include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
 #include "host_tools/diagnose/ripples.hpp"
 #include "tests/diagnose/small_problem.hpp"
 
@@ -103,6 +107,32 @@ TEST_F(SearchOfEffects, TheSpectrumOverTheAngleHasTheStrongerRippleFirst) {
   ASSERT_EQ(peaks.size(), 1U);
   EXPECT_NEAR(peaks[0].candidate.shape[0], 14, 0.5);
   EXPECT_EQ(peaks[0].candidate.joint, 1U);
+}
+
+/// How many periods of a wave joint 2 passes at once where the filter lets it through.
+double periods_in_a_row(const ProcessedLog& log, const Motion& motion, double n) {
+  double most = 0, from = 0, to = 0;
+  for (Index k = log.first; k < log.last; ++k) {
+    const bool fast = n * std::fabs(motion.dq(k, 1)) > 2 * std::numbers::pi * log.filter.torque_cutoff_hz;
+    from = fast || k == log.first ? motion.q(k, 1) : std::min(from, motion.q(k, 1));
+    to = fast || k == log.first ? motion.q(k, 1) : std::max(to, motion.q(k, 1));
+    most = std::max(most, (to - from) * n / (2 * std::numbers::pi));
+  }
+  return most;
+}
+
+TEST_F(SearchOfEffects, NoWaveIsTriedOfWhichTheFilterLetsNoTwoPeriodsThrough) {
+  run(1, {}, {});
+  const LinearFit nuisance = problem_->solver().solve(problem_->nuisance());
+  const std::vector<Group> peaks = ripples(*problem_, 1, problem_->solver().residual(1, nuisance), 10000);
+  double shortest = 0;
+  for (const Group& peak : peaks) shortest = std::max(shortest, peak.candidate.shape[0]);
+  const auto periods = [&](double n) {
+    return std::max(periods_in_a_row(problem_->logs()[0].log, problem_->motion(0), n),
+                    periods_in_a_row(problem_->logs()[1].log, problem_->motion(1), n));
+  };
+  EXPECT_GE(periods(shortest), 1.8);  // the spectrum reads every few samples
+  EXPECT_LT(periods(1.2 * shortest), 2);
 }
 
 TEST_F(SearchOfEffects, RefinesAShapeBetweenThoseOfTheGrid) {

@@ -36,7 +36,7 @@ TEST(EffectDeclarations, ListsAreThoseOfTheTraits) {
   EXPECT_EQ(named([](const EffectInfo& info) { return info.share; }), (Names{"saturation", "delay"}));
   EXPECT_EQ(named([](const EffectInfo& info) { return info.unites_others(); }), (Names{"lugre", "maxwell_slip"}));
   EXPECT_EQ(named([](const EffectInfo& info) { return info.curve; }),
-            (Names{"position_curve", "velocity_curve", "load_curve", "friction_over_position"}));
+            (Names{"position_curve", "velocity_curve", "load_curve", "friction_over_position", "cross_position"}));
   EXPECT_EQ(named([](const EffectInfo& info) { return info.friction; }),
             (Names{"viscous", "coulomb", "offset", "stribeck", "presliding", "asymmetric_friction", "viscous_quadratic",
                    "viscous_cubic", "load_friction", "friction_drift", "lugre", "maxwell_slip", "velocity_curve",
@@ -160,6 +160,10 @@ constexpr std::array promises = std::to_array<Promise>({
     {"friction_over_position", "from", "rad", -1e3, 1e3},
     {"friction_over_position", "span", "rad", 1e-4, 1e3},
     {"friction_over_position", "height_12", "N*m", -unbounded, unbounded},
+    {"cross_position", "joint", "-", 1, 32},
+    {"cross_position", "from", "rad or m", -1e3, 1e3},
+    {"cross_position", "span", "rad or m", 1e-4, 1e3},
+    {"cross_position", "height_12", "N*m", -unbounded, unbounded},
     {"payload", "mass", "kg", 0, unbounded},
     {"payload", "com_x", "m", -10, 10},
     {"payload", "com_y", "m", -10, 10},

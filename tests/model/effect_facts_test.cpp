@@ -30,7 +30,7 @@ std::vector<double> run(double structural, double total, double peer, std::set<s
     const double value = E::shape[i].name == "joint" ? 1 : E::shape[i].name == "span" ? 3 : 0.02;
     shape[i] = E::stored_shape(i, value, 0.002);
   }
-  const std::array<JointInput<Real>, 2> peers{{{0.1, peer, 2 * peer, 0.5 * peer}, {0.2, 0.3, 0.4, 0.5}}};
+  const std::array<JointInput<Real>, 2> peers{{{0.1 * peer, peer, 2 * peer, 0.5 * peer}, {0.2, 0.3, 0.4, 0.5}}};
   typename E::template State<Real> state{};
   Saturations saturations;
   std::vector<double> out;

@@ -110,6 +110,7 @@ constexpr std::array cases{
     Case{"velocity_curve", {-16, 10}, all_bumps(of_curve(curve_span, Quantity::velocity))},
     Case{"load_curve", {-260, 100}, all_bumps(of_curve(curve_span, Quantity::torque))},
     Case{"friction_over_position", {-3.5, 1}, all_bumps(of_curve(curve_span, Quantity::position))},
+    Case{"cross_position", {1, 4}, all_bumps(of_curve(curve_span, Quantity::position))},
 };
 
 /// Null: it has none.
@@ -200,7 +201,7 @@ struct Powers {
 
 /// A shape parameter at a share of its range, geometric where that spans decades.
 double shape_at(const Case& c, double share) {
-  const bool index = c.effect == "joint_coupling" || c.effect == "motor_coupling";
+  const bool index = c.effect == "joint_coupling" || c.effect == "motor_coupling" || c.effect == "cross_position";
   if (c.shape[0] > 0 && !index) return c.shape[0] * std::pow(c.shape[1] / c.shape[0], share);
   const double value = c.shape[0] + share * (c.shape[1] - c.shape[0]);
   return index ? std::round(value) : value;

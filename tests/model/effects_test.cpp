@@ -26,7 +26,7 @@ JointSeries random_series(std::uint64_t seed, int samples = 2000) {
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(samples);
   JointSeries s{zero, zero, zero, zero, step_s};
   s.total = zero;
-  s.peers_dq = s.peers_sign = s.peers_ddq = Eigen::MatrixXd::Zero(samples, 3);
+  s.peers_q = s.peers_dq = s.peers_sign = s.peers_ddq = Eigen::MatrixXd::Zero(samples, 3);
   const double a = random.uniform(0.2, 1.5), b = random.uniform(1, 9), c = random.uniform(0, 6);
   for (int k = 0; k < samples; ++k) {
     const double t = step_s * k;
@@ -36,6 +36,7 @@ JointSeries random_series(std::uint64_t seed, int samples = 2000) {
     s.structural[k] = 30 * std::sin(3 * t + c);
     s.total[k] = s.structural[k] + 4 * std::cos(11 * t);
     for (int i = 0; i < 3; ++i) {
+      s.peers_q(k, i) = -2.0 / (i + 1) * std::cos((i + 1) * t + c);
       s.peers_dq(k, i) = 2 * std::sin((i + 1) * t + c);
       s.peers_sign(k, i) = std::tanh(s.peers_dq(k, i) / 0.1);
       s.peers_ddq(k, i) = 2 * (i + 1) * std::cos((i + 1) * t + c);
@@ -128,6 +129,7 @@ std::vector<double> expected(std::string_view effect, const JointSeries& s, int 
   if (effect == "velocity_curve") return bumps(dq, -0.1, 0.2);
   if (effect == "load_curve") return bumps(structural, -0.5, 0.3);
   if (effect == "friction_over_position") return bumps(q, -0.1, 0.15, sign);
+  if (effect == "cross_position") return bumps(s.peers_q(k, 1), -0.3, 0.6);
   if (effect == "motor_coupling") {
     const double other = -0.8 * s.peers_dq(k, 1);
     return {1 - 2 / (1 + std::exp(2 * (dq + other) / 0.05)), other, -0.8 * s.peers_ddq(k, 1)};
@@ -151,6 +153,7 @@ std::vector<double> shape_of(std::string_view effect) {
   if (effect == "motor_coupling") return {2, -0.8, 0.05};
   if (effect == "position_curve" || effect == "friction_over_position") return {-0.1, 0.25};
   if (effect == "velocity_curve") return {-0.1, 0.3};
+  if (effect == "cross_position") return {2, -0.3, 0.9};
   if (effect == "load_curve") return {-0.5, 0.8};  // within the load of one_joint()
   const std::size_t count = find_effect(effect)->shape.size();
   if (count > 0) ADD_FAILURE() << "no values for the shape of " << effect << ": write them into shape_of()";
@@ -287,6 +290,7 @@ TEST(Effects, CoupledJointsSeeEachOthersMotion) {
   const Eigen::MatrixXd torque = predict(model, q, dq, ddq, step_s);
   for (Eigen::Index j = 0; j < 2; ++j) {
     JointSeries series{q.col(j), dq.col(j), ddq.col(j), {}, step_s};
+    series.peers_q = q;
     series.peers_dq = series.peers_sign = dq;
     series.peers_ddq = ddq;
     const auto& shape = model.joints[static_cast<std::size_t>(j)].effects[0].shape;

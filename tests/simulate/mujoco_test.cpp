@@ -89,6 +89,7 @@ INSTANTIATE_TEST_SUITE_P(
         Hidden{{test::effect("position_curve", {-0.5, 1.5}, {1, 2, -1, 0, 3, 2, 2, -2, 1, 0, 1, 2})}, 1e-6},
         Hidden{{test::effect("velocity_curve", {-1, 2}, {1, 2, -1, 0, 3, 2, 2, -2, 1, 0, 1, 2})}, 1e-6},
         Hidden{{test::effect("load_curve", {-50, 100}, {1, 2, -1, 0, 3, 2, 2, -2, 1, 0, 1, 2})}, 1e-3},
+        Hidden{{test::effect("cross_position", {3, -0.5, 1.5}, {1, 2, -1, 0, 3, 2, 2, -2, 1, 0, 1, 2})}, 1e-6},
         Hidden{{test::effect("friction_over_position", {-0.5, 1.5}, {1, 2, 1, 0, 3, 2, 2, 2, 1, 0, 1, 2})}, 0.03},
         Hidden{{test::effect("joint_coupling", {3}, {2, 1})}, 0.03},
         Hidden{{test::effect("motor_coupling", {3, 1.0, 0.002}, {2, 1, 0.5})}, 0.03},
