@@ -20,7 +20,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr auto ten = static_cast<Index>(parameters_per_link);
-Index own_columns() { return static_cast<Index>(nominal_effects().size()); }
+Index nominal_columns() { return static_cast<Index>(nominal_effects().size()); }
 
 Index own_column(std::string_view effect) {
   const std::vector<std::string>& all = nominal_effects();
@@ -29,12 +29,6 @@ Index own_column(std::string_view effect) {
 Index viscous_column() { return own_column(viscous_friction_effect().name); }
 Index rotor_column() { return own_column(rotor_effect().name); }
 Index coulomb_column() { return own_column(dry_friction_effect().name); }
-
-/// Sum of dq times the friction of a joint's own columns; x: bodies, then those.
-double friction_power(const MatrixXd& gram, const VectorXd& x) {
-  const Index bodies = x.size() - own_columns(), dq = bodies + viscous_column(), sign = bodies + coulomb_column();
-  return x[dq] * gram(dq, dq) + x[sign] * gram(sign, dq);
-}
 
 /// How far a joint may go: the URDF's range and as far again, or `widest` where it has none.
 double longest_way(const Joint& joint, const ArrangementOptions& options) {
@@ -83,14 +77,27 @@ Arrangement as_given(const Robot& robot) {
   return out;
 }
 
-ArrangementEvidence::ArrangementEvidence(Robot robot, TorqueSamples samples, const ArrangementOptions& options)
-    : robot_(std::move(robot)), samples_(std::move(samples)), options_(options) {
+ArrangementEvidence::ArrangementEvidence(Robot robot, TorqueSamples samples, const ArrangementOptions& options,
+                                         FrictionMemory memory)
+    : robot_(std::move(robot)), samples_(std::move(samples)), options_(options), memory_(std::move(memory)) {
   torque_square_ = samples_.tau.colwise().squaredNorm().transpose() / static_cast<double>(samples_.size());
   for (Index j = 0; j < static_cast<Index>(robot_.size()); ++j) {
     const auto [lower, upper] = range(j);
     const double most = std::min(longest_way(robot_.joints[static_cast<std::size_t>(j)], options_), options_.widest);
     moves_.push_back(upper - lower > options_.standstill * most);
   }
+}
+
+Index ArrangementEvidence::own_columns() const {
+  return nominal_columns() + (memory_.empty() ? 0 : memory_.front().cols());
+}
+
+/// Sum of dq times the friction of a joint's own columns; x: bodies, then those.
+double ArrangementEvidence::friction_power(const MatrixXd& gram, const VectorXd& x) const {
+  const Index bodies = x.size() - own_columns(), dq = bodies + viscous_column(), sign = bodies + coulomb_column();
+  double power = x[dq] * gram(dq, dq) + x[sign] * gram(sign, dq);
+  for (Index i = bodies + nominal_columns(); i < x.size(); ++i) power += x[i] * gram(i, dq);
+  return power;
 }
 
 double ArrangementEvidence::excess(const Arrangement& arrangement, Index joint) const {
@@ -128,6 +135,7 @@ ArrangementEvidence::Design ArrangementEvidence::design(const Arrangement& arran
   Design out;
   out.information = MatrixXd::Zero(bodies, bodies);
   out.mean.resize(bodies);
+  out.own_square.resize(robot.size());
   const double length = chain_length(robot);
   const double mass = std::sqrt(torque_square_.maxCoeff()) / (9.81 * length);
   for (std::size_t j = 0; j < robot.size(); ++j) {
@@ -138,12 +146,14 @@ ArrangementEvidence::Design ArrangementEvidence::design(const Arrangement& arran
     series.ddq = ddq.col(joint);
     series.step_s = 1;
     const double width = std::max(0.02 * series.dq.cwiseAbs().maxCoeff(), 1e-9);
-    out.own_square.emplace_back(own);
-    for (Index i = 0; i < own; ++i) {
-      const auto column = effect_columns(nominal_effects()[static_cast<std::size_t>(i)], {}, width, series);
-      x[j].col(bodies + i) = column.col(0);
-      out.own_square[j][i] = std::max(column.col(0).squaredNorm() / static_cast<double>(rows), 1e-12);
+    for (Index i = 0; i < nominal_columns(); ++i)
+      x[j].col(bodies + i) = effect_columns(nominal_effects()[static_cast<std::size_t>(i)], {}, width, series).col(0);
+    if (!memory_.empty()) {
+      const auto from = static_cast<std::size_t>(arrangement.motion_from[j]);
+      x[j].rightCols(own - nominal_columns()) = std::copysign(1.0, arrangement.motion_gain[joint]) * memory_[from];
     }
+    out.own_square[j] =
+        (x[j].rightCols(own).colwise().squaredNorm().transpose() / static_cast<double>(rows)).cwiseMax(1e-12);
     // Bodies before the joint do not load it: their columns are zero.
     const Index used = bodies + own - ten * joint;
     out.gram.emplace_back(MatrixXd::Zero(bodies + own, bodies + own));
@@ -170,6 +180,31 @@ ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangem
   return best;
 }
 
+/// Friction brakes, builds up after a reversal and not before it, and a rotor is heavy: else there is none from here
+/// on, and what it would explain is left.
+/// @param taken own columns of all joints that are out @return whether one more is
+bool ArrangementEvidence::take_out_impossible(Index joint, const MatrixXd& gram, const VectorXd& x,
+                                              std::vector<bool>& taken, MatrixXd& prior) const {
+  const Index own = own_columns(), bodies = x.size() - own;
+  bool more = false;
+  const auto take_out = [&](Index i) {
+    const Index at = own * joint + i;
+    if (taken[static_cast<std::size_t>(at)]) return;
+    taken[static_cast<std::size_t>(at)] = more = true;
+    prior(bodies + at, bodies + at) *= 1e8;
+  };
+  for (Index i = nominal_columns(); i < own; ++i) {
+    if (x[bodies + i] < 0) take_out(i);
+  }
+  if (friction_power(gram, x) < 0) {
+    take_out(viscous_column());
+    take_out(coulomb_column());
+    for (Index i = nominal_columns(); i < own; ++i) take_out(i);
+  }
+  if (x[bodies + rotor_column()] < 0) take_out(rotor_column());
+  return more;
+}
+
 ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangement& arrangement,
                                             double mass_error) const {
   const auto n = static_cast<Index>(robot_.size());
@@ -193,7 +228,7 @@ ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangem
 
   ArrangementScore out;
   VectorXd solution;
-  std::vector<bool> drives(robot_.size(), false), flies(robot_.size(), false);
+  std::vector<bool> taken(static_cast<std::size_t>(own * n), false);
   double log_determinant = 0;
   bool settled = false;
   for (int round = 0; round < 6 && !settled; ++round) {
@@ -224,20 +259,7 @@ ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangem
       const double before =
           std::exchange(variance[j], std::max(square, options_.perfect * options_.perfect * whole[j]));
       settled = settled && std::fabs(variance[j] - before) < options_.settled * before;
-      // Friction brakes and a rotor is heavy: else there is none from here on, and what it would explain is left.
-      const auto take_out = [&](Index i) {
-        prior(bodies + own * j + i, bodies + own * j + i) *= 1e8;
-        settled = false;
-      };
-      if (!drives[joint] && friction_power(design.gram[joint], x) < 0) {
-        drives[joint] = true;
-        take_out(viscous_column());
-        take_out(coulomb_column());
-      }
-      if (!flies[joint] && x[bodies + rotor_column()] < 0) {
-        flies[joint] = true;
-        take_out(rotor_column());
-      }
+      settled = !take_out_impossible(j, design.gram[joint], x, taken, prior) && settled;
     }
   }
   out.rms = variance.cwiseSqrt();

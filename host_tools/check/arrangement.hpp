@@ -27,16 +27,21 @@ struct ArrangementScore {
   Eigen::VectorXd rms;  ///< residual of each joint [N*m | N]
 };
 
+/// Friction that builds up over a path after each reversal: per column of the motion, samples x paths, what Dahl's
+/// state adds to the sign of the velocity (effect `presliding`). Empty: none.
+using FrictionMemory = std::vector<Eigen::MatrixXd>;
+
 /// The evidence of arrangements of one robot's samples. Model: tau_j = Y_j(q, dq, ddq) pi + nominal friction, rotor and
-/// offset of the joint. pi is normal about the URDF's bodies (pseudo-inertia metric, see barrier_hessian()), with that
-/// of options.mass_errors that has the most evidence; where a link has no body about a sphere, options.vague times as
-/// wide. The residual's deviation is
-/// each joint's own, found by iteration. What it consists of is structure more than noise, so only
-/// `options.independent` rows of a joint count. The way that a joint goes counts as well: one that leaves twice the
-/// URDF's range needs limits that are wrong, r times too narrow in a share r^-options.beyond of all URDFs.
+/// offset of the joint, and friction with a memory where it is given. pi is normal about the URDF's bodies
+/// (pseudo-inertia metric, see barrier_hessian()), with that of options.mass_errors that has the most evidence; where a
+/// link has no body about a sphere, options.vague times as wide. The residual's deviation is each joint's own, found by
+/// iteration. What it consists of is structure more than noise, so only `options.independent` rows of a joint count.
+/// The way that a joint goes counts as well: one that leaves twice the URDF's range needs limits that are wrong, r
+/// times too narrow in a share r^-options.beyond of all URDFs.
 class ArrangementEvidence {
  public:
-  ArrangementEvidence(Robot robot, TorqueSamples samples, const ArrangementOptions& options);
+  ArrangementEvidence(Robot robot, TorqueSamples samples, const ArrangementOptions& options,
+                      FrictionMemory memory = {});
 
   /// Safe from several threads.
   ArrangementScore operator()(const Arrangement& arrangement) const;
@@ -58,6 +63,7 @@ class ArrangementEvidence {
   bool moves(Eigen::Index column) const { return moves_[static_cast<std::size_t>(column)]; }
   /// Lowest and highest position in a column.
   std::array<double, 2> range(Eigen::Index column) const {
+    if (samples_.size() == 0) return {0, 0};
     return {samples_.q.col(column).minCoeff(), samples_.q.col(column).maxCoeff()};
   }
   /// How far the joint would go beyond twice what the URDF lets it, logarithm of the ratio; 0: it does not.
@@ -67,10 +73,15 @@ class ArrangementEvidence {
 
  private:
   ArrangementScore score(const Design& design, const Arrangement& arrangement, double mass_error) const;
+  Eigen::Index own_columns() const;
+  double friction_power(const Eigen::MatrixXd& gram, const Eigen::VectorXd& x) const;
+  bool take_out_impossible(Eigen::Index joint, const Eigen::MatrixXd& gram, const Eigen::VectorXd& x,
+                           std::vector<bool>& taken, Eigen::MatrixXd& prior) const;
 
   Robot robot_;
   TorqueSamples samples_;
   ArrangementOptions options_;
+  FrictionMemory memory_;
   std::vector<bool> moves_;
   Eigen::VectorXd torque_square_;  ///< mean squares of the torque columns
 };

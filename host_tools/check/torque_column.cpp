@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "host_tools/check/arrangement.hpp"
+#include "host_tools/effects/effect_roles.hpp"
+#include "host_tools/effects/effects.hpp"
 
 namespace fxdyn {
 namespace {
@@ -16,8 +18,9 @@ struct Explained {
 
 /// How well the URDF as it is explains the samples; `left`: share of the torque's RMS that stays, mean over joints;
 /// `most`: of the joint that it explains least.
-Explained explain(const Robot& robot, const TorqueSamples& samples, const ArrangementOptions& options) {
-  const ArrangementEvidence evidence(robot, samples, options);
+Explained explain(const Robot& robot, const TorqueSamples& samples, const ArrangementOptions& options,
+                  FrictionMemory memory = {}) {
+  const ArrangementEvidence evidence(robot, samples, options, std::move(memory));
   Explained out;
   out.enough = evidence.enough();
   if (!out.enough) return out;
@@ -35,13 +38,47 @@ Explained explain(const Robot& robot, const TorqueSamples& samples, const Arrang
   return out;
 }
 
+/// Friction with a memory at the samples. Its state needs the whole way there; filtered as the torque is.
+FrictionMemory friction_memory(const Robot& robot, const std::vector<ProcessedLog>& logs,
+                               const TorqueSamples& samples) {
+  if (samples.size() == 0) return {};
+  const EffectInfo& effect = presliding_effect();
+  FrictionMemory out;
+  for (std::size_t j = 0; j < robot.size(); ++j) {
+    const auto joint = static_cast<Eigen::Index>(j);
+    MotionScales scales;
+    scales.turns = robot.joints[j].type == JointType::revolute;
+    const auto paths = effect.shape[0].values.judged(scales);
+    out.emplace_back(samples.size(), static_cast<Eigen::Index>(paths.size()));
+    const double width = std::max(0.02 * samples.dq.col(joint).cwiseAbs().maxCoeff(), 1e-9);
+    Eigen::Index row = 0;
+    for (std::size_t l = 0; l < logs.size(); ++l) {
+      const std::vector<Eigen::Index>& at = samples.at[l];
+      if (at.empty()) continue;
+      JointSeries series;
+      series.dq = logs[l].joint_velocity(joint);
+      series.step_s = logs[l].step_s;
+      series.q = series.ddq = Eigen::VectorXd::Zero(series.dq.size());
+      for (std::size_t i = 0; i < paths.size(); ++i) {
+        const Eigen::MatrixXd column =
+            logs[l].filter_columns(effect_columns(effect.name, {&paths.begin()[i], 1}, width, series));
+        for (std::size_t k = 0; k < at.size(); ++k)
+          out.back()(row + static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(i)) = column(at[k], 0);
+      }
+      row += static_cast<Eigen::Index>(at.size());
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 std::optional<TorqueLead> find_long_torque_lead(const Project& project, const std::vector<ProcessedLog>& logs,
                                                 const ArrangementOptions& options) {
   const double known = project.signals.torque_lead_s.value_or(0);
+  const FrictionMemory memory = friction_memory(project.robot, logs, sample_torque(logs, options.samples, known));
   const auto at = [&](double more) {
-    return explain(project.robot, sample_torque(logs, options.samples, known + more), options);
+    return explain(project.robot, sample_torque(logs, options.samples, known + more), options, memory);
   };
   const Explained given = at(0);
   if (!given.enough) return {};
@@ -69,7 +106,13 @@ std::optional<TorqueLead> find_long_torque_lead(const Project& project, const st
   }
   if (given.nats - best.nats < options.gain || std::fabs(lead) < options.least_lead_s) return {};
   if (best.left > options.lead_leaves * given.left) return {};
-  return TorqueLead{known + lead, given.left, best.left};
+  return TorqueLead{known + lead, given.left, best.left, given.nats - best.nats};
+}
+
+double torque_lead_nats(const Project& project, const std::vector<ProcessedLog>& logs, double seconds,
+                        const ArrangementOptions& options) {
+  const TorqueSamples samples = sample_torque(logs, options.samples, seconds);
+  return explain(project.robot, samples, options, friction_memory(project.robot, logs, samples)).nats;
 }
 
 std::optional<MeasuredLead> torque_lead(const Project& project, const std::vector<ProcessedLog>& logs,

@@ -14,11 +14,17 @@ namespace fxdyn {
 struct TorqueLead {
   double seconds = 0;            ///< torque ahead of the motion: [signals] torque_lead_s
   double before = 0, after = 0;  ///< share of the torque's RMS that is not explained, mean of the joints that move
+  double nats = 0;               ///< gained
 };
 /// The shift that explains the torque best, where it gains `gain` and is longer than `least_lead_s`: shorter ones
 /// belong to identify, which finds them by itself.
 std::optional<TorqueLead> find_long_torque_lead(const Project& project, const std::vector<ProcessedLog>& logs,
                                                 const ArrangementOptions& options);
+
+/// Minus the log of the evidence of a torque that is `seconds` ahead of the motion, up to a constant that all shifts
+/// share.
+double torque_lead_nats(const Project& project, const std::vector<ProcessedLog>& logs, double seconds,
+                        const ArrangementOptions& options);
 
 struct MeasuredLead {
   double seconds = 0;     ///< torque ahead of the motion

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "host_tools/cli/verb.hpp"
+#include "host_tools/exchange/formats.hpp"
 #include "host_tools/support/error.hpp"
 
 namespace fxdyn::cli {
@@ -137,6 +138,7 @@ std::vector<Finding> findings() {
   out.push_back(needs_program("build_image.sh (firmware)", "arm-none-eabi-g++",
                               "gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib"));
   out.push_back(needs_program("replay --image, demo.sh", "qemu-system-arm", "qemu-system-arm"));
+  out.push_back({"export --to sdf", "libsdformat", can_read_sdf() ? "12" : "", package("libsdformat12-12")});
   out.push_back(can_interface());
   out.push_back(gpio_chip());
   out.push_back(needs_program("flashing a board", "openocd", "openocd"));

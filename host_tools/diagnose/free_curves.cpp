@@ -34,6 +34,16 @@ constexpr Index drawn_points = 4 * static_cast<Index>(curve_pieces) + 1;
 
 std::vector<VectorXd> white(std::size_t joints) { return std::vector<VectorXd>(joints, VectorXd::Zero(1)); }
 
+/// The joint that a curve's variable is of.
+std::size_t joint_of_variable(const EffectCandidate& effect) {
+  return find_effect(effect.effect)->needs_peers ? static_cast<std::size_t>(effect.shape[0]) - 1 : effect.joint;
+}
+
+/// A variable is an effect's, of a joint.
+bool same_variable(const EffectCandidate& a, const EffectCandidate& b) {
+  return a.effect == b.effect && joint_of_variable(a) == joint_of_variable(b);
+}
+
 /// What a curve leaves on what judges.
 struct Tried {
   EffectCandidate effect;
@@ -52,17 +62,21 @@ class Trials {
   std::vector<Tried> best_of_each() {
     std::vector<EffectCandidate> coarse;
     for (const EffectInfo& info : effect_infos()) {
-      for (int parts = 1; info.curve && parts <= coarsest_parts; parts *= 2) add(info, parts, coarse);
+      if (!info.curve) continue;
+      for (std::size_t of = 0; of < scales_.size(); ++of) {
+        if ((of != joint_) != info.needs_peers) continue;
+        for (int parts = 1; parts <= coarsest_parts; parts *= 2) add(info, of, parts, coarse);
+      }
     }
     std::vector<Tried> out = best(coarse);
     std::vector<EffectCandidate> fine;
     for (std::size_t i = 0; i < std::min<std::size_t>(2, out.size()); ++i) {
       for (int parts = 2 * coarsest_parts; parts <= finest_parts; parts *= 2)
-        add(*find_effect(out[i].effect.effect), parts, fine);
+        add(*find_effect(out[i].effect.effect), joint_of_variable(out[i].effect), parts, fine);
     }
     for (const Tried& one : best(fine)) {
       const auto same = std::find_if(out.begin(), out.end(),
-                                     [&](const Tried& other) { return other.effect.effect == one.effect.effect; });
+                                     [&](const Tried& other) { return same_variable(other.effect, one.effect); });
       if (one.left < same->left) *same = one;
     }
     std::sort(out.begin(), out.end(), less);
@@ -72,18 +86,13 @@ class Trials {
 
  private:
   static bool less(const Tried& a, const Tried& b) { return a.left < b.left; }
-  /// Of a curve over another joint's position one for each of them.
-  void add(const EffectInfo& info, int parts, std::vector<EffectCandidate>& to) const {
-    if (!info.needs_peers) return add(info, scales_[joint_], {}, parts, to);
-    for (std::size_t other = 0; other < scales_.size(); ++other) {
-      if (other != joint_) add(info, scales_[other], {static_cast<double>(other + 1)}, parts, to);
-    }
-  }
-  /// Knots over each of so many parts of the motion, and over those between.
-  void add(const EffectInfo& info, const MotionScales& scales, const std::vector<double>& first, int parts,
-           std::vector<EffectCandidate>& to) const {
+  /// Knots over each of so many parts of the motion, and over those between. @param of the variable's joint
+  void add(const EffectInfo& info, std::size_t of, int parts, std::vector<EffectCandidate>& to) const {
+    std::vector<double> first;
+    if (info.needs_peers) first.push_back(static_cast<double>(of + 1));
     const std::size_t i = first.size();
-    const double from = info.shape[i].values.tried(scales)[0], span = info.shape[i + 1].values.tried(scales)[0];
+    const double from = info.shape[i].values.tried(scales_[of])[0],
+                 span = info.shape[i + 1].values.tried(scales_[of])[0];
     const double length = span / parts;
     for (int half = 0; length >= info.shape[i + 1].lower && half <= 2 * (parts - 1); ++half) {
       to.push_back({std::string(info.name), joint_, first});
@@ -102,7 +111,7 @@ class Trials {
     count_ += all.size();
     std::vector<Tried> out;
     for (std::size_t i = 0; i < all.size(); ++i) {
-      if (out.empty() || out.back().effect.effect != all[i].effect) out.push_back({all[i]});
+      if (out.empty() || !same_variable(out.back().effect, all[i])) out.push_back({all[i]});
       if (left[i] < out.back().left) out.back() = {all[i], left[i]};
     }
     std::sort(out.begin(), out.end(), less);
@@ -130,6 +139,12 @@ double left_by_velocities_of_others(const Linearised& problem, std::size_t joint
   return left;
 }
 
+/// "cross_position of joint 4"
+std::string words_of_variable(const EffectCandidate& effect) {
+  const std::size_t of = joint_of_variable(effect);
+  return of == effect.joint ? effect.effect : fmt::format("{} of joint {}", effect.effect, of + 1);
+}
+
 /// The curve that explains most at a joint, where it is sure and worth its numbers.
 std::optional<FreeCurve> best_at(const Linearised& problem, std::size_t joint, double size) {
   const Options& options = problem.options();
@@ -154,7 +169,7 @@ std::optional<FreeCurve> best_at(const Linearised& problem, std::size_t joint, d
   out.odds_nothing = odds(before, tried[0].left) - std::log10(static_cast<double>(trials.count()));
   if (tried.size() > 1) {
     out.odds_rival = odds(tried[1].left, tried[0].left);
-    out.rival = tried[1].effect.effect;
+    out.rival = words_of_variable(tried[1].effect);
   }
   if (out.odds_nothing < options.gate.established || out.closes < options.curve.least_share) return {};
   return out;
@@ -203,12 +218,6 @@ std::string variable_of(const EffectInfo& info) {
       return "q";
   }
 }
-
-/// The joint that a curve's variable is of.
-std::size_t joint_of_variable(const EffectCandidate& effect) {
-  return find_effect(effect.effect)->needs_peers ? static_cast<std::size_t>(effect.shape[0]) - 1 : effect.joint;
-}
-
 VectorXd values_of(const std::string& variable, const Linearised& problem, std::size_t log, std::size_t joint) {
   const auto j = static_cast<Index>(joint);
   if (variable == "dq") return problem.motion(log).dq.col(j);
@@ -281,21 +290,20 @@ double misfit(const Linearised& problem, const FreeCurve& curve, const CurveResu
   return std::max(0.0, (of_means - static_cast<double>(bins) * noise) / rows);
 }
 
-/// "friction rises by 0.8 N*m between 0.85 and 1.05 rad": the largest way off the curve's median, and where it is more
-/// than half of that. A curve that goes as far to the other side, by half at least, changes over all of its interval.
-std::string sentence_of(const CurveResult& curve, const Robot& robot, std::size_t joint,
-                        const std::vector<SessionLog>& logs) {
-  const std::vector<CurveResult::Point>& p = curve.points;
+/// The largest way off the curve's median, and where it is more than half of that. A curve that goes as far to the
+/// other side, by half at least, changes over all of its interval.
+struct Bump {
+  double height = 0;  ///< less than 0: a dip
+  bool both_ways = false;
+  double from = 0, to = 0;
+};
+
+Bump bump_of(const std::vector<CurveResult::Point>& p) {
   std::vector<double> sorted;
   for (const CurveResult::Point& point : p) sorted.push_back(point.y);
   std::sort(sorted.begin(), sorted.end());
   const double median = sorted[sorted.size() / 2], up = sorted.back() - median, down = median - sorted.front();
-  const std::string unit = robot.joints[joint].torque_unit();
-  const std::string what = curve.friction ? "friction" : "torque";
-  if (2 * std::min(up, down) > std::max(up, down)) {
-    return fmt::format("{} changes by {:.2g} {} between {:.2f} and {:.2f} {}{}", what, up + down, unit, p.front().x,
-                       p.back().x, curve.unit, curve.joint > 0 ? fmt::format(" of joint {}", curve.joint) : "");
-  }
+  if (2 * std::min(up, down) > std::max(up, down)) return {up + down, true, p.front().x, p.back().x};
   const double height = up > down ? up : -down;
   const auto share = [&](std::size_t i) { return (p[i].y - median) / height; };
   std::size_t peak = 0;
@@ -309,14 +317,22 @@ std::string sentence_of(const CurveResult& curve, const Robot& robot, std::size_
     from -= from > 0 ? 1 : 0;
     to += to + 1 < p.size() ? 1 : 0;
   }
+  return {height, false, p[from].x, p[to].x};
+}
+
+/// "friction rises by 0.8 N*m between 0.85 and 1.05 rad".
+std::string sentence_of(const CurveResult& curve, const Bump& bump, const Robot& robot, std::size_t joint,
+                        const std::vector<SessionLog>& logs) {
+  const std::string what = curve.friction ? "friction" : "torque";
+  const std::string size = fmt::format("{:.2g} {}", std::fabs(bump.height), robot.joints[joint].torque_unit());
+  if (bump.both_ways) {
+    return fmt::format("{} changes by {} between {:.2f} and {:.2f} {}{}", what, size, bump.from, bump.to, curve.unit,
+                       curve.joint > 0 ? fmt::format(" of joint {}", curve.joint) : "");
+  }
   std::vector<const ProcessedLog*> shown;
   for (const SessionLog& log : logs) shown.push_back(&log.log);
-  GapRegion region;
-  region.signal = curve.signal;
-  region.joint = curve.joint;
-  region.from = p[from].x;
-  region.to = p[to].x;
-  return fmt::format("{} {} by {:.2g} {} {}", what, height > 0 ? "rises" : "falls", std::fabs(height), unit,
+  const GapRegion region = place_of(curve);
+  return fmt::format("{} {} by {} {}", what, bump.height > 0 ? "rises" : "falls", size,
                      words_of(region, robot, joint, shown));
 }
 
@@ -363,7 +379,7 @@ std::vector<FreeCurve> add_free_curves(Models& models, const Outcome& outcome, c
 CurveResult drawn(const Models& models, const FreeCurve& curve, const std::vector<SessionLog>& logs) {
   const EffectInfo& info = *find_effect(curve.effect.effect);
   const std::size_t of_joint = joint_of_variable(curve.effect);
-  const bool turns = models.current.robot.joints[of_joint].type == JointType::revolute;
+  const Joint& of = models.current.robot.joints[of_joint];
   Linearised problem(models, logs, white(models.current.joints.size()));
   problem.solver().set_weights(diluted_weights(problem));
   const LinearFit fit = problem.solver().solve(problem.unknown_columns());
@@ -376,8 +392,9 @@ CurveResult drawn(const Models& models, const FreeCurve& curve, const std::vecto
   CurveResult out;
   out.effect = curve.effect.effect;
   out.signal = variable_of(info);
-  const ParameterInfo& from = info.needs_peers ? find_effect("position_curve")->shape[0] : info.shape[0];
-  out.unit = turns ? from.unit : from.unit_prismatic;
+  const ParameterInfo& from = info.shape[0];
+  const bool turns = of.type == JointType::revolute;
+  out.unit = info.needs_peers ? of.position_unit() : std::string(turns ? from.unit : from.unit_prismatic);
   if (of_joint != curve.effect.joint) out.joint = of_joint + 1;
   out.friction = info.friction && out.signal == "q";
   out.odds_nothing = curve.odds_nothing;
@@ -395,8 +412,19 @@ CurveResult drawn(const Models& models, const FreeCurve& curve, const std::vecto
   const double more = misfit(problem, curve, out, problem.solver().residual(curve.effect.joint, fit));
   for (Index i = 0; i < drawn_points; ++i)
     out.points.push_back({x[i], y[i], std::sqrt(std::max(spread(i, i), 0.0) + more)});
-  const Robot& robot = models.current.robot;
-  out.sentence = sentence_of(out, robot, curve.effect.joint, logs);
+  const Bump bump = bump_of(out.points);
+  out.from = bump.from;
+  out.to = bump.to;
+  out.sentence = sentence_of(out, bump, models.current.robot, curve.effect.joint, logs);
+  return out;
+}
+
+GapRegion place_of(const CurveResult& curve) {
+  GapRegion out;
+  out.signal = curve.signal;
+  out.joint = curve.joint;
+  out.from = curve.from;
+  out.to = curve.to;
   return out;
 }
 

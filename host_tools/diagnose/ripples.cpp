@@ -125,7 +125,7 @@ Spectrum spectrum_of(const OverAngle& data, const ExpectedPower& power, double l
   Spectrum out;
   for (std::size_t i = 0; i < most_wavenumbers; ++i) {
     const double number = lowest + step * static_cast<double>(i), expected = power(number);
-    if (expected < floor || !comes_back(data, number)) break;
+    if (expected < floor) break;
     std::complex<double> sum = 0;
     for (std::size_t k = 0; k < data.q.size(); ++k) {
       sum += at_n[k];
@@ -163,6 +163,7 @@ std::vector<Group> ripples(const Linearised& problem, std::size_t joint, const V
   const Spectrum spectrum = spectrum_of(data, ExpectedPower(problem, joint, data.speed), lowest, step);
   std::vector<Group> out;
   for (const std::size_t i : peaks_of(spectrum.p, most)) {
+    if (!comes_back(data, spectrum.n[i])) continue;
     Group group;
     group.candidate = {std::string(info->name), joint, {spectrum.n[i]}};
     group.nonlinear = 1;

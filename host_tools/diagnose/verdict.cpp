@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "host_tools/diagnose/explore.hpp"
+#include "host_tools/diagnose/free_curves.hpp"
 #include "host_tools/diagnose/gap_errors.hpp"
 #include "host_tools/diagnose/where.hpp"
 #include "host_tools/diagnose/where_words.hpp"
@@ -324,7 +325,7 @@ class ReportWriter {
       out.where = place(*impacts);
       advise(fmt::format("look at the raw torque of joint {} there; an encoder on its link would show a gap", j + 1));
     } else if (of_torque) {
-      out.where = place_of_gap(j, std::min(of.floor, of.before));
+      out.where = place_of_gap(j, std::min(of.floor, of.before), left ? conclusion_.curves[j] : std::nullopt);
     }
     if (left && of_torque) note_doubtful_direction(j);
     if (left && !only_impacts) advise_on_gap(j, out.where.regions);
@@ -351,7 +352,7 @@ class ReportWriter {
   }
 
   /// Where the gap of the model before sits, on the logs that fit and those that judge.
-  GapPlace place_of_gap(std::size_t j, double noise) const {
+  GapPlace place_of_gap(std::size_t j, double noise, const std::optional<CurveResult>& curve) const {
     std::vector<const ProcessedLog*> logs;
     std::vector<VectorXd> loads, errors;
     IdentifiedModel rigid = conclusion_.nominal;
@@ -364,7 +365,9 @@ class ReportWriter {
       loads.emplace_back(predict(rigid, log).col(static_cast<Index>(j)));
       errors.push_back(error_of(log, predict(conclusion_.nominal, log), j));
     }
-    return where(conclusion_.nominal.robot, j, logs, loads, errors, noise, report_);
+    std::optional<GapRegion> of_curve;
+    if (curve) of_curve = place_of(*curve);
+    return where(conclusion_.nominal.robot, j, logs, loads, errors, noise, report_, of_curve);
   }
 
   /// Whether a named effect on the robot is felt at a joint.

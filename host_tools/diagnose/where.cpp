@@ -253,39 +253,70 @@ std::vector<Region> in_time(const std::vector<const ProcessedLog*>& logs, const 
   return {best};
 }
 
-/// Octaves of frequency, without a white noise of that size; their share of the band instead of that of time.
-Region in_frequency(const std::vector<const ProcessedLog*>& logs, const std::vector<VectorXd>& error, double noise) {
-  const double cutoff = logs.front()->filter.torque_cutoff_hz;
+/// Power by frequency of what each log has of it, up to the torque's cut-off.
+struct Octaves {
   VectorXd power;
-  double step = 0;
+  double step_hz = 0;
+  double share(double from, double to) const {
+    const auto a = static_cast<Index>(from / step_hz);
+    const auto b = std::min<Index>(power.size(), static_cast<Index>(to / step_hz));
+    const double whole = power.sum();
+    return b > a && whole > 0 ? std::min(1.0, power.segment(a, b - a).sum() / whole) : 0;
+  }
+};
+
+/// @param noise RMS of a white noise below the cut-off that is no part of it
+Octaves octaves_of(const std::vector<const ProcessedLog*>& logs, const std::vector<VectorXd>& signal, double noise) {
+  const double cutoff = logs.front()->filter.torque_cutoff_hz;
+  Octaves out;
   for (std::size_t l = 0; l < logs.size(); ++l) {
     const ProcessedLog& log = *logs[l];
-    const Spectrum spectrum = welch(error[l].segment(log.first, log.last - log.first), log.step_s);
-    if (power.size() == 0) power = VectorXd::Zero(spectrum.density.size());
-    if (power.size() != spectrum.density.size()) continue;
-    power += spectrum.density * static_cast<double>(log.rows());
-    step = spectrum.frequency(1) - spectrum.frequency(0);
-    const auto inside = std::min<Index>(power.size(), static_cast<Index>(cutoff / step));
-    power.head(inside).array() -= noise * noise / cutoff * static_cast<double>(log.rows());
+    const Spectrum spectrum = welch(signal[l].segment(log.first, log.last - log.first), log.step_s);
+    if (out.power.size() == 0) out.power = VectorXd::Zero(spectrum.density.size());
+    if (out.power.size() != spectrum.density.size()) continue;
+    out.step_hz = spectrum.frequency(1) - spectrum.frequency(0);
+    const auto inside = std::min<Index>(out.power.size(), static_cast<Index>(cutoff / out.step_hz));
+    VectorXd power = spectrum.density.head(inside).array() - noise * noise / cutoff;
+    out.power.head(inside) += power * static_cast<double>(log.rows());
   }
-  const double whole = power.sum();
+  return out;
+}
+
+/// The octave that has more of the gap than of the load, by most: its share of that instead of that of time.
+Region in_frequency(const std::vector<const ProcessedLog*>& logs, const std::vector<VectorXd>& error,
+                    const std::vector<VectorXd>& load, double noise) {
+  const double cutoff = logs.front()->filter.torque_cutoff_hz;
+  const Octaves gap = octaves_of(logs, error, noise), motion = octaves_of(logs, load, 0);
   Region best;
   best.signal = "frequency";
-  for (double from = 0; from < cutoff && whole > 0 && step > 0; from = std::max(2 * from, 0.5)) {
+  for (double from = 0; from < cutoff && gap.step_hz > 0; from = std::max(2 * from, 0.5)) {
     const double to = std::max(2 * from, 0.5);
-    const auto a = static_cast<Index>(from / step), b = std::min<Index>(power.size(), static_cast<Index>(to / step));
-    if (b <= a) continue;
-    const double share = std::min(1.0, power.segment(a, b - a).sum() / whole), of_band = (to - from) / cutoff;
-    if (share - of_band > best.contrast()) best = {"frequency", 0, from, to, share, of_band};
+    const Region region{"frequency", 0, from, to, gap.share(from, to), motion.share(from, to)};
+    if (region.contrast() > best.contrast()) best = region;
   }
   return best;
+}
+
+/// How much of the gap, and of the time, is at the place of a curve; nothing where the signal is not here.
+std::vector<Region> measured(const Samples& samples, const std::optional<GapRegion>& place) {
+  const double whole = samples.power.sum();
+  if (!place || !(whole > 0)) return {};
+  for (const Signal& signal : samples.signals) {
+    if (signal.name != place->signal || signal.joint != place->joint) continue;
+    const Eigen::ArrayXd within =
+        (signal.values.array() >= place->from && signal.values.array() <= place->to).cast<double>();
+    Region out{signal.name, signal.joint, place->from, place->to, 0, within.mean()};
+    out.share = std::min(1.0, (samples.power.array() * within).sum() / whole);
+    return {out};
+  }
+  return {};
 }
 
 }  // namespace
 
 GapPlace where(const Robot& robot, std::size_t index, const std::vector<const ProcessedLog*>& logs,
                const std::vector<VectorXd>& load, const std::vector<VectorXd>& error, double noise,
-               const ReportOptions& options) {
+               const ReportOptions& options, const std::optional<GapRegion>& of_curve) {
   Samples samples = samples_of(logs, index, load, error);
   take_noise(logs, samples, noise);
   std::vector<Region> regions = in_motion(samples, options.region_chance);
@@ -297,17 +328,23 @@ GapPlace where(const Robot& robot, std::size_t index, const std::vector<const Pr
           region.signal,  0,         region.from < -0.5 ? -1.0 : 0.0, region.from < -0.5 ? 0.0 : 1.0, region.share,
           region.of_time, region.log};
   }
-  std::erase_if(regions, [&](const Region& r) { return r.contrast() < options.least_contrast; });
+  const auto drop_faint = [&] {
+    std::erase_if(regions, [&](const Region& r) { return r.contrast() < options.least_contrast; });
+  };
+  drop_faint();
   // What another joint's position explains, its own motion may explain as well: the joint's own is told first.
   std::sort(regions.begin(), regions.end(), [&](const Region& a, const Region& b) {
     const auto rank = [&](const Region& r) { return r.evidence() * (r.joint > 0 ? 1 - options.other_joint : 1); };
     return rank(a) > rank(b);
   });
-  // What has no place in the motion may have one in time, or in the spectrum.
-  if (regions.empty()) regions = in_time(logs, samples, options.region_chance);
-  if (regions.empty() || regions.front().contrast() < options.least_contrast)
-    regions = {in_frequency(logs, error, noise)};
-  std::erase_if(regions, [&](const Region& r) { return r.contrast() < options.least_contrast; });
+  const auto or_else = [&](const auto& others) {
+    if (!regions.empty()) return;
+    regions = others();
+    drop_faint();
+  };
+  or_else([&] { return measured(samples, of_curve); });
+  or_else([&] { return in_time(logs, samples, options.region_chance); });
+  or_else([&] { return std::vector<Region>{in_frequency(logs, error, load, noise)}; });
   GapPlace out;
   for (const Region& region : regions) {
     if (out.regions.size() >= most_regions) break;

@@ -14,6 +14,8 @@ std::span<const ExportFormat> export_formats() {
                    "simulator.urdf", "urdfdom", false, write_urdf_dynamics, replay_urdf},
       ExportFormat{"mjcf", "MuJoCo: bodies, joints with damping, frictionloss and armature, one motor a joint",
                    "simulator.xml", "MuJoCo", true, write_mjcf, replay_mjcf},
+      ExportFormat{"sdf", "Gazebo: bodies, joints with <dynamics> damping and friction, and their limits",
+                   "simulator.sdf", "libsdformat", false, write_sdf, replay_sdf},
   };
   return all;
 }

@@ -37,13 +37,19 @@ struct ExportFormat {
 std::span<const ExportFormat> export_formats();
 /// @throws InputError: unknown; lists the known ones
 const ExportFormat& export_format(const std::string& name);
-/// "urdf, mjcf"
+/// "urdf, mjcf, .."
 std::string export_format_names();
 
 // urdf_format.cpp
 void write_urdf_dynamics(const SimpleRobot& robot, const std::filesystem::path& file);
 ReplayedTorque replay_urdf(const std::filesystem::path& file, const IdentifiedModel& expected, const MotionRows& motion,
                            double step_s);
+// sdf_format.cpp
+void write_sdf(const SimpleRobot& robot, const std::filesystem::path& file);
+ReplayedTorque replay_sdf(const std::filesystem::path& file, const IdentifiedModel& expected, const MotionRows& motion,
+                          double step_s);
+/// Whether libsdformat and its reader of ours are here.
+bool can_read_sdf();
 // mjcf_format.cpp
 void write_mjcf(const SimpleRobot& robot, const std::filesystem::path& file);
 ReplayedTorque replay_mjcf(const std::filesystem::path& file, const IdentifiedModel& expected, const MotionRows& motion,

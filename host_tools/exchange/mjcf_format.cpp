@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "host_tools/exchange/formats.hpp"
+#include "host_tools/exchange/xml_text.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
 
@@ -16,24 +17,6 @@ namespace {
 /// MuJoCo lets pass is twice the time step, whose default is 0.002 s (its documentation, "Solver parameters") [s].
 constexpr double friction_time_s = 0.004;
 
-std::string xyz(const Eigen::Vector3d& v) { return fmt::format("{:.17g} {:.17g} {:.17g}", v.x(), v.y(), v.z()); }
-
-/// As an attribute's value.
-std::string quoted(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '&')
-      out += "&amp;";
-    else if (c == '<')
-      out += "&lt;";
-    else if (c == '"')
-      out += "&quot;";
-    else
-      out += c;
-  }
-  return '"' + out + '"';
-}
-
 std::string body_start(const Joint& joint) {
   const Eigen::Quaterniond turn(joint.origin.linear());
   const Inertial& body = *joint.inertial;
@@ -41,14 +24,14 @@ std::string body_start(const Joint& joint) {
   return fmt::format(
       "<body name={} pos=\"{}\" quat=\"{:.17g} {:.17g} {:.17g} {:.17g}\">\n<inertial pos=\"{}\" mass=\"{:.17g}\" "
       "fullinertia=\"{:.17g} {:.17g} {:.17g} {:.17g} {:.17g} {:.17g}\"/>\n",
-      quoted(joint.link), xyz(joint.origin.translation()), turn.w(), turn.x(), turn.y(), turn.z(), xyz(body.centre),
-      body.mass, t(0, 0), t(1, 1), t(2, 2), t(0, 1), t(0, 2), t(1, 2));
+      quoted(joint.link), numbers(joint.origin.translation()), turn.w(), turn.x(), turn.y(), turn.z(),
+      numbers(body.centre), body.mass, t(0, 0), t(1, 1), t(2, 2), t(0, 1), t(0, 2), t(1, 2));
 }
 
 std::string joint_tag(const Joint& joint, const SimpleJoint& said) {
-  std::string out =
-      fmt::format("<joint name={} type=\"{}\" axis=\"{}\" damping=\"{:.17g}\" armature=\"{:.17g}\"", quoted(joint.name),
-                  joint.type == JointType::revolute ? "hinge" : "slide", xyz(joint.axis), said.damping, said.armature);
+  std::string out = fmt::format("<joint name={} type=\"{}\" axis=\"{}\" damping=\"{:.17g}\" armature=\"{:.17g}\"",
+                                quoted(joint.name), joint.type == JointType::revolute ? "hinge" : "slide",
+                                numbers(joint.axis), said.damping, said.armature);
   if (said.friction > 0)
     out += fmt::format(" frictionloss=\"{:.17g}\" solreffriction=\"{:g} 1\"", said.friction, friction_time_s);
   if (joint.limits && !joint.continuous && joint.limits->lower < joint.limits->upper)
@@ -110,7 +93,7 @@ void write_mjcf(const SimpleRobot& robot, const std::filesystem::path& file) {
       "<mujoco model={}>\n<!-- Written by fxdyn. Joints: damping [N m s/rad], frictionloss [N m], armature [kg m^2], "
       "at "
       "the output of the gear. -->\n<compiler angle=\"radian\"/>\n<option gravity=\"{}\"/>\n<worldbody>\n",
-      quoted(chain.name), xyz(chain.gravity));
+      quoted(chain.name), numbers(chain.gravity));
   for (std::size_t j = 0; j < chain.size(); ++j)
     text += body_start(chain.joints[j]) + joint_tag(chain.joints[j], robot.joints[j]);
   for (std::size_t j = 0; j < chain.size(); ++j) text += "</body>\n";

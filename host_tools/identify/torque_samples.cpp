@@ -48,7 +48,7 @@ TorqueSamples sample_torque(std::span<const ProcessedLog> logs, Index wanted, do
     samples.independent += 2 * log.filter.torque_cutoff_hz * static_cast<double>(log.last - log.first) * log.step_s;
   }
   const Index stride = std::max<Index>(1, available / wanted);
-  std::vector<std::vector<Index>> at;
+  std::vector<std::vector<Index>>& at = samples.at;
   Index rows = 0;
   for (const ProcessedLog& log : logs) {
     at.push_back(log.role == Role::train ? spread_samples(log.first, log.last, stride) : std::vector<Index>{});

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <span>
+#include <vector>
 
 #include "host_tools/regression/dataset.hpp"
 
@@ -11,6 +12,7 @@ namespace fxdyn {
 struct TorqueSamples {
   Eigen::MatrixXd q, dq, ddq, tau;
   double independent = 0;  ///< samples of noise below the torque's cut-off: 2 f T, over all train logs
+  std::vector<std::vector<Eigen::Index>> at{};  ///< per log: which of its samples these are, one log after the other
   Eigen::Index size() const { return tau.rows(); }
 };
 

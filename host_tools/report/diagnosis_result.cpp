@@ -128,6 +128,8 @@ json to_json(const std::optional<CurveResult>& curve) {
           {"unit", curve->unit},
           {"friction", curve->friction},
           {"sentence", curve->sentence},
+          {"from", curve->from},
+          {"to", curve->to},
           {"log10_odds_nothing", curve->odds_nothing},
           {"log10_odds_rival", or_null(curve->odds_rival)},
           {"rival", curve->rival.empty() ? json(nullptr) : json(curve->rival)},
@@ -144,9 +146,11 @@ std::optional<CurveResult> curve_of(const json& file) {
   out.effect = file.at("effect");
   out.signal = file.at("signal");
   out.unit = file.at("unit");
-  if (file.at("joint").is_number()) out.joint = file.at("joint");
+  if (file.value("joint", json()).is_number()) out.joint = file.at("joint");
   out.friction = file.at("friction");
   out.sentence = file.at("sentence");
+  out.from = number_of(file.value("from", json()));
+  out.to = number_of(file.value("to", json()));
   out.odds_nothing = number_of(file.at("log10_odds_nothing"));
   out.odds_rival = optional_of(file.at("log10_odds_rival"));
   if (file.at("rival").is_string()) out.rival = file.at("rival");

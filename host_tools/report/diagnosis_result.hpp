@@ -74,6 +74,7 @@ struct CurveResult {
   std::string unit;                  ///< of the variable
   bool friction = false;             ///< y is friction, and turns with the direction
   std::string sentence;              ///< "friction rises by 0.8 N*m between 0.85 and 1.05 rad"
+  double from = 0, to = 0;           ///< that interval
   double odds_nothing = 0;           ///< log10, on data that did not fit it
   std::optional<double> odds_rival;  ///< .. against the best curve of another variable; none: there is none
   std::string rival;

@@ -44,7 +44,8 @@ std::string summary_table(const fs::path& directory) {
   const Results results = read_results(directory);
   const json &measured = results["metrics"], &replayed = results["replay"], &diagnosis = results["diagnosis"];
   const json& tables = results["export"];
-  const std::string diagnosed = diagnosis.is_null() ? "" : diagnosis_table(diagnosis_of(diagnosis));
+  const std::string diagnosed =
+      diagnosis.is_null() ? "" : diagnosis_table(diagnosis_of(diagnosis), terminal_of_output());
   if (measured.is_null()) return diagnosed;
   const MetricsResult metrics = metrics_of(measured);
   const auto exported = tables.is_null() ? std::nullopt : std::optional(export_of(tables));

@@ -313,8 +313,7 @@ void read_robot(Table& root, const fs::path& file, Scenario& scenario) {
 }  // namespace
 
 double plant_step(const Scenario& scenario) {
-  constexpr double longest_controlled_step = 0.0005;  // under a controller
-  constexpr int substeps = 4;                         // of a sample: friction states are stepped so
+  constexpr int substeps = 4;  // of a sample: friction states are stepped so
   double step = scenario.sample_s / substeps;
   if (scenario.motion == Scenario::Motion::closed_loop) {
     const double tick = scenario.control.tick_s;

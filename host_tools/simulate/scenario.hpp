@@ -62,6 +62,8 @@ struct Scenario {
 /// @throws InputError with file and line.
 Scenario read_scenario(const std::filesystem::path& file);
 
+/// Of the internal plant under a controller [s].
+inline constexpr double longest_controlled_step = 0.0005;
 /// Of the plant's run [s]: a fraction of the samples' step, under a controller a whole fraction of its tick.
 double plant_step(const Scenario& scenario);
 

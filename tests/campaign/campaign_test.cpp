@@ -207,6 +207,15 @@ TEST(CampaignScore, PairsOutsideAndClean) {
   EXPECT_TRUE(curved(3, "friction_over_position"));
   EXPECT_FALSE(curved(3, "velocity_curve"));
   EXPECT_FALSE(curved(2, "friction_over_position"));
+  const auto wound = [&](int other) {
+    json moved = diagnosis;
+    moved["joints"][2]["curve"] = {{"effect", "cross_position"}, {"joint", other}};
+    json of = spot;
+    of["curve"] = "cross_position 1";
+    return score(truth_with(json::array({of})), moved, {}).at("curve_right").get<bool>();
+  };
+  EXPECT_TRUE(wound(1));
+  EXPECT_FALSE(wound(2));
 
   // A background that was there before is no alarm.
   json quiet = truth_with(json::array());

@@ -146,7 +146,7 @@ std::optional<Drawn> draw(const std::string& effect, std::size_t joint, const Pl
   if (effect == "delay") {
     drawn.at = [=](double size) { return EffectFit{effect, {size}, {1}, {}, {}, true}; };
     drawn.typical = 0.004;
-    drawn.largest = 0.028;
+    drawn.largest = plan.longest_delay_s;
     return drawn;
   }
   if (effect == "joint_coupling" || effect == "motor_coupling") {

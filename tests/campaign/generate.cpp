@@ -8,6 +8,7 @@
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/signals/log.hpp"
+#include "host_tools/simulate/scenario.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/support/files.hpp"
 #include "tests/campaign/healthy_friction.hpp"
@@ -322,7 +323,7 @@ json truth_json(const Case& wanted, const Ground& ground) {
     const std::vector<std::string> stands_for = names_of_form(outside.effect);
     if (stands_for.empty()) {
       entry["outside"] = true;
-      entry["curve"] = curve_of(outside.effect);
+      entry["curve"] = curve_of(outside);
     } else {
       entry["names"] = stands_for;
     }
@@ -358,14 +359,20 @@ Ground plan_case(const Case& wanted, const fs::path& folder) {
   const IdentifiedModel healthy = read_model(folder / "plan" / "truth.json");
 
   Ground ground;
-  ground.plan = make_plan(healthy, motions_of(files, healthy.robot));
+  const auto planned = [&](const IdentifiedModel& model, std::vector<Motion> motions) {
+    Plan plan = make_plan(model, std::move(motions));
+    if (wanted.closed_loop && !wanted.mujoco)
+      plan.longest_delay_s = find_effect("delay")->most_ticks * longest_controlled_step;
+    return plan;
+  };
+  ground.plan = planned(healthy, motions_of(files, healthy.robot));
   fs::remove_all(folder / "plan");
   Random random(wanted.seed * 7919 + 11);
   for (const Wanted& one : wanted.background) {
     ground.background.push_back(find(one, {}, ground.plan, random));
     ground.plan =
-        make_plan(with_effect(ground.plan.healthy, ground.background.back().first, ground.background.back().second),
-                  std::move(ground.plan.motions));
+        planned(with_effect(ground.plan.healthy, ground.background.back().first, ground.background.back().second),
+                std::move(ground.plan.motions));
   }
   ground.measured = ground.plan.healthy;
   std::optional<std::size_t> first;

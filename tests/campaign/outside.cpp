@@ -1,5 +1,7 @@
 #include "tests/campaign/outside.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -51,10 +53,10 @@ bool is_outside(const std::string& effect) {
   return in(outside_effects()) || in(other_forms());
 }
 
-std::string curve_of(const std::string& effect) {
-  if (effect == "tight_spot") return "friction_over_position";
-  if (effect == "end_stop") return "position_curve";
-  if (effect == "other_position") return "cross_position";
+std::string curve_of(const Outside& outside) {
+  if (outside.effect == "tight_spot") return "friction_over_position";
+  if (outside.effect == "end_stop") return "position_curve";
+  if (outside.effect == "other_position") return fmt::format("cross_position {}", outside.other + 1);
   return {};
 }
 

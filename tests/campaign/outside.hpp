@@ -39,8 +39,8 @@ struct Place {
 };
 std::optional<Place> place_of(const Outside& outside);
 
-/// The free curve that has its form; "": none has.
-std::string curve_of(const std::string& effect);
+/// The free curve that has its form, "cross_position 4" where it is over the position of joint 4; "": none has.
+std::string curve_of(const Outside& outside);
 
 /// The amplitude that makes it the share of rated torque (RMS over the plan's motions).
 void scale(Outside& outside, double share, const Plan& plan);

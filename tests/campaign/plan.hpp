@@ -12,6 +12,7 @@ struct Plan {
   std::vector<Eigen::MatrixXd> torque;                                   ///< of the healthy robot over them [N*m | N]
   Eigen::VectorXd largest_velocity, largest_torque, largest_structural;  ///< per joint
   Eigen::MatrixXd range;                                                 ///< of q per joint: lowest, highest
+  double longest_delay_s = 0.028;                                        ///< that the plant can play
 
   std::size_t joints() const { return healthy.joints.size(); }
 };

@@ -1,5 +1,7 @@
 #include "tests/campaign/score.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <set>
 
@@ -88,10 +90,12 @@ bool is_placed(const json& joint, const json& place) {
          first.at("to").get<double>() >= place.at("from").get<double>();
 }
 
-/// The free curve that a joint has; "": none.
+/// The free curve that a joint has, "cross_position 4" where it is over the position of joint 4; "": none.
 std::string curve_at(const json& joint) {
   const json curve = joint.value("curve", json());
-  return curve.is_object() ? curve.at("effect").get<std::string>() : std::string();
+  if (!curve.is_object()) return {};
+  const json other = curve.value("joint", json());
+  return curve.at("effect").get<std::string>() + (other.is_number() ? fmt::format(" {}", other.get<int>()) : "");
 }
 
 /// Joints with a free curve.

@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <kdl/chainidsolver_recursive_newton_euler.hpp>
 #include <numbers>
+#include <vector>
 
 #include "host_tools/support/random.hpp"
 #include "tests/support/chains.hpp"
@@ -15,13 +18,34 @@ namespace {
 
 using Eigen::Index;
 
+/// Dry friction with a memory, -1 .. 1: springs in parallel that slip one after the other, not Dahl's equation.
+class SlippingSprings {
+ public:
+  explicit SlippingSprings(double path) : path_(path) {}
+  double after(double moved) {
+    double sum = 0;
+    for (std::size_t i = 0; i < stretch_.size(); ++i) {
+      const double most = path_ * spread[i];
+      stretch_[i] = std::clamp(stretch_[i] + moved, -most, most);
+      sum += stretch_[i] / most;
+    }
+    return sum / static_cast<double>(stretch_.size());
+  }
+
+ private:
+  static constexpr std::array spread{0.2, 0.5, 1.0, 2.0};
+  double path_;
+  std::array<double, 4> stretch_{};
+};
+
 /// Twenty seconds of a robot with KDL's inverse dynamics and friction of another form than the check's. Its torque is
 /// of `late_s` before its motion's time stamps.
 struct Recording {
   Project project;
   Log log;
 
-  explicit Recording(double late_s = 0) {
+  /// @param path of dry friction with a memory [rad], as large as most of the other torques; 0: none
+  explicit Recording(double late_s = 0, double path = 0) {
     project.robot = read_urdf(test::puma560);
     const Robot& robot = project.robot;
     const KDL::Chain chain = test::to_kdl(robot);
@@ -44,6 +68,7 @@ struct Recording {
     };
     const auto size = static_cast<unsigned>(robot.size());
     KDL::JntArray q(size), dq(size), ddq(size), tau(size);
+    std::vector<SlippingSprings> springs(size, SlippingSprings(path));
     for (Index i = 0; i < samples; ++i) {
       for (unsigned j = 0; j < robot.size(); ++j) {
         log.q(i, j) = angle(log.t[i], j, 0);
@@ -56,6 +81,7 @@ struct Recording {
         const double scale = j < 3 ? 2.5 : 0.2;
         log.tau(i, j) =
             tau(j) + scale * std::copysign(std::sqrt(std::fabs(dq(j))), dq(j)) + 0.02 * scale * random.normal();
+        if (path > 0) log.tau(i, j) += 6 * scale * springs[j].after(dq(j) * log.step_s);
       }
     }
   }
@@ -87,6 +113,16 @@ TEST(TorqueColumn, OfAnotherTimeIsMeasured) {
     Recording known(late);
     known.project.signals.torque_lead_s = -late;
     EXPECT_FALSE(known.lead().has_value());
+  }
+}
+
+// Friction that builds up over a path after each reversal lags, as late torque does, but at the reversals alone.
+TEST(TorqueColumn, FrictionWithAMemoryIsNotLate) {
+  for (const double path : {0.003, 0.01}) {
+    EXPECT_FALSE(Recording(0, path).lead().has_value()) << path;
+    const auto late = Recording(0.03, path).lead();
+    ASSERT_TRUE(late.has_value()) << path;
+    EXPECT_NEAR(late->seconds, -0.03, 1.5 * 0.004) << path;
   }
 }
 

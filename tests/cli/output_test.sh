@@ -33,6 +33,11 @@ name = "b"
 duration_s = 4
 period_s = 4
 seed = 2
+[[log]]
+name = "c"
+duration_s = 4
+period_s = 4
+seed = 3
 TOML
 cat >robot.toml <<'TOML'
 [robot]
@@ -69,6 +74,33 @@ says 0 "{'used_by', 'looked_for', 'found'} <= set(d[0])" doctor --json
 "$fxdyn" identify robot.toml --out out --quiet >said 2>err || fail "identify --quiet: $(cat err)"
 [ ! -s said ] || fail "identify --quiet prints: $(head -1 said)"
 ! grep -qv "^note: " err || fail "identify --quiet: $(grep -v "^note: " err | head -1)"
+# On a terminal verdicts have colours and the table is as wide as that; not with NO_COLOR, a dumb one, or in a file.
+cat >look.py <<'PYTHON'
+import fcntl, os, pty, struct, subprocess, sys, termios
+columns, program = int(sys.argv[1]), sys.argv[2:]
+master, slave = pty.openpty()
+fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack('HHHH', 40, columns, 0, 0))
+child = subprocess.Popen(program, stdout=slave, stderr=subprocess.DEVNULL)
+os.close(slave)
+try:
+    while data := os.read(master, 65536):
+        sys.stdout.buffer.write(data)
+except OSError:  # how Linux says that the other end is closed
+    pass
+sys.exit(child.wait())
+PYTHON
+{ cat robot.toml && printf '[[log]]\nfile = "c.csv"\nrole = "validate"\n'; } >judged.toml
+look() { env "$1" "$2" python3 look.py 130 "$fxdyn" diagnose judged.toml --out out >said || fail "diagnose on a terminal: $?"; }
+verdict=$'\033\\[3[123]m(nothing missing|explained|unexplained|partly explained)'
+look TERM=xterm NO_COLOR=
+grep -qE "$verdict" said || fail "no colours on a terminal: $(head -c 300 said)"
+look TERM=xterm NO_COLOR=1
+! grep -q $'\033' said || fail "colours with NO_COLOR"
+grep -q "verdict" said || fail "no table on a terminal"
+look TERM=dumb NO_COLOR=
+! grep -q $'\033' said || fail "colours on a dumb terminal"
+"$fxdyn" diagnose judged.toml --out out >said 2>err || fail "diagnose: $(tail -1 err)"
+! grep -q $'\033' said || fail "colours in a file"
 code=0
 "$fxdyn" identify gone.toml --out out --quiet >said 2>err || code=$?
 [ "$code" -eq 2 ] && grep -q "gone.toml" err && [ ! -s said ] || fail "--quiet hides a complaint"

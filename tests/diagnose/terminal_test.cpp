@@ -75,6 +75,23 @@ TEST(DiagnosisTable, IsAtMostAHundredColumnsWideWhateverTheNames) {
   EXPECT_LE(widest(diagnosis_table(diagnosis_of(diagnosis))), 100U) << diagnosis_table(diagnosis_of(diagnosis));
 }
 
+TEST(DiagnosisTable, IsAsWideAsTheTerminal) {
+  json diagnosis = test::diagnosis();
+  diagnosis["next_experiment"] = std::string(250, 'n');
+  for (const std::size_t width : {100, 130, 160})
+    EXPECT_EQ(widest(diagnosis_table(diagnosis_of(diagnosis), {width, false})), width);
+}
+
+TEST(DiagnosisTable, ColoursAreVerdictsAndChangeNothingElse) {
+  const std::string plain = diagnosis_table(diagnosis_of(test::diagnosis()));
+  std::string coloured = diagnosis_table(diagnosis_of(test::diagnosis()), {100, true});
+  EXPECT_EQ(plain.find('\033'), std::string::npos);
+  expect_parts(coloured, {"\033[31munexplained  ", "\033[32mnothing missing", "diagnosis: \033[31munexplained\033[0m"});
+  for (std::size_t at = 0; (at = coloured.find('\033')) != std::string::npos;)
+    coloured.erase(at, coloured.find('m', at) + 1 - at);
+  EXPECT_EQ(coloured, plain);
+}
+
 TEST(DiagnosisTable, ManagesWithWhatIsThere) {
   DiagnosisResult diagnosis;
   diagnosis.joints = {{"a", "N*m", 1, Verdict::nothing_missing}};

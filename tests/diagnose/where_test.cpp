@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "host_tools/effects/identified_model.hpp"
 #include "tests/diagnose/small_log.hpp"
@@ -118,6 +119,54 @@ TEST_F(Where, AnotherJointsPositionIsNamedWithIt) {
 TEST_F(Where, TheFirstSecondsAreCalledSo) {
   EXPECT_THAT(place([](double, double, double t) { return t < 3; }).sentence, testing::HasSubstr("in the first "));
   EXPECT_THAT(place([](double, double, double t) { return t > 17; }).sentence, testing::HasSubstr("in the last "));
+}
+
+// The load itself, but at another time.
+TEST_F(Where, AGapAsSlowAsTheMotionIsAtNoFrequency) {
+  const VectorXd load = predict(model_, log_).col(static_cast<Index>(joint));
+  VectorXd error(load.size());
+  const Index half = load.size() / 2;
+  error << load.tail(load.size() - half), load.head(half);
+  const GapPlace found = where(model_.robot, joint, {&log_}, {load}, {log_.filter_columns(error)}, 0, {});
+  EXPECT_TRUE(found.regions.empty()) << found.sentence;
+}
+
+TEST_F(Where, AVibrationIsAtItsFrequency) {
+  const VectorXd load = predict(model_, log_).col(static_cast<Index>(joint));
+  VectorXd error(log_.samples());
+  for (Index k = 0; k < error.size(); ++k) error[k] = std::sin(2 * std::numbers::pi * 6 * log_.t[k]);
+  const GapPlace found = where(model_.robot, joint, {&log_}, {load}, {error}, 0, {});
+  ASSERT_EQ(found.regions.size(), 1U);
+  EXPECT_EQ(found.regions[0].signal, "frequency");
+  EXPECT_EQ(found.regions[0].from, 4);
+  EXPECT_EQ(found.regions[0].to, 8);
+  EXPECT_GT(*found.regions[0].share_of_gap, 0.95);
+}
+
+TEST_F(Where, WithoutAClearRegionACurveSaysThePlace) {
+  const VectorXd load = predict(model_, log_).col(static_cast<Index>(joint));
+  const MotionRows motion = log_.joint_motion(static_cast<Index>(joint));
+  VectorXd error = VectorXd::Constant(log_.samples(), 0.1);
+  GapRegion of_curve;
+  of_curve.signal = "q";
+  of_curve.from = 1e3;
+  of_curve.to = -1e3;
+  for (Index k = 0; k < error.size(); ++k) {
+    if (log_.t[k] < 5 || log_.t[k] > 5.5) continue;
+    error[k] = 1;
+    of_curve.from = std::min(of_curve.from, motion.q(k, 0));
+    of_curve.to = std::max(of_curve.to, motion.q(k, 0));
+  }
+  const auto region = [&](const std::optional<GapRegion>& curve) {
+    return where(model_.robot, joint, {&log_}, {load}, {error}, 0.1, {}, curve).regions.at(0);
+  };
+  EXPECT_EQ(region({}).signal, "t");
+  EXPECT_EQ(region(of_curve).signal, "q");
+  EXPECT_EQ(region(of_curve).from, of_curve.from);
+  EXPECT_GT(*region(of_curve).share_of_gap, 0.95);
+  of_curve.from = log_.q.col(joint).minCoeff();
+  of_curve.to = log_.q.col(joint).maxCoeff();
+  EXPECT_EQ(region(of_curve).signal, "t");  // everywhere is no place
 }
 
 // Slow noise has louder and quieter seconds, too.

@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "host_tools/exchange/certificate.hpp"
 #include "host_tools/support/files.hpp"
@@ -51,12 +52,14 @@ class Exchange : public testing::TestWithParam<const char*> {
     format.write(robot, file());
     return certify(format, file(), robot, model, held_out);
   }
+  bool is(const std::string& name) const { return name == format.name; }
   /// As a reader that has another opinion of the unit would have it.
   void change(const std::string& attribute, const std::function<double(double)>& how) const {
     const std::string text = read_file(file());
     const std::size_t joint = text.find("<joint name=\"" + changed_name + "\"");
     ASSERT_NE(joint, std::string::npos);
-    const std::size_t from = text.find(attribute + "=\"", joint) + attribute.size() + 2, to = text.find('"', from);
+    const std::string before = is("sdf") ? "<" + attribute + ">" : attribute + "=\"";
+    const std::size_t from = text.find(before, joint) + before.size(), to = text.find_first_of("\"<", from);
     const double value = std::stod(text.substr(from, to - from));
     write_file(file(), text.substr(0, from) + fmt::format("{:.17g}", how(value)) + text.substr(to));
   }
@@ -90,7 +93,7 @@ TEST_P(Exchange, ViscousAndDryFrictionAreTheModelsOwn) {
 
 TEST_P(Exchange, ErrorsInTheFileAreFound) {
   constexpr double degrees = 180 / 3.14159265358979323846, gear = 62.61;
-  const std::string dry = format.name == std::string("urdf") ? "friction" : "frictionloss";
+  const std::string dry = is("mjcf") ? "frictionloss" : "friction";
   struct Injected {
     std::string what, attribute;
     std::function<double(double)> how;
@@ -129,7 +132,7 @@ TEST_P(Exchange, BodiesThatAreChangedAreFound) {
   const SimpleRobot robot = simple();
   format.write(robot, file());
   std::string text = read_file(file());
-  const std::string mass = format.name == std::string("urdf") ? "<mass value=\"" : "mass=\"";
+  const std::string mass = is("urdf") ? "<mass value=\"" : is("sdf") ? "<mass>" : "mass=\"";
   const std::size_t at = text.rfind(mass);
   ASSERT_NE(at, std::string::npos);
   text.insert(at + mass.size(), "1");  // 0.09 -> 10.09 kg
@@ -227,7 +230,7 @@ TEST_P(Exchange, CertificateHoldsWhatTheTableSays) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Formats, Exchange, testing::Values("urdf", "mjcf"),
+INSTANTIATE_TEST_SUITE_P(Formats, Exchange, testing::Values("urdf", "mjcf", "sdf"),
                          [](const auto& instance) { return std::string(instance.param); });
 
 TEST(ExportFormats, UnknownOneIsRefusedWithThoseThereAre) {
@@ -235,7 +238,7 @@ TEST(ExportFormats, UnknownOneIsRefusedWithThoseThereAre) {
     export_format("sldprt");
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("urdf, mjcf"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("urdf, mjcf, sdf"), std::string::npos) << error.what();
   }
 }
 
@@ -249,24 +252,94 @@ TEST(ExportFormats, MujocoRefusesImpossibleBodies) {
   EXPECT_THROW(replay_mjcf(file, model, rest, 0.001), DataError);
 }
 
+/// Any axes and frames, a slide among them, and names that XML has other uses for.
+void expect_read_as_meant(const ExportFormat& format, unsigned seed) {
+  Robot robot = test::Chains(seed).robot(4);
+  robot.name = "one & only";
+  robot.joints[0].name = "a & \"b\" <c>";
+  for (Joint& joint : robot.joints) joint.link = joint.name + " >'link'";
+  for (Joint& joint : robot.joints) make_possible(*joint.inertial);
+  IdentifiedModel model = test::plant_of(robot);
+  SimpleRobot simple{robot, std::vector<SimpleJoint>(4, SimpleJoint{2, 3, format.has_armature ? 0.5 : 0, 10}), {}};
+  const fs::path file = test::folder() / "slides.xml";
+  format.write(simple, file);
+  const Reference motion = test::motion_of(robot, 0.002, 2);
+  const MatrixXd meant = predict(as_model(simple, model), motion.q, motion.dq, motion.ddq, motion.step_s);
+  const ReplayedTorque read = format.replay(file, model, {motion.q, motion.dq, motion.ddq}, motion.step_s);
+  const MatrixXd off = ((read.tau - meant).array() * read.sliding.array()).matrix();
+  EXPECT_LT(off.cwiseAbs().maxCoeff(), 1e-6 * meant.cwiseAbs().maxCoeff()) << format.name << ", seed " << seed;
+  EXPECT_GT(read.sliding.mean(), 0.5) << format.name;
+}
+
 TEST(ExportFormats, PrismaticJointsAndNamesThatNeedCare) {
   for (unsigned seed = 1, found = 0; found < 3; ++seed) {
-    Robot robot = test::Chains(seed).robot(4);
-    if (!test::slides(robot)) continue;
+    if (!test::slides(test::Chains(seed).robot(4))) continue;
     ++found;
-    robot.joints[0].name = "a & \"b\" <c>";
-    for (Joint& joint : robot.joints) make_possible(*joint.inertial);
-    IdentifiedModel model = test::plant_of(robot);
-    SimpleRobot simple{robot, std::vector<SimpleJoint>(4, SimpleJoint{2, 3, 0.5, 10}), {}};
-    const fs::path file = test::folder() / "slides.xml";
-    write_mjcf(simple, file);
-    const Reference motion = test::motion_of(robot, 0.002, 2);
-    const MatrixXd meant = predict(as_model(simple, model), motion.q, motion.dq, motion.ddq, motion.step_s);
-    const ReplayedTorque read = replay_mjcf(file, model, {motion.q, motion.dq, motion.ddq}, motion.step_s);
-    const MatrixXd off = ((read.tau - meant).array() * read.sliding.array()).matrix();
-    EXPECT_LT(off.cwiseAbs().maxCoeff(), 1e-6 * meant.cwiseAbs().maxCoeff());
-    EXPECT_GT(read.sliding.mean(), 0.5);
+    for (const char* name : {"mjcf", "sdf"}) expect_read_as_meant(export_format(name), seed);
   }
+}
+
+TEST(ExportFormats, SdfTurnsOfNinetyDegreesAreExact) {
+  IdentifiedModel model = possible_puma();
+  for (Joint& joint : model.robot.joints)
+    joint.origin.linear() = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitY()).toRotationMatrix() *
+                            Eigen::AngleAxisd(0.3, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  const SimpleRobot simple{model.robot, std::vector<SimpleJoint>(6), {}};
+  const fs::path file = test::folder() / "turned.sdf";
+  write_sdf(simple, file);
+  const MatrixXd q = MatrixXd::Constant(1, 6, 0.4), dq = MatrixXd::Constant(1, 6, 1), ddq = MatrixXd::Constant(1, 6, 2);
+  const MatrixXd meant = predict(as_model(simple, model), q, dq, ddq, 0.001);
+  EXPECT_LT((replay_sdf(file, model, {q, dq, ddq}, 0.001).tau - meant).norm(), 1e-12 * meant.norm());
+}
+
+// libsdformat looks for a home once in a process: this shows something where it runs alone, as under ctest.
+TEST(ExportFormats, ReadingSdfLeavesNothingInTheUsersHome) {
+  const fs::path home = test::folder() / "home";
+  fs::create_directory(home);
+  const char* had = std::getenv("HOME");
+  const std::optional<std::string> before = had == nullptr ? std::nullopt : std::optional<std::string>(had);
+  setenv("HOME", home.c_str(), 1);
+  const IdentifiedModel model = possible_puma();
+  const fs::path file = test::folder() / "home.sdf";
+  write_sdf({model.robot, std::vector<SimpleJoint>(6), {}}, file);
+  const MotionRows rest{MatrixXd::Zero(1, 6), MatrixXd::Zero(1, 6), MatrixXd::Zero(1, 6)};
+  replay_sdf(file, model, rest, 0.001);
+  EXPECT_EQ(std::string(std::getenv("HOME")), home.string());
+  EXPECT_TRUE(fs::is_empty(home));
+  if (before)
+    setenv("HOME", before->c_str(), 1);
+  else
+    unsetenv("HOME");
+}
+
+TEST(ExportFormats, SdfNeedsANameForEachLinkAndJoint) {
+  const IdentifiedModel model = possible_puma();
+  for (const char* name : {"joint_2", "world", "a::b", "__root__", ""}) {
+    SimpleRobot robot{model.robot, std::vector<SimpleJoint>(6), {}};
+    robot.robot.joints[1].name = "joint_2";
+    robot.robot.joints[3].link = name;
+    const fs::path file = test::folder() / "names.sdf";
+    EXPECT_THROW(write_sdf(robot, file), InputError) << name;
+    EXPECT_FALSE(fs::exists(file)) << name;
+  }
+}
+
+TEST(ExportFormats, SdfOfAnotherRobotIsRefused) {
+  const IdentifiedModel model = possible_puma();
+  const MotionRows rest{MatrixXd::Zero(1, 6), MatrixXd::Zero(1, 6), MatrixXd::Zero(1, 6)};
+  const auto refused = [&](const std::string& text) {
+    const fs::path file = test::folder() / "other.sdf";
+    write_file(file, text);
+    EXPECT_THROW(replay_sdf(file, model, rest, 0.001), DataError) << text.substr(0, 200);
+  };
+  refused("no XML");
+  refused("<sdf version=\"1.7\"><model name=\"m\"><link name=\"one\"/></model></sdf>");
+  const fs::path file = test::folder() / "right.sdf";
+  write_sdf({model.robot, std::vector<SimpleJoint>(6), {}}, file);
+  std::string text = read_file(file);
+  const std::size_t axis = text.find("<axis>");
+  refused(std::string(text).insert(axis, "<pose>1e-6 0 0 0 0 0</pose>"));  // a joint beside its link's origin
+  refused(std::string(text).insert(axis, "<pose>0 0 0 0 0 0.001</pose>"));
 }
 
 TEST(ExportFormats, UrdfKeepsWhatItDoesNotKnow) {

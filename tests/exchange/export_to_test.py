@@ -68,12 +68,12 @@ with tempfile.TemporaryDirectory() as name:
     run('simulate', work / 'scenario.toml', '--out', work / 'logs')
     project, out = work / 'arm.toml', work / 'out'
     project.write_text(PROJECT.format(other='test'))
-    said = run('export', '--to', 'urdf,mjcf', project, '--out', out).stdout
+    said = run('export', '--to', 'urdf,mjcf,sdf', project, '--out', out).stdout
     check(not (out / 'tables.bin').exists(), 'no tables are written')
     # what was identified: how near that is to what was simulated is for the tests of identify
     fits = [{e['effect']: e['parameters'] for e in j['effects']} for j in json.loads((out / 'model.json').read_text())['joints']]
     value = lambda joint, effect, name: next(p['value'] for p in fits[joint][effect] if p['name'] == name)
-    for form, file in ('urdf', 'simulator.urdf'), ('mjcf', 'simulator.xml'):
+    for form, file in ('urdf', 'simulator.urdf'), ('mjcf', 'simulator.xml'), ('sdf', 'simulator.sdf'):
         certificate = json.loads((out / f'certificate_{form}.json').read_text())
         check(certificate['as_meant'] and certificate['role'] == 'test', f'{form}: {certificate}')
         tree = xml.parse(out / file)
@@ -81,11 +81,15 @@ with tempfile.TemporaryDirectory() as name:
         for i, joint in enumerate(certificate['joints']):
             check(f'{joint["joint"]} ' in said and f'{joint["cannot_say"]:.4g}' in said, f'{form}: a line for {joint["joint"]}')
             found = tree.find(f".//joint[@name='{joint['joint']}']")
-            found = found.find('dynamics') if form == 'urdf' else found
-            dry = found.get('friction' if form == 'urdf' else 'frictionloss')
+            if form == 'sdf':
+                dynamics = found.find('axis/dynamics')
+                damping, dry = dynamics.findtext('damping'), dynamics.findtext('friction')
+            else:
+                found = found.find('dynamics') if form == 'urdf' else found
+                damping, dry = found.get('damping'), found.get('friction' if form == 'urdf' else 'frictionloss')
             # Damping and dry friction share what the file can't say, so neither is the model's alone; their torque is.
             for speed in (0.5, 1.0):
-                torque = float(found.get('damping')) * speed + float(dry)
+                torque = float(damping) * speed + float(dry)
                 model = value(i, 'viscous', 'coefficient') * speed + value(i, 'coulomb', 'amplitude')
                 check(abs(torque - model) < 0.03 * model, f'{form}: friction at {speed} rad/s {torque}, model {model}')
             check(joint['file_rmse'] >= joint['model_rmse'] * 0.9, f'{form}: {joint}')

@@ -12,7 +12,13 @@ cd "$work"
 "$fxdyn" effects --json >effects
 grep -q '^[0-9]' version || { echo "install: no version" >&2; exit 1; }
 grep -q '"effect": "coulomb"' effects || { echo "install: no effects" >&2; exit 1; }
-if ldd "$fxdyn" | grep -e "not found" -e "$1"; then
-  echo "install: needs libraries of the build folder" >&2
-  exit 1
-fi
+# What is opened at run time is where the program looks for it.
+runpath=$(readelf -d "$fxdyn" | sed -n 's/.*R.*PATH.*\[\(.*\)\]/\1/p')
+reader=${runpath/\$ORIGIN/$work/prefix/bin}/libfxdyn_sdf_reader.so
+[ -f "$reader" ] || { echo "install: no reader of SDF in '$runpath'" >&2; exit 1; }
+for file in "$fxdyn" "$reader"; do
+  if ldd "$file" | grep -e "not found" -e "$1"; then
+    echo "install: $file needs libraries of the build folder" >&2
+    exit 1
+  fi
+done

@@ -189,6 +189,7 @@ std::uint32_t effect_of() {
   static JointInput<Numbers> input{};
   static Saturations saturations;
   static volatile std::int64_t sum;
+  if constexpr (needs_peers<E>) input.peers = {&input, 1};
   // What never changes is a constant for the compiler: here it may have been changed.
   asm volatile("" : : "r"(&words), "r"(&state), "r"(&input) : "memory");
   return count([&] { sum = contribution<E, Numbers>(input, Words<Numbers>{words.data()}, state, saturations).raw; });
@@ -222,6 +223,11 @@ std::uint32_t inputs_of() {
 }
 /// Beside those before: their figures depend on the size of the function that they are in.
 [[gnu::noinline]] void report_slip() { report("maxwell_slip", effect_of<MaxwellSlip>()); }
+[[gnu::noinline]] void report_curves() {
+  report("position_curve", effect_of<PositionCurve>());
+  report("friction_over_position", effect_of<FrictionOverPosition>());
+  report("cross_position", effect_of<CrossPosition>());
+}
 
 }  // namespace
 
@@ -237,5 +243,6 @@ int main() {
   report("one_joint_mean", one_joint_mean(std::make_index_sequence<Model::joints>{}));
   report_other_kinds();
   report_slip();
+  report_curves();
   hal::semihosting::exit(ramps_are_exact() && clamps_are_exact() ? 0 : 1);
 }
