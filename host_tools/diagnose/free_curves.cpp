@@ -299,8 +299,8 @@ struct Bump {
 };
 
 Bump bump_of(const std::vector<CurveResult::Point>& p) {
-  std::vector<double> sorted;
-  for (const CurveResult::Point& point : p) sorted.push_back(point.y);
+  std::vector<double> sorted(p.size());
+  std::transform(p.begin(), p.end(), sorted.begin(), [](const CurveResult::Point& point) { return point.y; });
   std::sort(sorted.begin(), sorted.end());
   const double median = sorted[sorted.size() / 2], up = sorted.back() - median, down = median - sorted.front();
   if (2 * std::min(up, down) > std::max(up, down)) return {up + down, true, p.front().x, p.back().x};
@@ -329,8 +329,8 @@ std::string sentence_of(const CurveResult& curve, const Bump& bump, const Robot&
     return fmt::format("{} changes by {} between {:.2f} and {:.2f} {}{}", what, size, bump.from, bump.to, curve.unit,
                        curve.joint > 0 ? fmt::format(" of joint {}", curve.joint) : "");
   }
-  std::vector<const ProcessedLog*> shown;
-  for (const SessionLog& log : logs) shown.push_back(&log.log);
+  std::vector<const ProcessedLog*> shown(logs.size());
+  std::transform(logs.begin(), logs.end(), shown.begin(), [](const SessionLog& log) { return &log.log; });
   const GapRegion region = place_of(curve);
   return fmt::format("{} {} by {} {}", what, bump.height > 0 ? "rises" : "falls", size,
                      words_of(region, robot, joint, shown));
