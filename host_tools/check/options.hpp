@@ -55,7 +55,7 @@ struct ArrangementOptions {
   double least_lead_s = 0.010;
   /// share of what stays unexplained; torque is reported as late where moving it leaves less; hand: what is missing in
   /// the model of a measured robot gains evidence at other times, and leaves 0.97 there; late torque leaves 0.6 at most
-  /// on the robots that the rule was tuned on
+  /// on robots 1000 to 1065 of check_study, which the rule was tuned on
   double lead_leaves = 0.8;
   /// share of what stays unexplained, squared; a shift that adds less can't be separated from none; hand: what friction
   /// with a memory adds on the measured sets

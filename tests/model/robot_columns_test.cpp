@@ -51,7 +51,7 @@ std::vector<double> shape_of(std::string_view effect, std::size_t joint) {
   if (effect == "backlash") return {5};
   if (effect == "position_curve" || effect == "friction_over_position") return {-0.2, 1};
   if (effect == "velocity_curve") return {-1, 2};
-  if (effect == "cross_position") return {joint == 0 ? 2.0 : 1.0, -0.2, 1};
+  if (effect == "cross_position") return {joint == 0 ? 2.0 : 1.0, -0.07, 0.85};  // where joint 1 comes by
   return std::vector<double>(find_effect(effect)->shape.size(), 1);
 }
 
