@@ -215,6 +215,7 @@ class Diagnoser {
   /// The model has the curves that are told of, where validate logs confirm each: beyond the motion that fitted it, a
   /// curve is a guess.
   void take_curves(const Outcome& outcome, Diagnosis& result) const {
+    if (settings_.max_effects == 0) return;  // the BLS is to learn what is left
     std::vector<JointDiagnosis>& told = result.report.joints;
     std::vector<bool> without = still_;
     for (std::size_t j = 0; j < joints(); ++j) without[j] = without[j] || !told[j].curve;

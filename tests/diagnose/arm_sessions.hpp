@@ -28,6 +28,7 @@ struct Sessions {
   bool baseline = true;
   bool validate = true;
   bool test = true;
+  int max_effects = 3;
   double test_starts_s = 48;                   ///< a1, a2 begin at 0 and 12 s, b1 and b2 at 24 and 36
   std::function<void(Log&)> tamper = nullptr;  ///< with the logs of the session in question
 };
@@ -94,6 +95,7 @@ inline std::filesystem::path diagnose_sessions(const std::string& name, const Se
   add(true, {"a1", "a2"}, "train");
   add(c.validate, {"b1", "b2"}, "validate");
   add(c.test, {"c1", "c2"}, "test");
+  project += fmt::format("[diagnose]\nmax_effects = {}\n", c.max_effects);
   write_file(folder / "project.toml", project);
   Pipeline(folder / "project.toml", folder / "out").diagnose();
   return folder / "out";

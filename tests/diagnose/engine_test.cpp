@@ -202,5 +202,15 @@ TEST(Diagnosis, WithoutSuchLogsACurveIsAnAnswerOnly) {
   EXPECT_EQ(read_model(out / "model.json").joints[1].find("friction_over_position"), nullptr);
 }
 
+TEST(Diagnosis, WhereNothingIsToBeNamedACurveIsAnAnswerOnly) {
+  if (test::sanitized) GTEST_SKIP() << "other cases run the same code";
+  const std::filesystem::path out =
+      test::diagnose_sessions("spot_left", {.baseline = false, .max_effects = 0, .tamper = tight_spot});
+  const json joint = json::parse(read_file(out / "diagnosis.json")).at("joints").at(1);
+  ASSERT_TRUE(joint.at("curve").is_object()) << joint.dump(1);
+  EXPECT_FALSE(joint.at("curve").at("in_model"));
+  EXPECT_EQ(read_model(out / "model.json").joints[1].find("friction_over_position"), nullptr);
+}
+
 }  // namespace
 }  // namespace fxdyn
