@@ -9,7 +9,7 @@ packages=(
   g++ cmake ninja-build pkg-config
   # host libraries
   libeigen3-dev liburdfdom-dev libtomlplusplus-dev nlohmann-json3-dev libcli11-dev libfmt-dev zlib1g-dev
-  libzstd-dev liblz4-dev libsqlite3-dev libsdformat-dev
+  libzstd-dev liblz4-dev libsqlite3-dev libmatio-dev libhdf5-dev libsdformat-dev
   # pins of the node on Linux
   libgpiod-dev
   # report: its pictures; what npm needs to install its plotting library

@@ -64,11 +64,15 @@ std::optional<Kind> kind_of(const std::vector<std::string>& words) {
     return std::any_of(words.begin(), words.end(), [&](const std::string& word) { return is_one_of(word, list); });
   };
   if (has({"ddq", "qdd", "acc", "accel", "acceleration", "accelerations"})) return acceleration;
-  if (has({"dq", "qd", "vel", "velocity", "velocities", "speed", "speeds"})) return velocity;
+  if (has({"dq", "qd", "vel", "qvel", "velocity", "velocities", "speed", "speeds"})) return velocity;
   if (has({"tau", "torque", "torques", "effort", "efforts", "moment"})) return torque;
   if (has({"current", "currents", "cur", "amps", "amp", "i", "iq"})) return current;
-  if (has({"q", "pos", "position", "positions", "angle", "angles"})) return position;
-  if (has({"t", "time", "timestamp", "stamp", "stamps", "sec", "secs", "seconds", "clock"})) return time;
+  if (has({"q", "pos", "qpos", "position", "positions", "angle", "angles"})) return position;
+  if (has({"t", "time", "timestamp", "stamp", "timestamps", "stamps", "tout", "sec", "secs", "seconds", "clock"}))
+    return time;
+  // A voltage has this letter, too, but more words beside it.
+  if (words.size() == 2 && words.front() == "v" && std::isdigit(static_cast<unsigned char>(words.back()[0])) != 0)
+    return velocity;
   return {};
 }
 

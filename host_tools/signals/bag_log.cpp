@@ -2,10 +2,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "host_tools/bags/joint_recording.hpp"
-#include "host_tools/signals/column_layout.hpp"
+#include "host_tools/signals/column_cut.hpp"
 #include "host_tools/signals/log_reader.hpp"
 #include "host_tools/support/error.hpp"
 
@@ -116,43 +115,6 @@ void leave_out_absent(LogFormat& format, const JointTopic& topic) {
   }
 }
 
-/// The rows in the window. Drivers that start or stop send NaN: such rows count neither at the begin nor at the end.
-ColumnTable cut(std::vector<std::vector<double>> columns, const Names& names, const LogRequest& request,
-                const std::string& where, std::string& note) {
-  ColumnTable out;
-  out.first_t = columns[0].front();
-  out.last_t = columns[0].back();
-  const auto bound = [&](double t) {
-    return static_cast<std::size_t>(std::lower_bound(columns[0].begin(), columns[0].end(), t) - columns[0].begin());
-  };
-  std::size_t begin = bound(request.from), end = bound(request.to);
-  const auto bad = [&](std::size_t row) {
-    return std::find_if(columns.begin(), columns.end(),
-                        [&](const std::vector<double>& column) { return !std::isfinite(column[row]); }) -
-           columns.begin();
-  };
-  const auto all = static_cast<std::ptrdiff_t>(columns.size());
-  const std::size_t rows = end - std::min(begin, end);
-  while (begin < end && bad(begin) != all) ++begin;
-  while (begin < end && bad(end - 1) != all) --end;
-  if (begin < end && end - begin < rows)
-    note += fmt::format("{}{}: {} rows at its ends are not numbers in every column: left out", note.empty() ? "" : "; ",
-                        where, rows - (end - begin));
-  for (std::size_t row = begin; row < end; ++row) {
-    if (const auto column = bad(row); column != all)
-      throw InputError(
-          fmt::format("{}: '{}' is no number at t = {:.9g} s, though it is one before and after; cut it out "
-                      "by from_s and to_s, or record it again",
-                      where, names[static_cast<std::size_t>(column)], columns[0][row]));
-  }
-  for (std::vector<double>& column : columns) {
-    column.resize(std::max(begin, end));
-    column.erase(column.begin(), column.begin() + static_cast<std::ptrdiff_t>(begin));
-  }
-  out.columns = std::move(columns);
-  return out;
-}
-
 }  // namespace
 
 RecordedLog read_bag_log(const LogRequest& request) {
@@ -176,7 +138,7 @@ RecordedLog read_bag_log(const LogRequest& request) {
   if (table.columns[0].size() < 2) throw InputError(where + ": fewer than 2 messages");
   std::string note = recording.note;
   if (!table.note.empty()) note += (note.empty() ? "" : "; ") + table.note;
-  ColumnTable rows = cut(std::move(table.columns), layout.names, request, where, note);
+  ColumnTable rows = cut_rows(std::move(table.columns), layout.names, request, where, note);
   const double first_t = rows.first_t, last_t = rows.last_t;
   Log log = to_log(std::move(rows), layout, request.joints);
   log.time_note = note;

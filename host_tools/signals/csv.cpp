@@ -142,13 +142,6 @@ ColumnNames header_of(LineReader& lines, const std::string& where) {
   return header(where, lines.number(), first);
 }
 
-std::string unit_note(const std::string& file, const TimeUnit& unit) {
-  return fmt::format(
-      "{}: time stamps read as {}, by their steps; time_unit = \"{}\" in its [[log]] says it, or another of s, ms, "
-      "us, ns",
-      file, unit.name, unit.name);
-}
-
 }  // namespace
 
 RecordedLog read_csv(const LogRequest& request) {
@@ -166,7 +159,7 @@ RecordedLog read_csv(const LogRequest& request) {
   ColumnTable table = rows.read(mapped, lines, request.from, request.to, unit);
   const double first_t = table.first_t, last_t = table.last_t;
   Log log = to_log(std::move(table), layout, request.joints);
-  if (!time_is_known && unit.per_second != 1) log.time_note = unit_note(request.file.filename().string(), unit);
+  if (!time_is_known && unit.per_second != 1) log.time_note = unit_note(unit, request.file.filename().string());
   return {std::move(log), first_t, last_t, time_is_known};
 }
 

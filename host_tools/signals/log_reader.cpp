@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 
+#include "host_tools/arrays/arrays.hpp"
 #include "host_tools/bags/bag.hpp"
 
 namespace fxdyn {
@@ -10,8 +11,10 @@ namespace {
 
 /// The last one reads what no other knows.
 constexpr std::array readers{
-    LogReader{"mcap", ".mcap", read_bag_log, is_bag, bag_columns},
-    LogReader{"rosbag2", ".db3", read_bag_log, is_bag, bag_columns},
+    LogReader{"mcap", ".mcap", read_bag_log, is_bag, bag_columns, true},
+    LogReader{"rosbag2", ".db3", read_bag_log, is_bag, bag_columns, true},
+    LogReader{"matlab", ".mat", read_array_log, is_matlab, array_columns},
+    LogReader{"hdf5", ".h5", read_array_log, is_hdf5, array_columns},
     LogReader{"csv", ".csv", read_csv},
 };
 
@@ -43,7 +46,7 @@ std::vector<std::string> joint_columns_of(const std::string& signal, const std::
 
 LogFormat with_joint_names(const std::filesystem::path& file, LogFormat format,
                            const std::vector<std::string>& joints) {
-  if (reader_of(file).columns == nullptr) return format;
+  if (!reader_of(file).names_joints) return format;
   for (const char* signal : signal_names) {
     if (format.columns.contains(signal) || format.joint_columns.contains(signal)) continue;
     const std::vector<std::string> names = joint_columns_of(signal, joints);

@@ -40,13 +40,13 @@ struct RecordedLog {
   bool time_is_known = false;
 };
 
-/// What a file has whose columns carry the joints' names, as in "elbow.effort": of each topic.
+/// The columns of a file that may hold several logs: of each topic of a recording, of each struct or group of arrays.
 struct LogColumns {
   std::string topic;
   std::vector<std::string> names;
 };
 
-/// The entry of LogFormat::columns that says which topic of a recording is meant; none: the one that has the joints.
+/// The entry of LogFormat::columns that says which topic, struct or group is meant; none: the one that has the joints.
 inline constexpr const char* topic_key = "topic";
 
 /// A file format. One more: a file with its `read`, and a line in log_reader.cpp.
@@ -57,10 +57,11 @@ struct LogReader {
   RecordedLog (*read)(const LogRequest& request);
   /// Whether a file is its own, by its first bytes; it may have any name. nullptr: the extension says it.
   bool (*knows)(const std::filesystem::path& file) = nullptr;
-  /// Of a format that names the joints; the topic that serves best first. nullptr: a line of the text names the
+  /// Of a format that may hold several logs; the topic that serves best first. nullptr: a line of the text names the
   /// columns.
   /// @throws InputError: it has none
   std::vector<LogColumns> (*columns)(const std::filesystem::path& file) = nullptr;
+  bool names_joints = false;  ///< its columns carry the joints' names, as in "elbow.effort"
 };
 
 /// All formats.
@@ -76,6 +77,10 @@ RecordedLog read_csv(const LogRequest& request);
 /// "JOINT.command." with these. Two ends of a recording that carry no numbers are left out, and told.
 RecordedLog read_bag_log(const LogRequest& request);
 std::vector<LogColumns> bag_columns(const std::filesystem::path& file);
+/// Arrays of MATLAB (4, 5, 7.3) or HDF5 with a vector of stamps, see array_groups.hpp: one row or one column of each a
+/// sample. Samples at the end that were never filled (NaN) are left out, and told.
+RecordedLog read_array_log(const LogRequest& request);
+std::vector<LogColumns> array_columns(const std::filesystem::path& file);
 
 /// The format for a file that names its joints: the columns of the robot's joints, for all signals that the format does
 /// not say. Of other files, the format as it is.

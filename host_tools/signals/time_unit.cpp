@@ -80,4 +80,11 @@ TimeUnit unit_of_stamps(const std::vector<double>& stamps, const std::string& fi
       possible.empty() ? "s" : possible.front().name));
 }
 
+std::string unit_note(const TimeUnit& unit, const std::string& file) {
+  return fmt::format(
+      "{}: time stamps read as {}, by their steps; time_unit = \"{}\" in its [[log]] says it, or another of s, ms, "
+      "us, ns",
+      file, unit.name, unit.name);
+}
+
 }  // namespace fxdyn

@@ -27,5 +27,7 @@ std::optional<TimeUnit> unit_in_name(std::string_view column);
 /// From the first stamps of a log: seconds, unless their steps make that impossible.
 /// @throws InputError: neither the steps nor the size of the stamps tell two units apart; names the line to write
 TimeUnit unit_of_stamps(const std::vector<double>& stamps, const std::string& file);
+/// What to tell of a unit that the steps have shown.
+std::string unit_note(const TimeUnit& unit, const std::string& file);
 
 }  // namespace fxdyn

@@ -12,6 +12,7 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / 'tests/support'))
+import matlab_files
 import ros2_bags
 PAGE = ROOT / 'docs/guide/my-log.md'
 DEMO = ROOT / 'host_tools/demo'
@@ -96,6 +97,14 @@ def ros_2(folder, rows):
     ros2_bags.database(folder / 'my_bag/my_bag_0.db3', messages)
 
 
+def matlab(folder, rows):
+    matrix = matlab_files.matrix
+    # A row a joint, but for the torque.
+    (folder / 'run1.mat').write_bytes(matlab_files.file(
+        matrix('time', [[row[0]] for row in rows]), matrix('q', list(zip(*(row[1] for row in rows)))),
+        matrix('qd', list(zip(*velocities(rows)))), matrix('torque', [row[2] for row in rows]), matrix('rate', [[250.0]])))
+
+
 def odrive(folder, rows):
     names = ['t'] + [f'pos{j + 1}' for j in range(JOINTS)] + [f'iq{j + 1}' for j in range(JOINTS)]
     table(folder / 'odrive.csv', ','.join(names), [[t, *(x * r / (2 * math.pi) for x, r in zip(q, ODRIVE_RATIO)),
@@ -121,7 +130,7 @@ def can_sniffer(folder, rows):
 
 
 KINDS = {'Universal Robots (RTDE)': universal_robots, 'Franka (libfranka)': franka, 'KUKA (RSI)': kuka, 'Staubli': staubli,
-         'ROS 2': ros_2, 'ODrive': odrive, 'moteus': moteus, 'A CAN sniffer (CiA 402)': can_sniffer}
+         'ROS 2': ros_2, 'MATLAB and HDF5': matlab, 'ODrive': odrive, 'moteus': moteus, 'A CAN sniffer (CiA 402)': can_sniffer}
 
 
 def commands_of(page):

@@ -34,6 +34,7 @@ import good
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "support"))
+import matlab_files
 import ros2_bags
 TIMEOUT_S = 60
 
@@ -55,11 +56,28 @@ def make_bag(kind, text):
     return data[:len(data) // 2] if kind == "cut" else data
 
 
+def make_matlab(kind, text):
+    """The log's columns as variables of a MATLAB file: time, and a matrix each of position and torque."""
+    rows = [list(map(float, line.split(","))) for line in text.splitlines()[1:]]
+    t, q, tau = [row[:1] for row in rows], [row[1:3] for row in rows], [row[3:5] for row in rows]
+    if kind == "of other lengths":
+        tau = tau[:-1]
+    if kind == "with NaN":
+        tau[700] = [tau[700][0], float("nan")]
+    variables = [] if kind == "without time stamps" else [matlab_files.matrix("time", t)]
+    variables.append(matlab_files.matrix("q", list(zip(*q))))  # a row a joint, as it often is
+    variables.append(matlab_files.matrix("tau", tau, imaginary=kind == "with complex numbers"))
+    data = matlab_files.file(*variables)
+    return data[:len(data) // 2] if kind == "cut" else data
+
+
 def make_bytes(kind, text, file):
     """The log's text as other programs would store it; None: `file` was written."""
     data = text.encode()
     if kind.startswith("bag "):
         return make_bag(kind.removeprefix("bag "), text)
+    if kind.startswith("matlab "):
+        return make_matlab(kind.removeprefix("matlab "), text)
     if kind == "gzip":
         return gzip.compress(data, 1)
     if kind == "gzip, cut":

@@ -11,6 +11,7 @@ cd "$root"
 mkdir -p "$build"
 flags=(-std=c++20 -O1 -g1 -fsanitize=integer,undefined -fno-sanitize-recover=all
   -fsanitize-ignorelist=tests/portable/not_checked.txt -I"$root" -isystem /usr/include/eigen3
+  $(pkg-config --cflags matio hdf5-serial)
   -DFXDYN_SOURCE_DIR="\"$root\"" -DFXDYN_TABLES_HEADER="\"$model/tables.hpp\"" -DFXDYN_VECTORS_HEADER="\"$model/vectors.hpp\"")
 # A folder of host_tools in one go: most of the time goes into headers.
 sources=()
@@ -29,7 +30,7 @@ for source in "${sources[@]}"; do
   clang++-14 "${flags[@]}" -c "$source" -o "$object"
   objects+=("$object")
 done
-clang++-14 -fsanitize=integer,undefined "${objects[@]}" -o "$build/test" -lrapidcheck -lgtest_main -lgtest -lpthread -lfmt -lz -lzstd -llz4 -lsqlite3 \
+clang++-14 -fsanitize=integer,undefined "${objects[@]}" -o "$build/test" -lrapidcheck -lgtest_main -lgtest -lpthread -lfmt -lz -lzstd -llz4 -lsqlite3 $(pkg-config --libs matio hdf5-serial) \
   -Wl,--as-needed -lurdfdom_model -ltinyxml -lconsole_bridge
 rm "${objects[@]}"
 UBSAN_OPTIONS=print_stacktrace=1 RC_PARAMS=seed=1 timeout 300 "$build/test"
