@@ -5,18 +5,14 @@
 
 #include "hal/fake/serial.hpp"
 #include "hal/slcan.hpp"
+#include "tests/hal/slcan_text.hpp"
 
 namespace fxdyn::hal {
 namespace {
 
-std::string line_of(const ClassicFrame& frame) {
-  std::array<std::uint8_t, slcan::longest_line> line{};
-  const std::size_t size = slcan::encode(frame, line);
-  return {line.begin(), line.begin() + static_cast<std::ptrdiff_t>(size)};
-}
-std::span<const std::uint8_t> bytes(const std::string& text) {
-  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
-}
+using test::bytes;
+using test::line_of;
+
 void feed(fake::Serial& port, const std::string& text) {
   port.incoming.insert(port.incoming.end(), text.begin(), text.end());
 }
