@@ -182,6 +182,47 @@ def check_draws(path):
               'drawn numbers are used')
 
 
+def read_trajectory(path):
+    """Joint names and points, line by line: every list is one of JSON, and every number in it has a point."""
+    names, points = [], []
+    for line in path.read_text().splitlines():
+        key, _, value = line.lstrip(' -').partition(': ')
+        if key == 'joint_names':
+            names = json.loads(value)
+        elif key in ('positions', 'velocities', 'accelerations', 'effort'):
+            if key == 'positions':
+                points.append({})
+            check(all('.' in word for word in value.strip('[]').split(', ')), f'{key}: YAML 1.1 takes them for numbers')
+            points[-1][key] = json.loads(value)
+        elif key == 'time_from_start':
+            sec, nanosec = re.fullmatch(r'\{sec: (\d+), nanosec: (\d+)\}', value).groups()
+            points[-1]['t'] = int(sec) + 1e-9 * int(nanosec)
+    return names, points
+
+
+def check_trajectory(work):
+    """The whole model's torque, so nothing is lost: what is there is the true torque, but for friction's turns, which
+    the torque's cut-off rounds off."""
+    plan, log = work / 'plan.csv', rows(work / 'logs/a.csv')
+    names = ['t', 'q1', 'q2', 'dq1', 'dq2', 'ddq1', 'ddq2']
+    with open(plan, 'w') as file:
+        csv.writer(file).writerows([names] + [[row[name] if name != 't' else row[name] + 5 for name in names] for row in log])
+    run('predict', '--model', work / 'out/model.json', '--log', plan, '--out', work / 'plan', '--trajectory', '--raw')
+    joints, points = read_trajectory(work / 'plan/plan.yaml')
+    check(joints == list(JOINTS) and len(points) == len(log), f'{joints}, {len(points)} points')
+    truth = rows(work / 'logs/a.truth.csv')
+    middle = range(500, len(log) - 500)
+    check(all(abs(points[k]['t'] - log[k]['t']) < 1e-9 for k in middle), 'time counts from the first point')
+    for j in range(2):
+        rms = lambda values: math.sqrt(sum(x * x for x in values) / len(middle))
+        for key, column in ('positions', 'q'), ('velocities', 'dq'), ('accelerations', 'ddq'):
+            size = rms([log[k][f'{column}{j + 1}'] for k in middle])
+            off = rms([points[k][key][j] - log[k][f'{column}{j + 1}'] for k in middle])
+            check(off < 1e-3 * size, f'{key} {j + 1}: off by {off} of {size}')
+        size, off = rms([truth[k][f'tau{j + 1}'] for k in middle]), rms([truth[k][f'tau{j + 1}'] - points[k]['effort'][j] for k in middle])
+        check(off < 0.01 * size, f'effort {j + 1}: off by {off} of {size} N m')
+
+
 with tempfile.TemporaryDirectory() as name:
     work = pathlib.Path(name)
     (work / 'arm.urdf').write_text((root / 'tests/support/elastic_arm/arm.urdf').read_text())
@@ -193,4 +234,5 @@ with tempfile.TemporaryDirectory() as name:
     for form in READERS:
         check_format(form, work / 'out', held_out)
     check_draws(work / 'out/simulator_isaaclab.py')
+    check_trajectory(work)
 sys.exit(bool(failed))
