@@ -105,7 +105,7 @@ Action add_simulate(CLI::App& verb) {
 Action add_predict(CLI::App& verb) {
   struct Options {
     std::string model, log, numbers = "real", out;
-    bool raw = false;
+    bool raw = false, trajectory = false;
   };
   const auto options = std::make_shared<Options>();
   verb.add_option("--model", options->model, "model.json")->required();
@@ -114,10 +114,14 @@ Action add_predict(CLI::App& verb) {
       ->check(CLI::IsMember({"real", "fixed"}))
       ->capture_default_str();
   verb.add_flag("--raw", options->raw, "torque as computed, with the noise of q; default: below the torque's cut-off");
+  verb.add_flag("--trajectory", options->trajectory,
+                "also the motion with its feedforward, as a JointTrajectory of ROS 2 (YAML)");
   verb.add_option("--out", options->out, "directory for the prediction")->required();
   return [options] {
-    fmt::print("{}", predict_log(options->model, options->log,
-                                 {.fixed = options->numbers == "fixed", .raw = options->raw}, options->out));
+    fmt::print("{}", predict_log(
+                         options->model, options->log,
+                         {.fixed = options->numbers == "fixed", .raw = options->raw, .trajectory = options->trajectory},
+                         options->out));
     fmt::print("prediction in {}\n", options->out);
   };
 }

@@ -79,7 +79,7 @@ Certificate certify(const ExportFormat& format, const std::filesystem::path& fil
     joint.name = meant.robot.joints[j].name;
     joint.unit = meant.robot.joints[j].torque_unit();
     joint.written = meant.joints[j];
-    joint.left_out = left_out(model, j, format.has_armature);
+    joint.left_out = left_out(model, j, format.has_armature, format.has_stribeck);
     joint.cannot_say = std::sqrt(sum.cannot_say[k] / sum.samples);
     joint.file_rmse = std::sqrt(sum.file[k] / sum.samples);
     joint.model_rmse = std::sqrt(sum.model[k] / sum.samples);

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/exchange/certificate.hpp"
+#include "host_tools/exchange/posterior.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
 #include "host_tools/project/project.hpp"
 #include "host_tools/support/error.hpp"
@@ -65,8 +66,9 @@ std::string export_for_simulators(Pipeline& pipeline, const std::vector<std::str
   std::string out;
   for (const std::string& name : formats) {
     const ExportFormat& format = export_format(name);
-    SimpleRobot simple = simple_robot(model, bodies, format.has_armature, train);
+    SimpleRobot simple = simple_robot(model, bodies, format.has_armature, train, {}, format.has_stribeck);
     simple.urdf = pipeline.project().urdf;
+    if (format.has_ranges) simple.ranges = joint_ranges(pipeline.project(), model, train);
     const fs::path file = pipeline.directory() / format.file;
     format.write(simple, file);
     const Certificate certificate = certify(format, file, simple, model, held_out);

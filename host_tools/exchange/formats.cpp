@@ -4,6 +4,7 @@
 
 #include <array>
 
+#include "host_tools/exchange/own_reading.hpp"
 #include "host_tools/support/error.hpp"
 
 namespace fxdyn {
@@ -16,6 +17,13 @@ std::span<const ExportFormat> export_formats() {
                    "simulator.xml", "MuJoCo", true, write_mjcf, replay_mjcf},
       ExportFormat{"sdf", "Gazebo: bodies, joints with <dynamics> damping and friction, and their limits",
                    "simulator.sdf", "libsdformat", false, write_sdf, replay_sdf},
+      ExportFormat{"isaaclab",
+                   "Isaac Lab and mjlab: actuators in Python, with ranges to randomise them; bodies as URDF",
+                   "simulator_isaaclab.py", own_reader, true, write_isaaclab, replay_isaaclab, false, true},
+      ExportFormat{"bam", "BAM: friction models m1 and m2 of each joint as JSON; bodies as URDF", "simulator_bam.json",
+                   own_reader, true, write_bam, replay_bam, true},
+      ExportFormat{"usd", "USD: a layer with PhysX joint friction and armature; bodies as URDF", "simulator_usd.usda",
+                   own_reader, true, write_usd, replay_usd},
   };
   return all;
 }

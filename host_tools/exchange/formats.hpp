@@ -32,6 +32,8 @@ struct ExportFormat {
   /// @throws DataError: the library refuses the file, or other joints are in it
   ReplayedTorque (*replay)(const std::filesystem::path& file, const IdentifiedModel& expected, const MotionRows& motion,
                            double step_s);
+  bool has_stribeck = false;  ///< it knows more dry friction at low speed
+  bool has_ranges = false;    ///< it says what the logs leave open: SimpleRobot::ranges are asked for
 };
 
 std::span<const ExportFormat> export_formats();
@@ -54,5 +56,17 @@ bool can_read_sdf();
 void write_mjcf(const SimpleRobot& robot, const std::filesystem::path& file);
 ReplayedTorque replay_mjcf(const std::filesystem::path& file, const IdentifiedModel& expected, const MotionRows& motion,
                            double step_s);
+// isaaclab_format.cpp
+void write_isaaclab(const SimpleRobot& robot, const std::filesystem::path& file);
+ReplayedTorque replay_isaaclab(const std::filesystem::path& file, const IdentifiedModel& expected,
+                               const MotionRows& motion, double step_s);
+// bam_format.cpp
+void write_bam(const SimpleRobot& robot, const std::filesystem::path& file);
+ReplayedTorque replay_bam(const std::filesystem::path& file, const IdentifiedModel& expected, const MotionRows& motion,
+                          double step_s);
+// usd_format.cpp
+void write_usd(const SimpleRobot& robot, const std::filesystem::path& file);
+ReplayedTorque replay_usd(const std::filesystem::path& file, const IdentifiedModel& expected, const MotionRows& motion,
+                          double step_s);
 
 }  // namespace fxdyn

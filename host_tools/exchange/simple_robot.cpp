@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <optional>
 
 #include "host_tools/support/error.hpp"
 
@@ -62,16 +62,27 @@ struct Sums {
     vr += v * rest;
     sr += s * rest;
   }
-  /// d, f >= 0 that leave the smallest square: inside, or on one of the two edges.
-  std::array<double, 2> solve() const {
+  /// The smallest square of all d, f; nothing: dq and its sign are one column.
+  std::optional<FrictionPair> both() const {
     const double det = vv * ss - vs * vs;
-    if (det > 1e-12 * vv * ss) {
-      const double d = (vr * ss - sr * vs) / det, f = (sr * vv - vr * vs) / det;
-      if (d >= 0 && f >= 0) return {d, f};
-    }
-    const double d = vv > 0 ? std::max(vr / vv, 0.0) : 0, f = ss > 0 ? std::max(sr / ss, 0.0) : 0;
+    if (!(det > 1e-12 * vv * ss)) return std::nullopt;
+    return FrictionPair{(vr * ss - sr * vs) / det, (sr * vv - vr * vs) / det};
+  }
+  FrictionPair damping_alone() const { return {vv > 0 ? vr / vv : 0, 0}; }
+  FrictionPair friction_alone() const { return {0, ss > 0 ? sr / ss : 0}; }
+  /// d, f >= 0 that leave the smallest square: inside, or on one of the two edges.
+  FrictionPair solve() const {
+    const std::optional<FrictionPair> free = both();
+    if (free && free->damping >= 0 && free->friction >= 0) return *free;
+    const double d = std::max(damping_alone().damping, 0.0), f = std::max(friction_alone().friction, 0.0);
     const double gain_of_d = 2 * d * vr - d * d * vv, gain_of_f = 2 * f * sr - f * f * ss;
-    return gain_of_d > gain_of_f ? std::array{d, 0.0} : std::array{0.0, f};
+    return gain_of_d > gain_of_f ? FrictionPair{d, 0} : FrictionPair{0, f};
+  }
+  /// Without bounds, those alone that are not 0 here.
+  FrictionPair solve_like(const SimpleJoint& said) const {
+    if (said.damping > 0 && said.friction > 0) return both().value_or(FrictionPair{});
+    if (said.damping > 0) return damping_alone();
+    return said.friction > 0 ? friction_alone() : FrictionPair{};
   }
 };
 
@@ -99,12 +110,36 @@ IdentifiedModel as_model(const SimpleRobot& simple, IdentifiedModel model) {
     joint.bls.reset();
     joint.effects = {effect_of("viscous", said.damping), effect_of("coulomb", said.friction),
                      effect_of("rotor_inertia", said.armature)};
+    if (said.stribeck == 0) continue;
+    joint.effects.push_back(effect_of("stribeck", said.stribeck));
+    joint.effects.back().shape = {said.stribeck_velocity};
   }
   return model;
 }
 
+std::vector<FrictionPair> fit_friction(const IdentifiedModel& model, const std::vector<ProcessedLog>& logs,
+                                       const std::function<Eigen::MatrixXd(const ProcessedLog&)>& rest,
+                                       const std::vector<SimpleJoint>& inside, const ProjectionOptions& options) {
+  const std::size_t n = model.joints.size();
+  std::vector<Sums> sliding(n), moving(n);
+  for (const ProcessedLog& log : logs) {
+    const Eigen::MatrixXd torque = rest(log);
+    for (std::size_t j = 0; j < n; ++j) {
+      const auto k = static_cast<Eigen::Index>(j);
+      add_samples(sliding[j], log, k, torque, options.sliding_widths * model.joints[j].sign_width);
+      add_samples(moving[j], log, k, torque, 0);
+    }
+  }
+  std::vector<FrictionPair> out;
+  for (std::size_t j = 0; j < n; ++j) {
+    const Sums& sums = (sliding[j].ss > 0 ? sliding : moving)[j];
+    out.push_back(inside.empty() ? sums.solve() : sums.solve_like(inside[j]));
+  }
+  return out;
+}
+
 SimpleRobot simple_robot(const IdentifiedModel& model, const Robot& bodies, bool has_armature,
-                         const std::vector<ProcessedLog>& train, const ProjectionOptions& options) {
+                         const std::vector<ProcessedLog>& train, const ProjectionOptions& options, bool has_stribeck) {
   if (train.empty()) throw DataError("no train log that friction could be fitted over: give one the role \"train\"");
   SimpleRobot out{model.robot, {}, {}};
   for (std::size_t j = 0; j < out.robot.size(); ++j) out.robot.joints[j].inertial = bodies.joints.at(j).inertial;
@@ -117,31 +152,30 @@ SimpleRobot simple_robot(const IdentifiedModel& model, const Robot& bodies, bool
   for (const JointFit& joint : model.joints) {
     const double rotor = has_armature ? std::max(linear_of(joint, "rotor_inertia"), 0.0) : 0;
     out.joints.push_back({0, 0, rotor, joint.tau_limit});
+    const EffectFit* stribeck = has_stribeck ? joint.find("stribeck") : nullptr;
+    if (stribeck == nullptr || !(stribeck->linear.at(0) > 0)) continue;
+    out.joints.back().stribeck = stribeck->linear[0];
+    out.joints.back().stribeck_velocity = stribeck->shape.at(0);
   }
   IdentifiedModel whole = model, without = as_model(out, model);
   whole.filter.torque_lead_s = without.filter.torque_lead_s = 0;  // friction belongs to the velocity of its own sample
-  const std::size_t n = out.joints.size();
-  std::vector<Sums> sliding(n), moving(n);
-  for (const ProcessedLog& log : train) {
-    const Eigen::MatrixXd rest = predict(whole, log) - predict(without, log);
-    for (std::size_t j = 0; j < n; ++j) {
-      const auto k = static_cast<Eigen::Index>(j);
-      add_samples(sliding[j], log, k, rest, options.sliding_widths * model.joints[j].sign_width);
-      add_samples(moving[j], log, k, rest, 0);
-    }
-  }
-  for (std::size_t j = 0; j < n; ++j) {
-    const auto [damping, friction] = (sliding[j].ss > 0 ? sliding : moving)[j].solve();
-    out.joints[j].damping = damping;
-    out.joints[j].friction = friction;
+  const std::vector<FrictionPair> friction = fit_friction(
+      model, train,
+      [&](const ProcessedLog& log) { return Eigen::MatrixXd(predict(whole, log) - predict(without, log)); }, {},
+      options);
+  for (std::size_t j = 0; j < out.joints.size(); ++j) {
+    out.joints[j].damping = friction[j].damping;
+    out.joints[j].friction = friction[j].friction;
   }
   return out;
 }
 
-std::vector<std::string> left_out(const IdentifiedModel& model, std::size_t joint, bool has_armature) {
+std::vector<std::string> left_out(const IdentifiedModel& model, std::size_t joint, bool has_armature,
+                                  bool has_stribeck) {
   std::vector<std::string> out;
   const auto said = [&](const std::string& name) {
-    return name == "viscous" || name == "coulomb" || (has_armature && name == "rotor_inertia");
+    return name == "viscous" || name == "coulomb" || (has_armature && name == "rotor_inertia") ||
+           (has_stribeck && name == "stribeck");
   };
   for (const EffectFit& fit : model.joints.at(joint).effects) {
     if (!said(fit.effect)) out.push_back(fit.effect);

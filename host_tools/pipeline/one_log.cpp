@@ -11,6 +11,7 @@
 #include "host_tools/identify/known_load.hpp"
 #include "host_tools/identify/payload.hpp"
 #include "host_tools/identify/payload_result.hpp"
+#include "host_tools/pipeline/joint_trajectory.hpp"
 #include "host_tools/pipeline/log_check.hpp"
 #include "host_tools/project/log_entries.hpp"
 #include "host_tools/regression/metrics_result.hpp"
@@ -185,6 +186,26 @@ std::string identify_torque_gains(const fs::path& model_file, const fs::path& un
   return gain_table(result, model.robot);
 }
 
+namespace {
+
+/// As the firmware computes, or in double.
+Eigen::MatrixXd torque_of(const IdentifiedModel& model, const ProcessedLog& log, bool fixed) {
+  if (!fixed) return predict(model, log);
+  // At the drive's ticks, as the firmware computes; then back to the log's samples.
+  const TickStates ticks = at_ticks(log, model.tick_s, true);
+  return at_other_times(interpolate(predict_fixed(model, *model.formats, ticks, age_of(model, log)), ticks.t, log.t),
+                        model.filter.torque_lead_s / log.step_s);
+}
+
+/// Feedforward belongs to the motion's own times, however late the log's torque column is.
+void write_trajectory(const fs::path& file, IdentifiedModel model, const ProcessedLog& log, const Prediction& how) {
+  model.filter.torque_lead_s = 0;
+  const Eigen::MatrixXd torque = torque_of(model, log, how.fixed);
+  write_file(file, joint_trajectory(model.robot, log.t, log.motion(), how.raw ? torque : log.filter_columns(torque)));
+}
+
+}  // namespace
+
 std::string predict_log(const fs::path& model_file, const fs::path& log_file, const Prediction& how,
                         const fs::path& directory) {
   const IdentifiedModel model = read_model(model_file);
@@ -198,18 +219,9 @@ std::string predict_log(const fs::path& model_file, const fs::path& log_file, co
   const Eigen::VectorXd stamps = std::move(log.stamps);
   const ProcessedLog processed = process(std::move(log), model.filter);
 
-  Eigen::MatrixXd torque;
-  if (how.fixed) {
-    if (!model.formats)
-      throw InputError(fmt::format("{}: has no fixed-point formats; run `fxdyn export` first", model_file.string()));
-    // At the drive's ticks, as the firmware computes; then back to the log's samples.
-    const TickStates ticks = at_ticks(processed, model.tick_s, true);
-    torque = at_other_times(
-        interpolate(predict_fixed(model, *model.formats, ticks, age_of(model, processed)), ticks.t, processed.t),
-        model.filter.torque_lead_s / processed.step_s);
-  } else {
-    torque = predict(model, processed);
-  }
+  if (how.fixed && !model.formats)
+    throw InputError(fmt::format("{}: has no fixed-point formats; run `fxdyn export` first", model_file.string()));
+  const Eigen::MatrixXd torque = torque_of(model, processed, how.fixed);
   require_log_of(model, log_file, processed, torque);
   const fs::path out = directory / prediction_name(log_file);
   std::error_code ignored;
@@ -221,6 +233,7 @@ std::string predict_log(const fs::path& model_file, const fs::path& log_file, co
   const Eigen::MatrixXd written = how.raw ? torque : processed.filter_columns(torque);
   result.tau = resampled ? interpolate(written, processed.t, stamps) : written;
   write_log(out, result);
+  if (how.trajectory) write_trajectory(fs::path(out).replace_extension(".yaml"), model, processed, how);
   std::vector<LogErrors> errors;
   if (processed.tau.size() > 0) errors.push_back(errors_of(processed, model.robot, torque));
   const MetricsResult metrics{.logs = errors, .numbers = how.fixed ? "fixed" : "real"};

@@ -22,11 +22,13 @@ void require_log_of(const IdentifiedModel& model, const std::filesystem::path& f
                     const Eigen::MatrixXd& torque);
 
 struct Prediction {
-  bool fixed = false;  ///< as the firmware computes, else in double
-  bool raw = false;    ///< as computed; else below the torque's cut-off, which the fit saw: above it is noise of q
+  bool fixed = false;       ///< as the firmware computes, else in double
+  bool raw = false;         ///< as computed; else below the torque's cut-off, which the fit saw: above it is noise of q
+  bool trajectory = false;  ///< and the motion with its feedforward for ros2_control (joint_trajectory.hpp)
 };
 
-/// `fxdyn predict`: torque of the model over one log, in DIR/<name of the log>.csv; the errors as a table for people.
+/// `fxdyn predict`: torque of the model over one log, in DIR/<name of the log>.csv; the errors as a table for people. A
+/// trajectory is DIR/<name of the log>.yaml: the filtered motion, and the torque at its own times.
 std::string predict_log(const std::filesystem::path& model, const std::filesystem::path& log, const Prediction& how,
                         const std::filesystem::path& directory);
 

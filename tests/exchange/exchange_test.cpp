@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <array>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -54,14 +55,39 @@ class Exchange : public testing::TestWithParam<const char*> {
   }
   bool is(const std::string& name) const { return name == format.name; }
   /// As a reader that has another opinion of the unit would have it.
-  void change(const std::string& attribute, const std::function<double(double)>& how) const {
+  /// @param before what stands before the number, one after another
+  void change(const std::vector<std::string>& before, const std::function<double(double)>& how) const {
     const std::string text = read_file(file());
-    const std::size_t joint = text.find("<joint name=\"" + changed_name + "\"");
-    ASSERT_NE(joint, std::string::npos);
-    const std::string before = is("sdf") ? "<" + attribute + ">" : attribute + "=\"";
-    const std::size_t from = text.find(before, joint) + before.size(), to = text.find_first_of("\"<", from);
+    std::size_t from = 0;
+    for (const std::string& word : before) {
+      from = text.find(word, from);
+      ASSERT_NE(from, std::string::npos) << word;
+      from += word.size();
+    }
+    const std::size_t to = text.find_first_of("\"<,}\n", from);
     const double value = std::stod(text.substr(from, to - from));
     write_file(file(), text.substr(0, from) + fmt::format("{:.17g}", how(value)) + text.substr(to));
+  }
+  /// Where the numbers of the changed joint are: viscous and dry friction, rotor.
+  std::array<std::vector<std::string>, 3> places() const {
+    const auto all = [](const std::string& joint, std::array<const char*, 3> names) {
+      return std::array<std::vector<std::string>, 3>{{{joint, names[0]}, {joint, names[1]}, {joint, names[2]}}};
+    };
+    const std::string key = "\"" + changed_name + "\":";
+    if (is("isaaclab")) return {{{"\nVISCOUS_FRICTION = ", key}, {"\nFRICTION = ", key}, {"\nARMATURE = ", key}}};
+    if (is("bam")) return all(key, {"\"friction_viscous\": ", "\"friction_base\": ", "\"armature\": "});
+    if (is("usd")) {
+      return all("over \"" + changed_name + "\"",
+                 {":viscousFrictionCoefficient = ", ":dynamicFrictionEffort = ", ":armature = "});
+    }
+    const std::string joint = "<joint name=\"" + changed_name + "\"";
+    if (is("sdf")) return all(joint, {"<damping>", "<friction>", ""});
+    return all(joint, {"damping=\"", is("mjcf") ? "frictionloss=\"" : "friction=\"", "armature=\""});
+  }
+  /// Of the formats that leave the bodies to a URDF beside them.
+  fs::path file_of_bodies() const {
+    const bool beside = is("isaaclab") || is("bam") || is("usd");
+    return beside ? fs::path(file()).replace_extension(".urdf") : file();
   }
 
   const ExportFormat& format;
@@ -93,30 +119,31 @@ TEST_P(Exchange, ViscousAndDryFrictionAreTheModelsOwn) {
 
 TEST_P(Exchange, ErrorsInTheFileAreFound) {
   constexpr double degrees = 180 / 3.14159265358979323846, gear = 62.61;
-  const std::string dry = is("mjcf") ? "frictionloss" : "friction";
+  const auto [viscous, dry, rotor] = places();
   struct Injected {
-    std::string what, attribute;
+    std::string what;
+    std::vector<std::string> place;
     std::function<double(double)> how;
   };
   std::vector<Injected> errors{
-      {"sign of damping", "damping", [](double x) { return -x; }},
+      {"sign of damping", viscous, [](double x) { return -x; }},
       {"sign of friction", dry, [](double x) { return -x; }},
-      {"damping per degree", "damping", [](double x) { return x / degrees; }},
-      {"damping times 57.3", "damping", [](double x) { return x * degrees; }},
+      {"damping per degree", viscous, [](double x) { return x / degrees; }},
+      {"damping times 57.3", viscous, [](double x) { return x * degrees; }},
       {"friction times 57.3", dry, [](double x) { return x * degrees; }},
-      {"damping at the motor", "damping", [](double x) { return x / (gear * gear); }},
+      {"damping at the motor", viscous, [](double x) { return x / (gear * gear); }},
       {"friction at the motor", dry, [](double x) { return x / gear; }},
       {"friction left out", dry, [](double) { return 0.0; }},
-      {"damping off by 1 %", "damping", [](double x) { return 1.01 * x; }},
+      {"damping off by 1 %", viscous, [](double x) { return 1.01 * x; }},
   };
   if (format.has_armature) {
-    errors.push_back({"rotor at the motor", "armature", [](double x) { return x / (gear * gear); }});
-    errors.push_back({"rotor times 57.3", "armature", [](double x) { return x * degrees; }});
+    errors.push_back({"rotor at the motor", rotor, [](double x) { return x / (gear * gear); }});
+    errors.push_back({"rotor times 57.3", rotor, [](double x) { return x * degrees; }});
   }
   const SimpleRobot robot = simple();
   for (const Injected& error : errors) {
     const Certificate right = written(robot);
-    change(error.attribute, error.how);
+    change(error.place, error.how);
     const Certificate wrong = certify(format, file(), robot, model, held_out);
     EXPECT_FALSE(wrong.as_meant()) << error.what;
     EXPECT_THROW(require_as_meant(wrong), DataError) << error.what;
@@ -131,12 +158,13 @@ TEST_P(Exchange, ErrorsInTheFileAreFound) {
 TEST_P(Exchange, BodiesThatAreChangedAreFound) {
   const SimpleRobot robot = simple();
   format.write(robot, file());
-  std::string text = read_file(file());
-  const std::string mass = is("urdf") ? "<mass value=\"" : is("sdf") ? "<mass>" : "mass=\"";
+  const fs::path bodies = file_of_bodies();
+  std::string text = read_file(bodies);
+  const std::string mass = is("mjcf") ? "mass=\"" : is("sdf") ? "<mass>" : "<mass value=\"";
   const std::size_t at = text.rfind(mass);
   ASSERT_NE(at, std::string::npos);
   text.insert(at + mass.size(), "1");  // 0.09 -> 10.09 kg
-  write_file(file(), text);
+  write_file(bodies, text);
   EXPECT_FALSE(certify(format, file(), robot, model, held_out).as_meant());
 }
 
@@ -230,7 +258,7 @@ TEST_P(Exchange, CertificateHoldsWhatTheTableSays) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Formats, Exchange, testing::Values("urdf", "mjcf", "sdf"),
+INSTANTIATE_TEST_SUITE_P(Formats, Exchange, testing::Values("urdf", "mjcf", "sdf", "isaaclab", "bam", "usd"),
                          [](const auto& instance) { return std::string(instance.param); });
 
 TEST(ExportFormats, UnknownOneIsRefusedWithThoseThereAre) {
@@ -238,7 +266,7 @@ TEST(ExportFormats, UnknownOneIsRefusedWithThoseThereAre) {
     export_format("sldprt");
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("urdf, mjcf, sdf"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("urdf, mjcf, sdf, isaaclab, bam, usd"), std::string::npos) << error.what();
   }
 }
 

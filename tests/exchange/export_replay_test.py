@@ -1,0 +1,238 @@
+#!/usr/bin/env python3
+"""export_replay_test.py FXDYN: a simulated arm whose spring no simulator's joint can say, from its logs to the formats
+without a library here. robot_replay.py reads the files and replays the held-out log: the loss is the certificate's, and
+errors of sign, unit and side of the gear are seen."""
+import csv
+import json
+import math
+import pathlib
+import random
+import re
+import subprocess
+import sys
+import tempfile
+
+import robot_replay as replay
+
+fxdyn = pathlib.Path(sys.argv[1]).resolve()
+root = pathlib.Path(__file__).resolve().parents[2]
+failed = []
+
+
+def check(condition, what):
+    if not condition:
+        failed.append(what)
+        print('FAILED:', what)
+
+
+def run(*words):
+    done = subprocess.run([str(fxdyn), *map(str, words)], capture_output=True, text=True)
+    check(done.returncode == 0, f'{" ".join(map(str, words))}: exit code {done.returncode}: {done.stderr.strip()}')
+    return done.stdout
+
+
+VISCOUS, COULOMB, ROTOR, SPRING = [1.5, 0.6], [3.0, 1.0], 0.12, 12.0
+HELD_OUT_S, END_S, JOINTS = 8, 16, ('shoulder', 'elbow')
+SCENARIO = f'''seed = 3
+[sensors]
+exact_motion = true
+torque_noise = 0.002
+[robot]
+urdf = "arm.urdf"
+rated_torque = [60, 20]
+acceleration = [8, 8]
+[[effect]]
+name = "viscous"
+joint = "all"
+parameters = {{ coefficient = {VISCOUS} }}
+[[effect]]
+name = "coulomb"
+joint = "all"
+parameters = {{ amplitude = {COULOMB}, width = 0.005 }}
+[[effect]]
+name = "rotor_inertia"
+joint = 2
+parameters = {{ inertia = {ROTOR} }}
+[[effect]]
+name = "spring"
+joint = 2
+parameters = {{ stiffness = {SPRING}, offset = 0 }}
+[[log]]
+name = "a"
+duration_s = {END_S}
+period_s = 4
+seed = 3
+'''
+PROJECT = f'''[robot]
+urdf = "arm.urdf"
+rated_torque = [60, 20]
+[[log]]
+file = "logs/a.csv"
+role = "train"
+to_s = {HELD_OUT_S - 0.1}
+[[log]]
+file = "logs/a.csv"
+role = "test"
+from_s = {HELD_OUT_S}
+[check]
+columns = false
+[train]
+enabled = false
+'''
+
+
+def rows(path):
+    with open(path) as file:
+        return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
+
+
+class Replay:
+    """The held-out log through a file: RMS of true torque minus the file's, joint by joint [N m]."""
+
+    def __init__(self, work):
+        edge = json.loads((work / 'out/model.json').read_text())['filter']['edge_s']  # the certificate drops it, too
+        self.log = [row for row in rows(work / 'logs/a.csv') if HELD_OUT_S + edge <= row['t'] < END_S - edge][::2]
+        truth = {row['t']: row for row in rows(work / 'logs/a.truth.csv')}
+        self.tau = [[truth[row['t']][f'tau{j}'] for j in (1, 2)] for row in self.log]
+
+    def bodies(self, urdf):
+        chain = replay.Chain(urdf)
+        columns = lambda row, name: [row[f'{name}1'], row[f'{name}2']]
+        return [chain.torque(columns(row, 'q'), columns(row, 'dq'), columns(row, 'ddq')) for row in self.log]
+
+    def loss(self, bodies, joints):
+        out = []
+        for j, torque in enumerate(joints):
+            off = [tau[j] - body[j] - torque(row[f'dq{j + 1}'], row[f'ddq{j + 1}'])
+                   for row, tau, body in zip(self.log, self.tau, bodies)]
+            out.append(math.sqrt(sum(x * x for x in off) / len(off)))
+        return out
+
+
+READERS = {
+    'isaaclab': ('simulator_isaaclab.py', lambda path: (lambda names: [replay.isaaclab_joint(names, j) for j in JOINTS])(replay.run_python(path))),
+    'mjlab': ('simulator_isaaclab.py', lambda path: (lambda names: [replay.mjlab_joint(names, j) for j in JOINTS])(replay.run_python(path))),
+    'bam': ('simulator_bam.json', lambda path: [replay.bam_joint(path, j) for j in JOINTS]),
+    'usd': ('simulator_usd.usda', lambda path: [replay.usd_joint(path, j) for j in JOINTS]),
+}
+# what stands before the elbow's numbers: viscous and dry friction, rotor
+PLACES = {
+    'isaaclab': (r'\nVISCOUS_FRICTION = .*?"elbow":', r'\nFRICTION = .*?"elbow":', r'\nARMATURE = .*?"elbow":'),
+    'bam': (r'"elbow".*?"friction_viscous": ', r'"elbow".*?"friction_base": ', r'"elbow".*?"armature": '),
+    'usd': (r'over "elbow".*?viscousFrictionCoefficient = ', r'over "elbow".*?dynamicFrictionEffort = ',
+            r'over "elbow".*?armature = '),
+}
+PLACES['mjlab'] = PLACES['isaaclab']
+ERRORS = {'another sign': lambda x: -x, '57.3 times': math.degrees, 'a 57.3th': math.radians,
+          'at the motor': lambda x: x / 50, 'at the motor, squared': lambda x: x / 2500}
+
+
+def changed(path, place, how):
+    """The file with one number changed, under another name."""
+    text = path.read_text()
+    found = re.search('(%s)([-+.0-9e]+)' % place, text, re.S)
+    other = path.with_name('changed' + path.suffix)
+    other.write_text(text[:found.start(2)] + repr(how(float(found.group(2)))) + text[found.end(2):])
+    return other
+
+
+def loss_or_refused(log, bodies, read, path):
+    try:
+        return log.loss(bodies, read(path))[1]
+    except AssertionError:  # what the format's own rules exclude
+        return math.inf
+
+
+def check_format(form, out, log):
+    name, read = READERS[form]
+    path = out / name
+    certificate = json.loads((out / f'certificate_{"isaaclab" if form == "mjlab" else form}.json').read_text())
+    check(certificate['as_meant'] and certificate['read_back_by'] == 'fxdyn itself', f'{form}: {certificate}')
+    bodies = log.bodies(path.with_suffix('.urdf'))
+    loss = log.loss(bodies, read(path))
+    check('spring' in certificate['joints'][1]['left_out'], f'{form}: the spring is left out')
+    check(loss[1] > 1, f'{form}: the spring has a torque')
+    # The certificate is below the torque's cut-off, and the log has noise: 3 %.
+    said = certificate['joints'][1]['cannot_say']
+    check(abs(loss[1] - said) < 0.03 * said, f'{form}: {loss[1]} N m are lost, the certificate says {said}')
+    for place in PLACES[form]:
+        for what, how in ERRORS.items():
+            wrong = loss_or_refused(log, bodies, read, changed(path, place, how))
+            check(abs(wrong - loss[1]) > 0.005 * loss[1], f'{form}: {place} {what} shows: {wrong}')
+
+
+def check_draws(path):
+    names = replay.run_python(path)
+    chance = random.Random(5)
+    for joint in JOINTS:
+        known = names['RANGES'][joint]
+        size = len(known['parameters'])
+        check(size == (3 if joint == 'elbow' else 2), f'{joint}: {known["parameters"]}')
+        check(all(0 < s < 0.1 * m for s, m in zip(known['std'], known['mean'])), f'{joint}: {known}')
+        drawn = [names['draw'](joint, chance) for _ in range(4000)]
+        scaled = [[(d[p] - m) / s for p, m, s in zip(known['parameters'], known['mean'], known['std'])] for d in drawn]
+        moment = lambda i, k: sum(z[i] * z[k] for z in scaled) / len(scaled)
+        # uniform in an ellipsoid: covariance = radius^2 / (size + 2) of the matrix that shapes it
+        for i in range(size):
+            check(max(abs(z[i]) for z in scaled) <= known['radius'] * 1.000001, f'{joint}: inside')
+            for k in range(size):
+                expected = known['correlation'][i][k] * known['radius'] ** 2 / (size + 2)
+                check(abs(moment(i, k) - expected) < 0.06 * known['radius'] ** 2 / (size + 2), f'{joint}: {i} {k}')
+        check(names['isaaclab_actuators']({j: drawn[0] for j in JOINTS})['elbow'].armature == drawn[0]['armature'],
+              'drawn numbers are used')
+
+
+def read_trajectory(path):
+    """Joint names and points, line by line: every list is one of JSON, and every number in it has a point."""
+    names, points = [], []
+    for line in path.read_text().splitlines():
+        key, _, value = line.lstrip(' -').partition(': ')
+        if key == 'joint_names':
+            names = json.loads(value)
+        elif key in ('positions', 'velocities', 'accelerations', 'effort'):
+            if key == 'positions':
+                points.append({})
+            check(all('.' in word for word in value.strip('[]').split(', ')), f'{key}: YAML 1.1 takes them for numbers')
+            points[-1][key] = json.loads(value)
+        elif key == 'time_from_start':
+            sec, nanosec = re.fullmatch(r'\{sec: (\d+), nanosec: (\d+)\}', value).groups()
+            points[-1]['t'] = int(sec) + 1e-9 * int(nanosec)
+    return names, points
+
+
+def check_trajectory(work):
+    """The whole model's torque, so nothing is lost: what is there is the true torque, but for friction's turns, which
+    the torque's cut-off rounds off."""
+    plan, log = work / 'plan.csv', rows(work / 'logs/a.csv')
+    names = ['t', 'q1', 'q2', 'dq1', 'dq2', 'ddq1', 'ddq2']
+    with open(plan, 'w') as file:
+        csv.writer(file).writerows([names] + [[row[name] if name != 't' else row[name] + 5 for name in names] for row in log])
+    run('predict', '--model', work / 'out/model.json', '--log', plan, '--out', work / 'plan', '--trajectory', '--raw')
+    joints, points = read_trajectory(work / 'plan/plan.yaml')
+    check(joints == list(JOINTS) and len(points) == len(log), f'{joints}, {len(points)} points')
+    truth = rows(work / 'logs/a.truth.csv')
+    middle = range(500, len(log) - 500)
+    check(all(abs(points[k]['t'] - log[k]['t']) < 1e-9 for k in middle), 'time counts from the first point')
+    for j in range(2):
+        rms = lambda values: math.sqrt(sum(x * x for x in values) / len(middle))
+        for key, column in ('positions', 'q'), ('velocities', 'dq'), ('accelerations', 'ddq'):
+            size = rms([log[k][f'{column}{j + 1}'] for k in middle])
+            off = rms([points[k][key][j] - log[k][f'{column}{j + 1}'] for k in middle])
+            check(off < 1e-3 * size, f'{key} {j + 1}: off by {off} of {size}')
+        size, off = rms([truth[k][f'tau{j + 1}'] for k in middle]), rms([truth[k][f'tau{j + 1}'] - points[k]['effort'][j] for k in middle])
+        check(off < 0.01 * size, f'effort {j + 1}: off by {off} of {size} N m')
+
+
+with tempfile.TemporaryDirectory() as name:
+    work = pathlib.Path(name)
+    (work / 'arm.urdf').write_text((root / 'tests/support/elastic_arm/arm.urdf').read_text())
+    (work / 'scenario.toml').write_text(SCENARIO)
+    (work / 'arm.toml').write_text(PROJECT)
+    run('simulate', work / 'scenario.toml', '--out', work / 'logs')
+    run('export', work / 'arm.toml', '--out', work / 'out', '--to', 'isaaclab,bam,usd')
+    held_out = Replay(work)
+    for form in READERS:
+        check_format(form, work / 'out', held_out)
+    check_draws(work / 'out/simulator_isaaclab.py')
+    check_trajectory(work)
+sys.exit(bool(failed))
