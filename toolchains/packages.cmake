@@ -18,10 +18,10 @@ set(CPACK_DEBIAN_FXDYN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_FXDYN_PACKAGE_DEPENDS "gnuplot-nox | gnuplot")
 if(FXDYN_PYTHON)
   # The module is for this version of Python alone.
-  find_package(Python3 3.11 REQUIRED COMPONENTS Interpreter)
-  math(EXPR next "${Python3_VERSION_MINOR} + 1")
+  find_package(Python 3.9 REQUIRED COMPONENTS Interpreter)  # the one that host_tools/python is for
+  math(EXPR next "${Python_VERSION_MINOR} + 1")
   string(APPEND CPACK_DEBIAN_FXDYN_PACKAGE_DEPENDS
-    ", python3 (>= 3.${Python3_VERSION_MINOR}), python3 (<< 3.${next}), python3-numpy")
+    ", python3 (>= 3.${Python_VERSION_MINOR}), python3 (<< 3.${next}), python3-numpy")
 endif()
 set(CPACK_DEBIAN_FXDYN_PACKAGE_RECOMMENDS "qemu-system-arm, gcc-arm-none-eabi")
 
