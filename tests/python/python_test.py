@@ -144,7 +144,7 @@ class Module(unittest.TestCase):
     def test_simulate_gives_the_logs_of_the_program(self):
         scenario = {"seed": 4, "robot": {"urdf": "arm.urdf", "rated_torque": [60, 20], "acceleration": [8, 8]},
                     "effect": [{"name": "viscous", "joint": "all", "parameters": {"coefficient": [1.5, 0.6]}}],
-                    "log": [{"name": "a", "duration_s": 2}, {"name": "b", "duration_s": 2, "seed": 2}]}
+                    "log": [{"name": "a", "duration_s": 2, "seed": 1}, {"name": "b", "duration_s": 2, "seed": 2}]}
         logs = fxdyn.simulate(scenario, "simulated")
         self.assertEqual(program("simulate", "simulated/scenario.toml", "--out", "simulated_too").returncode, 0)
         self.assertEqual(set(logs), {"a", "b"})
