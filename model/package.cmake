@@ -1,6 +1,7 @@
 # What `cmake --install` puts into a package: the headers, the CMake files for find_package(fxdyn) and, for users of the
 # same processors, toolchain files and linker scripts.
 include(CMakePackageConfigHelpers)
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME libfxdyn-dev)
 set(package_directory share/cmake/fxdyn)  # nothing in it depends on the architecture
 
 set_target_properties(fxdyn_model PROPERTIES EXPORT_NAME model)

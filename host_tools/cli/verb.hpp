@@ -47,6 +47,7 @@ Action add_effects(CLI::App& verb);
 Action add_fleet(CLI::App& verb);
 Action add_fleet_worker(CLI::App& verb);
 Action add_history(CLI::App& verb);
+Action add_verify(CLI::App& verb);
 Action add_doctor(CLI::App& verb);
 Action add_completion(CLI::App& verb);
 Action add_man(CLI::App& verb);

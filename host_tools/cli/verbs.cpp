@@ -33,6 +33,8 @@ std::span<const Verb> verbs() {
            "robot.toml --out out/robot --image drive.elf", add_replay},
       Verb{"update", "Refit the coefficients with a new log, keep them where they are better: tables.bin, update.json.",
            "robot.toml --out out/robot --log new.csv", add_update},
+      Verb{"verify", "Whether tables, model, project, logs and version in DIR belong together, and an image (--image).",
+           "out/robot --image drive.elf", add_verify},
       Verb{"excite",
            "Plan trajectories that show the robot's parameters, within its limits: CSV to play, excite.json, plots.",
            "robot.toml --out out/plan", add_excite},

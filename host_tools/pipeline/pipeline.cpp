@@ -18,6 +18,7 @@
 #include "host_tools/pipeline/tables_export.hpp"
 #include "host_tools/pipeline/training.hpp"
 #include "host_tools/project/provenance.hpp"
+#include "host_tools/project/seal.hpp"
 #include "host_tools/report/diagnosis_result.hpp"
 #include "host_tools/report/report.hpp"
 #include "host_tools/robot/write_urdf.hpp"
@@ -305,7 +306,15 @@ void Pipeline::write_export(IdentifiedModel& model, const Formats& formats, cons
     for (const char* name : {"tables.hpp", "tables.bin", "export.json"}) fs::remove(directory / name);
     throw;
   }
-  write_file(directory / "export.json", to_json(result).dump(1) + "\n");
+  std::vector<std::string> files{"tables.bin", "tables.hpp"};
+  for (const ExportResult::Drive& drive : result.drives) {
+    for (const char* name : {"tables.bin", "tables.hpp"})
+      files.push_back(fmt::format("joint_{}/{}", drive.joint + 1, name));
+  }
+  json content = to_json(result);
+  content["of"] = belongings(project_, directory_, directory, files);
+  content["of"]["files"]["model.json"] = hash_of(to_json(model).dump(1) + "\n");  // as the caller writes it
+  write_file(directory / "export.json", sealed(std::move(content)));
 }
 
 void Pipeline::report() {

@@ -5,7 +5,9 @@
 
 #include <cstdio>
 #include <mutex>
+#include <utility>
 
+#include "host_tools/support/progress_listener.hpp"
 #include "host_tools/support/quiet.hpp"
 
 namespace fxdyn {
@@ -13,6 +15,7 @@ namespace {
 constexpr std::size_t width = 30;
 std::mutex drawing;
 bool quiet = false;
+ProgressListener told;
 bool on_terminal() {
   static const bool yes = ::isatty(STDERR_FILENO) != 0;
   return yes;
@@ -20,12 +23,14 @@ bool on_terminal() {
 }  // namespace
 
 void be_quiet() { quiet = true; }
+void set_progress_listener(ProgressListener listener) { told = std::move(listener); }
 
 void Progress::stage(const std::string& name, std::size_t total) {
   done();
   name_ = name;
   total_ = total;
   steps_ = 0;
+  if (told) told(name_, 0, total_);
   if (quiet) return;
   if (on_terminal()) {
     draw(0);
@@ -36,6 +41,7 @@ void Progress::stage(const std::string& name, std::size_t total) {
 
 void Progress::step() {
   const std::size_t steps = ++steps_;
+  if (told) told(name_, steps, total_);
   if (on_terminal() && !quiet) draw(steps);
 }
 

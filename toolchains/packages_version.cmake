@@ -1,0 +1,36 @@
+# Read by cpack: version and date of the packages. On a tag v1.2.3 the version is 1.2.3, five commits later 1.2.3+5.gabc1234. Without
+# such a tag it is that of project() with a ~, which comes before the release: 0.1.0~412.gabc1234. Without git it is project()'s.
+# SOURCE_DATE_EPOCH, if it is not set: the commit's date, or 1980 without git.
+function(git_says variable)
+  execute_process(COMMAND git -C ${CPACK_FXDYN_SOURCE_DIR} ${ARGN} OUTPUT_VARIABLE said ERROR_QUIET RESULT_VARIABLE failed
+    OUTPUT_STRIP_TRAILING_WHITESPACE)
+  if(failed)
+    set(said "")
+  endif()
+  set(${variable} "${said}" PARENT_SCOPE)
+endfunction()
+
+git_says(hash rev-parse --short=7 HEAD)
+if(EXISTS ${CPACK_FXDYN_SOURCE_DIR}/.git AND hash)  # the repository around an unpacked archive is not ours
+  git_says(described describe --tags --long --match v[0-9]* --abbrev=7)
+  if(described MATCHES "^v(.+)-([0-9]+)-(g[0-9a-f]+)$")
+    set(CPACK_PACKAGE_VERSION ${CMAKE_MATCH_1})
+    if(NOT CMAKE_MATCH_2 EQUAL 0)
+      string(APPEND CPACK_PACKAGE_VERSION +${CMAKE_MATCH_2}.${CMAKE_MATCH_3})
+    endif()
+  else()
+    git_says(count rev-list --count HEAD)
+    string(APPEND CPACK_PACKAGE_VERSION ~${count}.g${hash})
+  endif()
+  git_says(changed status --porcelain --untracked-files=no)
+  if(changed)
+    string(APPEND CPACK_PACKAGE_VERSION +changed)
+  endif()
+  git_says(date log -1 --format=%ct)
+else()
+  set(date 315532800)
+endif()
+if(NOT DEFINED ENV{SOURCE_DATE_EPOCH})
+  set(ENV{SOURCE_DATE_EPOCH} ${date})
+endif()
+set(CPACK_DEBIAN_PACKAGE_VERSION ${CPACK_PACKAGE_VERSION})
