@@ -7,6 +7,8 @@ set -euo pipefail
 packages=(
   # build
   g++ cmake ninja-build pkg-config
+  # its Debian packages
+  dpkg-dev
   # host libraries
   libeigen3-dev liburdfdom-dev libtomlplusplus-dev nlohmann-json3-dev libcli11-dev libfmt-dev zlib1g-dev
   libzstd-dev liblz4-dev libsqlite3-dev libmatio-dev libhdf5-dev libsdformat-dev
