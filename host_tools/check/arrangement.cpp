@@ -88,6 +88,12 @@ ArrangementEvidence::ArrangementEvidence(Robot robot, TorqueSamples samples, con
   }
 }
 
+ArrangementEvidence::ArrangementEvidence(Robot robot, TorqueSamples samples, const ArrangementOptions& options,
+                                         KnownBodies bodies)
+    : ArrangementEvidence(std::move(robot), std::move(samples), options) {
+  known_ = std::move(bodies);
+}
+
 Index ArrangementEvidence::own_columns() const {
   return nominal_columns() + (memory_.empty() ? 0 : memory_.front().cols());
 }
@@ -169,15 +175,31 @@ ArrangementEvidence::Design ArrangementEvidence::design(const Arrangement& arran
   return out;
 }
 
-ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangement& arrangement) const {
-  ArrangementScore best = score(design, arrangement, options_.mass_errors.front());
+ArrangementEvidence::Fit ArrangementEvidence::best_fit(const Design& design, const Arrangement& arrangement) const {
+  if (known_) return fit(design, arrangement, 1);
+  Fit best = fit(design, arrangement, options_.mass_errors.front());
   for (std::size_t i = 1; i < options_.mass_errors.size(); ++i) {
-    ArrangementScore other = score(design, arrangement, options_.mass_errors[i]);
-    if (other.nats < best.nats) best = std::move(other);
+    Fit other = fit(design, arrangement, options_.mass_errors[i]);
+    if (other.score.nats < best.score.nats) best = std::move(other);
   }
+  return best;
+}
+
+ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangement& arrangement) const {
+  ArrangementScore best = best_fit(design, arrangement).score;
   for (std::size_t j = 0; j < robot_.size(); ++j)
     best.nats += options_.beyond * excess(arrangement, static_cast<Index>(j));
   return best;
+}
+
+KnownBodies ArrangementEvidence::bodies(const Arrangement& arrangement) const {
+  const Fit fit = best_fit(design(arrangement), arrangement);
+  const Index bodies = ten * static_cast<Index>(robot_.size()), own = fit.x.size() - bodies;
+  // Whatever the joints' own columns are: those of another log differ.
+  const MatrixXd across = fit.information.topRightCorner(bodies, own);
+  const Eigen::LLT<MatrixXd> of_own(fit.information.bottomRightCorner(own, own));
+  return {fit.x.head(bodies),
+          fit.information.topLeftCorner(bodies, bodies) - across * of_own.solve(across.transpose())};
 }
 
 /// Friction brakes, builds up after a reversal and not before it, and a rotor is heavy: else there is none from here
@@ -205,17 +227,17 @@ bool ArrangementEvidence::take_out_impossible(Index joint, const MatrixXd& gram,
   return more;
 }
 
-ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangement& arrangement,
-                                            double mass_error) const {
+ArrangementEvidence::Fit ArrangementEvidence::fit(const Design& design, const Arrangement& arrangement,
+                                                  double mass_error) const {
   const auto n = static_cast<Index>(robot_.size());
   const Index bodies = ten * n, own = own_columns(), all = bodies + own * n;
   const auto rows = static_cast<double>(samples_.size());
   const double count = std::min(options_.independent, rows);
 
   MatrixXd prior = MatrixXd::Zero(all, all);
-  prior.topLeftCorner(bodies, bodies) = design.information / (mass_error * mass_error);
+  prior.topLeftCorner(bodies, bodies) = known_ ? known_->information : design.information / (mass_error * mass_error);
   VectorXd mean = VectorXd::Zero(all);
-  mean.head(bodies) = design.mean;
+  mean.head(bodies) = known_ ? known_->mean : design.mean;
   VectorXd whole(n), variance(n);
   const auto& [from, gain] = std::tie(arrangement.torque_from, arrangement.torque_gain);
   for (Index j = 0; j < n; ++j) {
@@ -226,14 +248,16 @@ ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangem
   }
   variance = whole;
 
-  ArrangementScore out;
-  VectorXd solution;
+  Fit result;
+  ArrangementScore& out = result.score;
+  VectorXd& solution = result.x;
+  MatrixXd& information = result.information;
   std::vector<bool> taken(static_cast<std::size_t>(own * n), false);
   double log_determinant = 0;
   bool settled = false;
   for (int round = 0; round < 6 && !settled; ++round) {
     settled = round > 0;
-    MatrixXd information = prior;
+    information = prior;
     VectorXd projection = prior * mean;
     for (Index j = 0; j < n; ++j) {
       const auto joint = static_cast<std::size_t>(j);
@@ -270,7 +294,7 @@ ArrangementScore ArrangementEvidence::score(const Design& design, const Arrangem
   const Eigen::LLT<MatrixXd> of_prior(prior);
   out.nats += 0.5 * change.dot(prior * change) + 0.5 * log_determinant -
               of_prior.matrixLLT().diagonal().array().abs().log().sum();
-  return out;
+  return result;
 }
 
 ArrangementScore ArrangementEvidence::operator()(const Arrangement& arrangement) const {

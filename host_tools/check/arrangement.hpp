@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,12 @@ struct ArrangementScore {
 /// state adds to the sign of the velocity (effect `presliding`). Empty: none.
 using FrictionMemory = std::vector<Eigen::MatrixXd>;
 
+/// What logs have taught of a robot's bodies: normal, in the frames of the URDF's axes.
+struct KnownBodies {
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd information;
+};
+
 /// The evidence of arrangements of one robot's samples. Model: tau_j = Y_j(q, dq, ddq) pi + nominal friction, rotor and
 /// offset of the joint, and friction with a memory where it is given. pi is normal about the URDF's bodies
 /// (pseudo-inertia metric, see barrier_hessian()), with that of options.mass_errors that has the most evidence; where a
@@ -42,6 +49,12 @@ class ArrangementEvidence {
  public:
   ArrangementEvidence(Robot robot, TorqueSamples samples, const ArrangementOptions& options,
                       FrictionMemory memory = {});
+  /// Of a log of the robot whose bodies other logs have taught: they take the place of the URDF's. For arrangements
+  /// with the axes as given.
+  ArrangementEvidence(Robot robot, TorqueSamples samples, const ArrangementOptions& options, KnownBodies bodies);
+
+  /// What these samples teach of the bodies if the arrangement is right.
+  KnownBodies bodies(const Arrangement& arrangement) const;
 
   /// Safe from several threads.
   ArrangementScore operator()(const Arrangement& arrangement) const;
@@ -72,7 +85,13 @@ class ArrangementEvidence {
   bool enough() const;
 
  private:
-  ArrangementScore score(const Design& design, const Arrangement& arrangement, double mass_error) const;
+  struct Fit {
+    ArrangementScore score;
+    Eigen::VectorXd x;            ///< of the bodies, then of each joint's own columns
+    Eigen::MatrixXd information;  ///< of x
+  };
+  Fit fit(const Design& design, const Arrangement& arrangement, double mass_error) const;
+  Fit best_fit(const Design& design, const Arrangement& arrangement) const;
   Eigen::Index own_columns() const;
   double friction_power(const Eigen::MatrixXd& gram, const Eigen::VectorXd& x) const;
   bool take_out_impossible(Eigen::Index joint, const Eigen::MatrixXd& gram, const Eigen::VectorXd& x,
@@ -82,6 +101,7 @@ class ArrangementEvidence {
   TorqueSamples samples_;
   ArrangementOptions options_;
   FrictionMemory memory_;
+  std::optional<KnownBodies> known_;
   std::vector<bool> moves_;
   Eigen::VectorXd torque_square_;  ///< mean squares of the torque columns
 };

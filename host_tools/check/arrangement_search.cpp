@@ -60,17 +60,18 @@ bool changes_motion(Mistake mistake) {
 /// All single changes of an arrangement, continuous ones on a grid.
 class Moves {
  public:
-  Moves(const ArrangementEvidence& evidence, const Arrangement& now, const ArrangementOptions& options)
+  Moves(const ArrangementEvidence& evidence, const Arrangement& now, const ArrangementOptions& options,
+        bool columns_only)
       : evidence_(evidence), now_(now), options_(options) {
     const auto n = static_cast<Index>(evidence.robot().size());
     for (Index j = 0; j < n; ++j) {
       for (Index other = j + 1; other < n; ++other) swap(j, other);
       if (evidence.moves(now.motion_from[static_cast<std::size_t>(j)])) signs_and_gains(j);
       zeros(j);
-      axes(j);
+      if (!columns_only) axes(j);
       units(j);
     }
-    directions_of_gravity();
+    if (!columns_only) directions_of_gravity();
     units_of_torque();
   }
   std::vector<ArrangementMove> all;
@@ -273,9 +274,9 @@ bool same_thing(const ArrangementMove& a, const ArrangementMove& b) {
 
 /// The best of each kind and joint, continuous ones refined where they may be the best.
 std::vector<Scored> best_of_each(const ArrangementEvidence& evidence, const Arrangement& now, double nats,
-                                 const ArrangementOptions& options) {
+                                 const ArrangementOptions& options, bool columns_only) {
   std::vector<Scored> best;
-  for (Scored& one : score_all(evidence, now, Moves(evidence, now, options).all)) {
+  for (Scored& one : score_all(evidence, now, Moves(evidence, now, options, columns_only).all)) {
     const bool known =
         std::any_of(best.begin(), best.end(), [&](const Scored& b) { return same_thing(b.move, one.move); });
     if (!known) best.push_back(std::move(one));
@@ -294,13 +295,14 @@ std::vector<Scored> best_of_each(const ArrangementEvidence& evidence, const Arra
 
 }  // namespace
 
-std::vector<ArrangementFinding> find_mistakes(const ArrangementEvidence& evidence, const ArrangementOptions& options) {
+std::vector<ArrangementFinding> find_mistakes(const ArrangementEvidence& evidence, const ArrangementOptions& options,
+                                              bool columns_only) {
   std::vector<ArrangementFinding> out;
   if (!evidence.enough()) return out;
   Arrangement now = as_given(evidence.robot());
   ArrangementScore score = evidence(now);
   for (int found = 0; found < options.most; ++found) {
-    std::vector<Scored> best = best_of_each(evidence, now, score.nats, options);
+    std::vector<Scored> best = best_of_each(evidence, now, score.nats, options, columns_only);
     if (best.empty() || best.front().score.nats > score.nats - options.gain) break;
     ArrangementFinding finding;
     finding.nats = score.nats - best.front().score.nats;

@@ -45,6 +45,8 @@ struct ArrangementFinding {
 
 /// The changes that explain the torques better than what the project says, each beside those before it, one by one
 /// while that gains `options.gain`. Empty where nothing is wrong, or where there are too few samples.
-std::vector<ArrangementFinding> find_mistakes(const ArrangementEvidence& evidence, const ArrangementOptions& options);
+/// @param columns_only of one log of several: axes and gravity are the robot's
+std::vector<ArrangementFinding> find_mistakes(const ArrangementEvidence& evidence, const ArrangementOptions& options,
+                                              bool columns_only = false);
 
 }  // namespace fxdyn

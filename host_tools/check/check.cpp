@@ -108,7 +108,7 @@ json to_json(const SignalFacts& signals) {
 }  // namespace
 
 std::vector<CheckFinding> check_columns(const Project& project, const std::vector<ProcessedLog>& logs,
-                                        const ArrangementOptions& options) {
+                                        const ArrangementOptions& options, const TorqueSamples* others) {
   std::vector<CheckFinding> out;
   if (!project.check.columns) return out;
   const auto lead = find_long_torque_lead(project, logs, options);
@@ -117,14 +117,46 @@ std::vector<CheckFinding> check_columns(const Project& project, const std::vecto
   const TorqueSamples samples = sample_torque(logs, options.samples, lead_s);
   const ArrangementEvidence evidence(project.robot, samples, options);
   Arrangement before = as_given(project.robot);
+  std::optional<ArrangementEvidence> of_same_robot;
+  if (others != nullptr)
+    of_same_robot.emplace(project.robot, samples, options,
+                          ArrangementEvidence(project.robot, *others, options).bodies(before));
+  // Slow motion alone hardly shows the bodies: friction that the model lacks makes other ones of them.
+  const auto holds_for_robot = [&](const Arrangement& after) {
+    return !of_same_robot || (*of_same_robot)(after).nats < (*of_same_robot)(before).nats - options.gain;
+  };
   std::vector<ArrangementFinding> found;
-  for (ArrangementFinding& finding : find_mistakes(evidence, options)) {
+  for (ArrangementFinding& finding : find_mistakes(evidence, options, others != nullptr)) {
     if (!is_in_each_log(project.robot, logs, lead_s, before, finding.move.result, options)) break;
+    if (!holds_for_robot(finding.move.result)) break;
     before = finding.move.result;
     found.push_back(std::move(finding));
   }
   const std::vector<std::string> signals = signals_in(logs);
   for (const ArrangementFinding& finding : found) out.push_back(in_words(finding, before, project, signals, options));
+  return out;
+}
+
+std::vector<CheckFinding> check_one_log(const Project& project, const TorqueSamples& train, Log log,
+                                        const FilterFit& filter, const ArrangementOptions& options) {
+  check_torque(log, project.robot);
+  const std::string name = log.file.filename().string();
+  Project alone = project;
+  for (LogEntry& entry : alone.logs) {
+    entry.role = entry.role == log.role ? Role::train : Role::baseline;
+    entry.own_format = true;  // what is to be written belongs into its [[log]]
+  }
+  log.role = Role::train;
+  std::vector<ProcessedLog> logs;
+  logs.push_back(process(std::move(log), filter));
+  const double lead_s = project.signals.torque_lead_s.value_or(0);
+  std::vector<CheckFinding> out;
+  if (!disagrees(project.robot, train, sample_torque(logs, options.samples, lead_s), options)) return out;
+  for (CheckFinding& finding : check_columns(alone, logs, options, &train)) {
+    if (!finding.error) continue;
+    finding.log = name;
+    out.push_back(std::move(finding));
+  }
   return out;
 }
 
@@ -151,45 +183,23 @@ void append(std::vector<CheckFinding> more, std::vector<CheckFinding>& to) {
   std::move(more.begin(), more.end(), std::back_inserter(to));
 }
 
-/// A log that decides nothing in the fit may have columns of its own. Looked at alone, where it disagrees with the
-/// train logs; what it shows less than surely is another load or another day.
-std::vector<CheckFinding> compare_alone(const Project& project, const TorqueSamples& train, Log log,
-                                        const FilterFit& filter, const ArrangementOptions& options) {
-  check_torque(log, project.robot);
-  const std::string name = log.file.filename().string();
-  Project alone = project;
-  for (LogEntry& entry : alone.logs) {
-    entry.role = entry.role == log.role ? Role::train : Role::baseline;
-    entry.own_format = true;  // what is to be written belongs into its [[log]]
-  }
-  log.role = Role::train;
-  std::vector<ProcessedLog> logs;
-  logs.push_back(process(std::move(log), filter));
-  const double lead_s = project.signals.torque_lead_s.value_or(0);
-  std::vector<CheckFinding> out;
-  if (!disagrees(project.robot, train, sample_torque(logs, options.samples, lead_s), options)) return out;
-  for (CheckFinding& finding : check_columns(alone, logs, options)) {
-    if (!finding.error) continue;
-    finding.log = name;
-    out.push_back(std::move(finding));
-  }
-  return out;
-}
-
 /// Facts of all logs, read role by role; findings of those that the fit does not see.
 /// @param fitted train and validate logs; empty: there is none to compare with
 std::vector<LogFacts> read_facts(const Project& project, const std::filesystem::path& directory,
                                  const std::vector<ProcessedLog>& fitted, KnownRows& known, const CheckOptions& options,
                                  std::vector<CheckFinding>& findings) {
   std::optional<TorqueSamples> train;
-  if (project.check.columns && !fitted.empty())
-    train = sample_torque(fitted, options.arrangement.samples, project.signals.torque_lead_s.value_or(0));
+  if (project.check.columns && !fitted.empty()) {
+    std::vector<ProcessedLog> logs = fitted;
+    std::erase_if(logs, [](const ProcessedLog& log) { return log.role != Role::train; });
+    train = sample_torque(logs, options.arrangement.samples, project.signals.torque_lead_s.value_or(0));
+  }
   std::vector<LogFacts> out;
   for (const Role role : {Role::baseline, Role::train, Role::validate, Role::test}) {
     for (Log& log : read_logs(project, role, directory, &known)) {
       out.push_back(facts_of(log, options.facts));
       if (role == Role::train || !train) continue;
-      append(compare_alone(project, *train, std::move(log), fitted.front().filter, options.arrangement), findings);
+      append(check_one_log(project, *train, std::move(log), fitted.front().filter, options.arrangement), findings);
     }
   }
   return out;

@@ -80,8 +80,16 @@ std::vector<CheckFinding> findings_of(const std::vector<LogFacts>& logs, const R
                                       const LogFactOptions& options);
 /// Columns, signs, zeros, axes, gravity and gains of the train logs against the URDF, see find_mistakes(). Empty where
 /// the project does not want it ([check] columns = false).
+/// @param others of logs of the same robot whose columns are right; null: there are none. The mistake is one of `logs`
+/// alone then: axes and gravity are the robot's, and it has to explain them with the bodies of the others, too
 std::vector<CheckFinding> check_columns(const Project& project, const std::vector<ProcessedLog>& logs,
-                                        const ArrangementOptions& options = {});
+                                        const ArrangementOptions& options = {}, const TorqueSamples* others = nullptr);
+/// A log that decides nothing in the fit may have columns of its own. Looked at where it disagrees with the train logs:
+/// alone, as it may be of another load, and with the bodies that the train logs teach, as it is of their robot. What it
+/// shows less than surely is another load or another day. Empty where the project does not want it.
+/// @param train samples of the train logs @param filter theirs
+std::vector<CheckFinding> check_one_log(const Project& project, const TorqueSamples& train, Log log,
+                                        const FilterFit& filter, const ArrangementOptions& options = {});
 /// For verbs that go on to a fit: what check() would complain of, as notes. Test logs are looked at, too, but decide
 /// nothing.
 /// @throws DataError: the data can't be what the project says, with the line to write

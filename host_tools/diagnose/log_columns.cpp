@@ -166,7 +166,7 @@ std::shared_ptr<const RobotColumns> LogColumns::robot_with(std::size_t log, cons
                                                    slow ? *slow_[log] : *motions_[log]);
   const std::lock_guard lock(for_group_mutex_);
   // Those of a long log are made again rather than kept for every rotor; whoever uses one holds it.
-  const auto bytes = static_cast<double>(2 * sizeof(double) * made->torque().size());
+  const auto bytes = static_cast<double>(3 * sizeof(double) * made->torque().size());
   if (bytes * static_cast<double>(for_group_.size() + 1) > most_kept) for_group_.clear();
   return for_group_.emplace(key, std::move(made)).first->second;
 }

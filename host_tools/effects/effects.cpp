@@ -54,7 +54,7 @@ Eigen::MatrixXd columns_of(std::span<const double> shape, double sign_width, con
     const JointInput<Real> u{series.q[k],
                              series.dq[k],
                              series.ddq[k],
-                             tanh_of(series.dq[k] / sign_width),
+                             series.sign.size() > 0 ? series.sign[k] : tanh_of(series.dq[k] / sign_width),
                              series.structural.size() > 0 ? series.structural[k] : 0.0,
                              series.total.size() > 0 ? series.total[k] : 0.0,
                              peers};

@@ -75,6 +75,7 @@ struct JointSeries {
   double step_s = 0;
   Eigen::VectorXd total{};
   Eigen::MatrixXd peers_dq{}, peers_sign{}, peers_ddq{}, peers_q{};  ///< samples x joints of the robot
+  Eigen::VectorXd sign{};  ///< tanh(dq / sign_width) where it is known; empty: it is computed
 };
 
 /// phi of a catalogue effect over a log: samples x linear parameters. States start at rest with the log.

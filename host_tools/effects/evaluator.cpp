@@ -3,7 +3,6 @@
 #include "host_tools/effects/broad_learning_types.hpp"
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/identified_model.hpp"
-#include "host_tools/robot/robot.hpp"
 #include "host_tools/support/error.hpp"
 #include "model/catalogue.hpp"
 
@@ -134,35 +133,19 @@ Evaluator<N>::~Evaluator() = default;
 template <class N>
 Evaluator<N>::Evaluator(const IdentifiedModel& model, double tick_s) {
   const std::size_t n = model.robot.size();
-  Robot robot = model.robot;
-  for (const EffectFit& fit : model.body) {
-    BodyEffects::for_each([&]<class E>() {
-      if constexpr (requires { &E::turn; }) {
-        if (E::name != fit.effect) return;
-        const Eigen::Vector3d& g = robot.gravity;
-        const auto up = E::turn({-g.x(), -g.y(), -g.z()}, fit.linear[0], fit.linear[1]);
-        robot.gravity = {-up.x, -up.y, -up.z};
-      }
-    });
-  }
-  const DhChain chain = to_dh(robot);
-  std::vector<LinkInertia<Real>> bodies = model.inertia;
-  for (const EffectFit& fit : model.body) {
-    if (!is_load(fit.effect)) continue;
-    bodies.back() = with_load(bodies.back(), fit.linear[0], {fit.linear[1], fit.linear[2], fit.linear[3]}, chain);
-  }
+  const RigidBody rigid = rigid_body_of(model);
   const auto up = [](double x) { return from_si<N, Quantity::linear_acceleration>(x); };
-  up_ = {up(chain.up.x()), up(chain.up.y()), up(chain.up.z())};
+  up_ = {up(rigid.up.x), up(rigid.up.y), up(rigid.up.z)};
   ticks_per_second_ = from_si<N, Quantity::count>(1 / tick_s);
   for (std::size_t i = 0; i < n; ++i) {
-    const LinkGeometry<Real>& link = chain.links[i];
+    const LinkGeometry<Real>& link = rigid.geometry[i];
     const auto length = [](double x) { return from_si<N, Quantity::length>(x); };
     geometry_.push_back({link.type,
                          from_si<N, Quantity::unit>(link.cos_alpha),
                          from_si<N, Quantity::unit>(link.sin_alpha),
                          {length(link.p.x), length(link.p.y), length(link.p.z)},
                          from_si<N, Quantity::position>(link.theta)});
-    const LinkInertia<Real>& body = bodies[i];
+    const LinkInertia<Real>& body = rigid.inertia[i];
     const auto first = [](double x) { return number<N, typename N::FirstMoment>({Kind::first_moment}, x); };
     const auto second = [](double x) { return number<N, typename N::SecondMoment>({Kind::second_moment}, x); };
     inertia_.push_back({number<N, typename N::Mass>({Kind::mass}, body.m),
@@ -414,23 +397,30 @@ IdentifiedModel unlimited(IdentifiedModel model) {
 }
 
 Predictor::Predictor(const IdentifiedModel& model, double step_s, double age_s)
-    : evaluator_(unlimited(model), step_s), state_(model.joints.size()) {
+    : evaluator_(unlimited(model), step_s), body_(rigid_body_of(model)), state_(model.joints.size()) {
   evaluator_.warm_up(age_s);
 }
 
 void Predictor::operator()(const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq, const Eigen::MatrixXd& ddq,
                            Eigen::Ref<Eigen::MatrixXd> tau, Eigen::MatrixXd* deflections, Eigen::MatrixXd* structural) {
   Saturations saturations;
+  // What is beyond a deflection depends on the sample before it.
+  const bool known = !evaluator_.deflects();
+  Eigen::MatrixXd here;
+  Eigen::MatrixXd& rigid = structural != nullptr ? *structural : here;
   if (deflections != nullptr) deflections->resize(q.rows(), q.cols());
-  if (structural != nullptr) structural->resize(q.rows(), q.cols());
+  if (structural != nullptr || known) rigid.resize(q.rows(), q.cols());
+  if (known) rigid_torques(body_, q, dq, ddq, rigid);
+  std::vector<double> at_sample(known ? state_.size() : 0);
   for (Eigen::Index k = 0; k < q.rows(); ++k) {
     for (Eigen::Index i = 0; i < q.cols(); ++i) state_[static_cast<std::size_t>(i)] = {q(k, i), dq(k, i), ddq(k, i)};
-    const auto out = evaluator_.tick(state_, saturations);
+    for (std::size_t i = 0; i < at_sample.size(); ++i) at_sample[i] = rigid(k, static_cast<Eigen::Index>(i));
+    const auto out = known ? evaluator_.tick(state_, at_sample, saturations) : evaluator_.tick(state_, saturations);
     for (Eigen::Index i = 0; i < q.cols(); ++i) {
       const auto at = static_cast<std::size_t>(i);
       tau(k, i) = out[at];
       if (deflections != nullptr) (*deflections)(k, i) = evaluator_.deflections()[at].delta;
-      if (structural != nullptr) (*structural)(k, i) = evaluator_.structural()[at];
+      if (structural != nullptr && !known) rigid(k, i) = evaluator_.structural()[at];
     }
   }
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "host_tools/effects/forward.hpp"
+#include "host_tools/effects/rigid_torques.hpp"
 #include "host_tools/numbers/bounded.hpp"
 #include "host_tools/numbers/run_time_fixed.hpp"
 #include "model/joint_state.hpp"
@@ -78,6 +79,8 @@ class Evaluator {
   ~Evaluator();
 
   std::size_t joints() const { return geometry_.size(); }
+  /// Whether an effect acts on the position.
+  bool deflects() const { return deflects_; }
   /// Puts out the torques of these joints only (bit i: joint i+1); the others' are zero.
   void set_outputs(std::uint32_t outputs) { outputs_ = outputs; }
   /// Effects back to rest.
@@ -159,6 +162,7 @@ class Predictor {
 
  private:
   Evaluator<Real> evaluator_;
+  RigidBody body_;
   std::vector<JointState<Real>> state_;
 };
 

@@ -7,6 +7,7 @@
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/rigid_torques.hpp"
 #include "host_tools/support/error.hpp"
 
 namespace fxdyn {
@@ -62,31 +63,38 @@ RobotColumns::RobotColumns(const IdentifiedModel& model, const Motion& motion)
       return info.acts_on == ActsOn::torque && !info.needs_structural && !info.needs_total;
     });
   });
+  for (std::size_t j = 0; j < model.joints.size(); ++j) sign_.push_back(std::make_unique<Sign>());
   const auto joints = static_cast<double>(model.joints.size());
   if (!plain || 3 * sizeof(double) * joints * joints * static_cast<double>(motion.q.rows()) > most_kept) return;
   for (std::size_t j = 0; j < model.joints.size(); ++j) by_state_.push_back(std::make_unique<ByState>());
 }
 
+const Eigen::VectorXd& RobotColumns::sign(std::size_t joint) const {
+  Sign& out = *sign_[joint];
+  std::call_once(out.made, [&] {
+    const double width = model_->joints[joint].sign_width;
+    const auto tanh = [=](double dq) { return tanh_of(dq / width); };
+    out.values = motion_->dq.col(static_cast<Index>(joint)).unaryExpr(tanh);
+  });
+  return out.values;
+}
+
 const RobotColumns::ByState& RobotColumns::by_state(std::size_t joint) const {
   ByState& out = *by_state_[joint];
   std::call_once(out.made, [&] {
-    const Index samples = motion_->q.rows(), joints = motion_->q.cols();
-    Evaluator<Real> robot(unlimited(*model_), motion_->step_s);
-    std::vector<JointState<Real>> state(model_->joints.size());
-    for (MatrixXd* m : {&out.q, &out.dq, &out.ddq}) m->resize(samples, joints);
-    for (Index k = 0; k < samples; ++k) {
-      for (Index i = 0; i < joints; ++i)
-        state[static_cast<std::size_t>(i)] = {motion_->q(k, i), motion_->dq(k, i), motion_->ddq(k, i)};
-      const JointState<Real> at = state[joint];
-      const auto put = [&](MatrixXd& slope, const JointState<Real>& moved, double step) {
-        state[joint] = moved;
-        const auto tau = robot.rigid_body(state);
-        for (Index i = 0; i < joints; ++i) slope(k, i) = (tau[static_cast<std::size_t>(i)] - structural_(k, i)) / step;
-      };
-      put(out.q, {at.q + small_angle, at.dq, at.ddq}, small_angle);
-      put(out.dq, {at.q, at.dq + small_velocity, at.ddq}, small_velocity);
-      put(out.ddq, {at.q, at.dq, at.ddq + unit_acceleration}, unit_acceleration);
-    }
+    const Motion& m = *motion_;
+    const RigidBody body = rigid_body_of(*model_);
+    MatrixXd moved;
+    const auto slope = [&](MatrixXd& to, const MatrixXd& of, double step) {
+      moved = of;
+      moved.col(static_cast<Index>(joint)).array() += step;
+      to.resize(of.rows(), of.cols());
+      rigid_torques(body, &of == &m.q ? moved : m.q, &of == &m.dq ? moved : m.dq, &of == &m.ddq ? moved : m.ddq, to);
+      to = (to - structural_) / step;
+    };
+    slope(out.q, m.q, small_angle);
+    slope(out.dq, m.dq, small_velocity);
+    slope(out.ddq, m.ddq, unit_acceleration);
   });
   return out;
 }
@@ -111,15 +119,13 @@ MatrixXd RobotColumns::phi(const EffectCandidate& candidate) const {
   const auto j = static_cast<Index>(candidate.joint);
   JointSeries series{motion_->q.col(j), motion_->dq.col(j), motion_->ddq.col(j), structural_.col(j), motion_->step_s};
   series.total = torque_.col(j);
+  series.sign = sign(candidate.joint);
   if (info.needs_peers) {
     series.peers_q = motion_->q;
     series.peers_dq = motion_->dq;
     series.peers_ddq = motion_->ddq;
-    series.peers_sign = motion_->dq;
-    for (Index i = 0; i < series.peers_sign.cols(); ++i) {
-      const double width = model_->joints[static_cast<std::size_t>(i)].sign_width;
-      series.peers_sign.col(i) = series.peers_sign.col(i).unaryExpr([=](double dq) { return tanh_of(dq / width); });
-    }
+    series.peers_sign.resize(motion_->dq.rows(), motion_->dq.cols());
+    for (Index i = 0; i < series.peers_sign.cols(); ++i) series.peers_sign.col(i) = sign(static_cast<std::size_t>(i));
   }
   return effect_columns(candidate.effect, candidate.shape, model_->joints[candidate.joint].sign_width, series);
 }

@@ -63,6 +63,12 @@ class RobotColumns {
   /// [torque of `changed` - torque of the model] / theta
   Eigen::MatrixXd slope(const IdentifiedModel& changed, double theta) const;
 
+  /// Sign of a joint's velocity as friction knows it: tanh(dq / width), for all samples.
+  const Eigen::VectorXd& sign(std::size_t joint) const;
+  struct Sign {
+    std::once_flag made;
+    Eigen::VectorXd values;
+  };
   /// Change of the rigid body's torques with one joint's state, samples x joints each.
   struct ByState {
     std::once_flag made;
@@ -75,6 +81,7 @@ class RobotColumns {
   std::shared_ptr<const IdentifiedModel> model_;
   const Motion* motion_;
   Eigen::MatrixXd torque_, structural_;
+  mutable std::vector<std::unique_ptr<Sign>> sign_;  ///< by joint
   /// Empty where something else than the rigid body feels a deflection, or the motion is too long to keep them.
   mutable std::vector<std::unique_ptr<ByState>> by_state_;
 };

@@ -5,10 +5,12 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <numbers>
 
 #include "host_tools/check/arrangement_search.hpp"
+#include "host_tools/check/check.hpp"
 #include "host_tools/check/torque_column.hpp"
 #include "host_tools/identify/gate_data.hpp"
 #include "host_tools/project/project.hpp"
@@ -153,6 +155,52 @@ void judge_columns(Project project, const Robot& robot, const fs::path& data, co
   count("q and tau", exchanged, exchanged, "not seen");
 }
 
+/// Mistakes in one log that decides nothing in the fit, each at a joint drawn at random.
+struct OwnColumns {
+  std::string name;
+  std::function<void(Log& log, Index joint, Index other)> make;
+};
+const std::vector<OwnColumns>& own_columns() {
+  static const std::vector<OwnColumns> all{
+      {"log sound", [](Log&, Index, Index) {}},
+      {"log torques swapped", [](Log& log, Index j, Index other) { log.tau.col(j).swap(log.tau.col(other)); }},
+      {"log q mirrored", [](Log& log, Index j, Index) { log.q.col(j) *= -1; }},
+      {"log torque mirrored", [](Log& log, Index j, Index) { log.tau.col(j) *= -1; }},
+      {"log zero off", [](Log& log, Index j, Index) { log.q.col(j).array() += 0.7; }},
+      {"log gain x 2", [](Log& log, Index j, Index) { log.tau.col(j) *= 2; }},
+      {"log torques x 100", [](Log& log, Index, Index) { log.tau *= 100; }},
+  };
+  return all;
+}
+
+/// Each test log as it is, and one of them, drawn at random, with one mistake of each kind.
+void judge_logs(const Project& project, const GateData& gate, const fs::path& data, std::uint64_t wanted_seed,
+                const ArrangementOptions& options, std::map<std::string, Tally>& counts) {
+  const TorqueSamples train = sample_torque(gate.logs, options.samples);
+  const std::vector<Log> logs = read_logs(project, Role::test, data);
+  Random random(wanted_seed * 101 + 9);
+  const auto n = static_cast<std::uint64_t>(project.robot.size());
+  const std::size_t drawn = random.next() % logs.size();
+  const auto j = static_cast<Index>(random.next() % n), other = static_cast<Index>((j + 1) % static_cast<Index>(n));
+  for (const OwnColumns& one : own_columns()) {
+    const bool sound = one.name == "log sound";
+    for (std::size_t l = 0; l < logs.size(); ++l) {
+      if (!sound && l != drawn) continue;
+      Log log = logs[l];
+      one.make(log, j, other);
+      const auto findings = check_one_log(project, train, std::move(log), gate.filter, options);
+      Tally& tally = counts[one.name];
+      ++tally.all;
+      tally.found += !findings.empty();
+      tally.right += sound == findings.empty();
+      tally.told += sound == findings.empty();
+      if (sound == findings.empty()) continue;
+      fmt::print("{} {} {} joint {}: {}\n", data.parent_path().filename().string(), logs[l].file.filename().string(),
+                 one.name, j + 1, findings.empty() ? "not seen" : findings.front().text);
+    }
+  }
+}
+
 std::string words(const ArrangementMove& move) {
   return fmt::format("{} {} {:.3g}", to_string(move.mistake), move.joint + 1, move.value);
 }
@@ -198,6 +246,7 @@ int run(int argc, char** argv) {
     Random random(wanted.seed * 7919 + 3);
     const Robot robot = with_masses_off(project.robot, share, random);
     if (wants("late torque")) judge_columns(project, robot, data, gate.logs, wanted.seed, options, counts);
+    if (wants("log sound")) judge_logs(project, gate, data, wanted.seed, options, counts);
     std::vector<Planted> cases = plant(robot, samples, random);
     cases.push_back({"sound", robot, samples});
     const double sound = ArrangementEvidence(robot, samples, options)(as_given(robot)).nats;
