@@ -77,6 +77,20 @@ Arrangement as_given(const Robot& robot) {
   return out;
 }
 
+TorqueSamples arranged(const TorqueSamples& samples, const Arrangement& arrangement) {
+  TorqueSamples out = samples;
+  for (Index j = 0; j < arrangement.motion_gain.size(); ++j) {
+    const Index motion = arrangement.motion_from[static_cast<std::size_t>(j)];
+    const Index torque = arrangement.torque_from[static_cast<std::size_t>(j)];
+    const double gain = arrangement.motion_gain[j];
+    out.q.col(j) = (gain * samples.q.col(motion)).array() + arrangement.motion_offset[j];
+    out.dq.col(j) = gain * samples.dq.col(motion);
+    out.ddq.col(j) = gain * samples.ddq.col(motion);
+    out.tau.col(j) = arrangement.torque_gain[j] * samples.tau.col(torque);
+  }
+  return out;
+}
+
 ArrangementEvidence::ArrangementEvidence(Robot robot, TorqueSamples samples, const ArrangementOptions& options,
                                          FrictionMemory memory)
     : robot_(std::move(robot)), samples_(std::move(samples)), options_(options), memory_(std::move(memory)) {
@@ -123,18 +137,11 @@ ArrangementEvidence::Design ArrangementEvidence::design(const Arrangement& arran
   for (std::size_t j = 0; j < robot.size(); ++j) robot.joints[j].axis = arrangement.axis[j];
   const DhChain chain = to_dh(robot);
 
-  MatrixXd q(rows, n), dq(rows, n), ddq(rows, n);
-  for (Index j = 0; j < n; ++j) {
-    const Index from = arrangement.motion_from[static_cast<std::size_t>(j)];
-    const double gain = arrangement.motion_gain[j];
-    q.col(j) = (gain * samples_.q.col(from)).array() + arrangement.motion_offset[j];
-    dq.col(j) = gain * samples_.dq.col(from);
-    ddq.col(j) = gain * samples_.ddq.col(from);
-  }
+  const TorqueSamples as = arranged(samples_, arrangement);
   std::vector<MatrixXd> x(robot.size(), MatrixXd(rows, bodies + own));
   Regressor regressor(chain);
   for (Index k = 0; k < rows; ++k) {
-    const MatrixXd& y = regressor(q.row(k), dq.row(k), ddq.row(k));
+    const MatrixXd& y = regressor(as.q.row(k), as.dq.row(k), as.ddq.row(k));
     for (Index j = 0; j < n; ++j) x[static_cast<std::size_t>(j)].row(k).head(bodies) = y.row(j);
   }
 
@@ -147,9 +154,9 @@ ArrangementEvidence::Design ArrangementEvidence::design(const Arrangement& arran
   for (std::size_t j = 0; j < robot.size(); ++j) {
     const auto joint = static_cast<Index>(j);
     JointSeries series;
-    series.q = q.col(joint);
-    series.dq = dq.col(joint);
-    series.ddq = ddq.col(joint);
+    series.q = as.q.col(joint);
+    series.dq = as.dq.col(joint);
+    series.ddq = as.ddq.col(joint);
     series.step_s = 1;
     const double width = std::max(0.02 * series.dq.cwiseAbs().maxCoeff(), 1e-9);
     for (Index i = 0; i < nominal_columns(); ++i)

@@ -21,6 +21,8 @@ struct Arrangement {
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();   ///< base frame [m/s^2]
 };
 Arrangement as_given(const Robot& robot);
+/// The samples as an arrangement has them: a column a joint.
+TorqueSamples arranged(const TorqueSamples& samples, const Arrangement& arrangement);
 
 /// How well an arrangement explains the torque.
 struct ArrangementScore {

@@ -218,5 +218,53 @@ TEST(Arrangement, PlaceholdersInTheUrdfAreNoMistakeOfTheLogs) {
   EXPECT_FALSE(recorded.check().empty());
 }
 
+/// So many samples from `first` on.
+TorqueSamples part(const TorqueSamples& samples, Index first, Index count) {
+  TorqueSamples out = samples;
+  for (auto [to, from] :
+       {std::pair{&out.q, &samples.q}, {&out.dq, &samples.dq}, {&out.ddq, &samples.ddq}, {&out.tau, &samples.tau}})
+    *to = from->middleRows(first, count);
+  return out;
+}
+
+TEST(Arrangement, SamplesAsItHasThemAreItsEvidence) {
+  const Recorded recorded;
+  Arrangement turned = as_given(recorded.robot);
+  std::swap(turned.motion_from[0], turned.motion_from[2]);
+  std::swap(turned.torque_from[3], turned.torque_from[5]);
+  turned.motion_gain[1] = -1;
+  turned.motion_offset[4] = 0.3;
+  turned.torque_gain[2] = -1;
+  const ArrangementOptions options;
+  const ArrangementEvidence as_recorded(recorded.robot, recorded.samples, options),
+      as_turned(recorded.robot, arranged(recorded.samples, turned), options);
+  EXPECT_NEAR(as_recorded(turned).nats, as_turned(as_given(recorded.robot)).nats, 1e-6);
+}
+
+// Other units of all torques may be bodies that are as much heavier, as far as one log and a URDF tell.
+TEST(Arrangement, BodiesThatOtherLogsTeachAreKnownInAShortLog) {
+  const Recorded recorded;
+  const ArrangementOptions options;
+  const TorqueSamples others = part(recorded.samples, 0, 250), log = part(recorded.samples, 250, 50);
+  const Arrangement given = as_given(recorded.robot);
+  const KnownBodies bodies = ArrangementEvidence(recorded.robot, others, options).bodies(given);
+  const ArrangementEvidence alone(recorded.robot, log, options), known(recorded.robot, log, options, bodies);
+  Arrangement heavy = given;
+  heavy.torque_gain *= 3;
+  EXPECT_GT(known(heavy).nats - known(given).nats, 2 * (alone(heavy).nats - alone(given).nats));
+}
+
+TEST(Arrangement, AxesAndGravityAreNotOfOneLog) {
+  Recorded recorded;
+  recorded.robot.gravity = Eigen::Vector3d(9.81, 0, 0);
+  const ArrangementOptions options;
+  for (const ArrangementFinding& finding :
+       find_mistakes(ArrangementEvidence(recorded.robot, recorded.samples, options), options, true)) {
+    EXPECT_NE(to_string(finding.move.mistake), "gravity");
+    EXPECT_NE(to_string(finding.move.mistake), "axis");
+    for (const ArrangementMove& other : finding.as_good) EXPECT_NE(to_string(other.mistake), "gravity");
+  }
+}
+
 }  // namespace
 }  // namespace fxdyn

@@ -1,0 +1,71 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "host_tools/check/check.hpp"
+#include "host_tools/project/project.hpp"
+#include "host_tools/simulate/recordings.hpp"
+#include "tests/campaign/generate.hpp"
+
+namespace fxdyn {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A robot of the second campaign: its logs, those of its train role as the fit sees them.
+struct Recordings {
+  fs::path folder = fs::path(testing::TempDir()) / "one_log_test";
+  Project project;
+  GateData gate;
+  TorqueSamples train;
+
+  explicit Recordings(std::uint64_t seed) {
+    fs::remove_all(folder);
+    campaign::Case wanted = campaign::drawn_cases(seed, 1).front();
+    wanted.validate = true;
+    campaign::generate(wanted, folder / "data", folder / "truth");
+    project = read_project(folder / "data" / "project.toml");
+    gate = read_gate_data(project, folder / "data");
+    std::vector<ProcessedLog> logs = gate.logs;
+    std::erase_if(logs, [](const ProcessedLog& log) { return log.role != Role::train; });
+    train = sample_torque(logs, ArrangementOptions{}.samples);
+  }
+  ~Recordings() { fs::remove_all(folder); }
+
+  std::vector<Log> judging() const { return read_logs(project, Role::validate, folder / "data"); }
+  std::vector<CheckFinding> check(Log log) const { return check_one_log(project, train, std::move(log), gate.filter); }
+};
+
+// Maxwell slip, three joints, 200 Hz: its slow reversals were refused as those of a robot with another axis.
+TEST(OneLog, OfFrictionWithMemoryIsSound) {
+  const Recordings recordings(1233);
+  const std::vector<Log> logs = recordings.judging();
+  ASSERT_EQ(logs.size(), 4U);
+  for (const Log& log : logs) {
+    for (const CheckFinding& finding : recordings.check(log)) ADD_FAILURE() << log.file << ": " << finding.text;
+  }
+}
+
+TEST(OneLog, WithColumnsOfItsOwnIsFound) {
+  const Recordings recordings(1233);
+  Log log = recordings.judging().front(), mirrored = log, doubled = log;
+  mirrored.tau.col(1) *= -1;
+  const auto found = recordings.check(std::move(mirrored));
+  ASSERT_FALSE(found.empty());
+  EXPECT_TRUE(found.front().error);
+  EXPECT_EQ(found.front().kind, "mirrored_torque");
+  EXPECT_EQ(found.front().joint, 1U);
+  EXPECT_FALSE(found.front().log.empty());
+  // Alone, its bodies would be twice as heavy. It is a warning: a gain may have changed.
+  doubled.tau.col(1) *= 2;
+  const auto gain = recordings.check(doubled);
+  ASSERT_FALSE(gain.empty());
+  EXPECT_FALSE(gain.front().error);
+  EXPECT_EQ(gain.front().kind, "torque_gain");
+  EXPECT_EQ(gain.front().joint, 1U);
+  doubled.role = Role::baseline;  // .. which the diagnosis is to name
+  EXPECT_TRUE(recordings.check(std::move(doubled)).empty());
+}
+
+}  // namespace
+}  // namespace fxdyn
