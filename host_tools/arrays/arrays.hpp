@@ -32,9 +32,11 @@ struct ArrayList {
   std::string name_of(const ArrayPath& path) const;
 };
 
-/// Whether that is a file of MATLAB (4 by its name, 5, 7.3) or of HDF5. Look at the first bytes; read no pipe.
+/// Whether that is a file of MATLAB (4 by its name, 5, 7.3), of HDF5 or of Parquet. Look at the first bytes; read no
+/// pipe.
 bool is_matlab(const std::filesystem::path& file);
 bool is_hdf5(const std::filesystem::path& file);
+bool is_parquet(const std::filesystem::path& file);
 
 /// What a file has, in its own order.
 /// @throws InputError naming the file: it can't be read, is cut or damaged
@@ -50,11 +52,14 @@ using ArrayNumbers = std::function<void(std::size_t which, std::uint64_t at, std
 /// @throws InputError as list_arrays()
 void read_arrays(const std::filesystem::path& file, const std::vector<ArrayPath>& paths, const ArrayNumbers& numbers);
 
-/// The formats. HDF5: groups and datasets, also those of MATLAB 7.3. MATLAB 4 and 5: by libmatio.
+/// The formats. HDF5: groups and datasets, also those of MATLAB 7.3. MATLAB 4 and 5: by libmatio. Parquet: columns; of
+/// a file with several episodes (episode_index of LeRobot), those of each as "episode_3", its rows alone.
 ArrayList list_hdf5(const std::filesystem::path& file);
 void read_hdf5(const std::filesystem::path& file, const std::vector<ArrayPath>& paths, const ArrayNumbers& numbers);
 ArrayList list_mat5(const std::filesystem::path& file);
 void read_mat5(const std::filesystem::path& file, const std::vector<ArrayPath>& paths, const ArrayNumbers& numbers);
+ArrayList list_parquet(const std::filesystem::path& file);
+void read_parquet(const std::filesystem::path& file, const std::vector<ArrayPath>& paths, const ArrayNumbers& numbers);
 
 /// What to say of arrays that hold something else than real numbers.
 std::string cell_trouble(const std::string& name);

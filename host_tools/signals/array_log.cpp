@@ -81,7 +81,7 @@ void explain(const ArrayGroup& group, const LogRequest& request, const std::stri
     const Names names = by_joint ? given->second : Names{column_of(request.columns, signal.c_str())};
     for (const auto& [array, why] : group.unusable)
       for (const std::string& name : names)
-        if (!name.empty() && (array == name || array == without_number(name)))
+        if (!name.empty() && (array == name || array == without_number(name) || without_number(array) == name))
           throw InputError(fmt::format("{}: {} {}", where, array, why));
   }
 }
