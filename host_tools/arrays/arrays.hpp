@@ -20,6 +20,8 @@ struct ArrayInfo {
   std::string type;                  ///< for people: "double", "int16", "cell"
   std::string trouble;               ///< why it can't be read as numbers; empty: it can
   std::string text;                  ///< of short texts
+  /// What the file or its data set calls the numbers of a sample, where it does: LeRobot.
+  std::vector<std::string> channels{};
   std::uint64_t size() const;
   /// As its program says it: "3000 x 6 double".
   std::string described() const;

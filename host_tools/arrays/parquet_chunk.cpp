@@ -124,11 +124,12 @@ std::uint32_t bits_of(std::uint32_t most) {
 
 class PartReader {
  public:
-  PartReader(ByteFile& file, const ParquetPart& part, std::uint64_t begin, std::uint64_t end,
+  PartReader(ByteFile& file, ParquetBuffers& buffers, const ParquetPart& part, std::uint64_t begin, std::uint64_t end,
              const std::function<void(std::span<const double>)>& take)
-      : file_(file), part_(part), take_(take), from_(begin * part.each), to_(end * part.each) {}
+      : file_(file), buffers_(buffers), part_(part), take_(take), from_(begin * part.each), to_(end * part.each) {}
 
   void read() {
+    buffers_.dictionary.clear();  // was another part's
     const std::uint64_t all = part_.rows * part_.each;
     if (part_.chunk.values != all) throw DamagedBytes("has lists of different lengths");
     for (std::uint64_t at = part_.chunk.begin; entry_ < to_;) {
@@ -160,8 +161,8 @@ class PartReader {
       const std::string_view bytes = unpacked(packed, static_cast<std::size_t>(head.size), part_.chunk.codec);
       // Booleans have none; of all other numbers each needs four bytes or more.
       if (values > bytes.size() / 4) throw DamagedBytes("is damaged");
-      dictionary_.resize(values);
-      parquet_values(ParquetEncoding::plain, part_.column, bytes, {})->take(dictionary_);
+      buffers_.dictionary.resize(values);
+      parquet_values(ParquetEncoding::plain, part_.column, bytes, {})->take(buffers_.dictionary);
     } else {
       head.kind == PageKind::data ? data(head, packed) : data_2(head, packed);
     }
@@ -172,9 +173,9 @@ class PartReader {
       if (packed.size() != size) throw DamagedBytes("is damaged");
       return packed;
     }
-    if (room_.size() < size) room_.resize(size);
-    if (size > 0 && !unpack_into(codec, packed, {room_.data(), size})) throw DamagedBytes("is damaged");
-    return {room_.data(), size};
+    if (buffers_.page.size() < size) buffers_.page.resize(size);
+    if (size > 0 && !unpack_into(codec, packed, {buffers_.page.data(), size})) throw DamagedBytes("is damaged");
+    return {buffers_.page.data(), size};
   }
 
   /// Levels of version 1: their length, then runs.
@@ -210,9 +211,11 @@ class PartReader {
   void entries(const PageHead& head, std::string_view repeated, std::string_view defined, std::string_view bytes) {
     const ParquetColumn& column = part_.column;
     RunReader repeats(repeated, bits_of(column.repeated)), defines(defined, bits_of(column.defined));
-    const auto values = parquet_values(static_cast<ParquetEncoding>(head.encoding), column, bytes, dictionary_);
-    std::vector<std::uint32_t> levels(at_once);
-    std::vector<double> numbers(at_once);
+    const auto values = parquet_values(static_cast<ParquetEncoding>(head.encoding), column, bytes, buffers_.dictionary);
+    std::vector<std::uint32_t>& levels = buffers_.levels;
+    std::vector<double>& numbers = buffers_.numbers;
+    levels.resize(at_once);
+    numbers.resize(at_once);
     for (auto left = static_cast<std::uint64_t>(head.values); left > 0;) {
       const std::size_t some = std::min<std::uint64_t>(left, at_once);
       left -= some;
@@ -250,21 +253,20 @@ class PartReader {
   }
 
   ByteFile& file_;
+  ParquetBuffers& buffers_;
   const ParquetPart& part_;
   const std::function<void(std::span<const double>)>& take_;
   std::uint64_t from_, to_;  ///< in numbers
   std::uint64_t entry_ = 0;  ///< the next one
-  std::vector<double> dictionary_;
-  std::vector<char> room_;
 };
 
 }  // namespace
 
-void read_parquet_part(ByteFile& file, const ParquetPart& part, std::uint64_t begin, std::uint64_t end,
-                       const std::function<void(std::span<const double>)>& take) {
+void read_parquet_part(ByteFile& file, ParquetBuffers& buffers, const ParquetPart& part, std::uint64_t begin,
+                       std::uint64_t end, const std::function<void(std::span<const double>)>& take) {
   if (begin >= end) return;
   try {
-    PartReader(file, part, begin, end, take).read();
+    PartReader(file, buffers, part, begin, end, take).read();
   } catch (const DamagedBytes& error) {
     const std::string_view what = error.what();
     const bool is_damage = what == "is damaged" || what == "ends in the middle";

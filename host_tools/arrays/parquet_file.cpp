@@ -10,6 +10,7 @@
 #include <set>
 
 #include "host_tools/arrays/arrays.hpp"
+#include "host_tools/arrays/lerobot.hpp"
 #include "host_tools/arrays/parquet_chunk.hpp"
 #include "host_tools/support/error.hpp"
 
@@ -62,7 +63,7 @@ class ParquetFile {
       if (begin < end) {
         const ParquetPart part{footer_.columns[column], group.chunks[column], group.rows, each_[column],
                                fmt::format("{}: {}", where_, name_of(footer_.columns[column]))};
-        read_parquet_part(bytes_, part, begin - first, end - first, take);
+        read_parquet_part(bytes_, buffers_, part, begin - first, end - first, take);
       }
       first += group.rows;
     }
@@ -105,6 +106,7 @@ class ParquetFile {
 
   std::string where_;
   ByteFile bytes_;
+  ParquetBuffers buffers_;
   ParquetFooter footer_;
   std::vector<std::uint64_t> each_;
   std::vector<Episode> episodes_;
@@ -120,6 +122,7 @@ ArrayPath path_in(const Episode& episode, const ParquetColumn& column) {
 
 ArrayList list_parquet(const std::filesystem::path& file) {
   const ParquetFile parquet(file);
+  const auto names = lerobot_names(file);
   ArrayList out;
   out.mark = '.';
   for (const Episode& episode : parquet.episodes()) {
@@ -131,6 +134,9 @@ ArrayList list_parquet(const std::filesystem::path& file) {
       array.trouble = column.trouble;
       if (episode.end - episode.begin != 1) array.shape.push_back(episode.end - episode.begin);
       if (parquet.each(k) > 1) array.shape.push_back(parquet.each(k));
+      if (const auto own = names.find(ParquetFile::name_of(column));
+          own != names.end() && own->second.size() == parquet.each(k))
+        array.channels = own->second;
       out.arrays.push_back(std::move(array));
     }
   }

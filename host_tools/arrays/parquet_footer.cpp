@@ -41,6 +41,13 @@ struct SchemaElement {
   double per_second = 0;
 };
 
+/// Names stand in complaints, which have one line.
+std::string in_one_line(std::string name) {
+  for (char& c : name)
+    if (static_cast<unsigned char>(c) < ' ') c = '_';
+  return name;
+}
+
 /// Unit of a LogicalType TIME or TIMESTAMP.
 double read_unit(ThriftReader& in) {
   constexpr std::array units{0.0, 1e3, 1e6, 1e9};
@@ -73,7 +80,7 @@ SchemaElement read_element(ThriftReader& in) {
   in.structure([&](int field) {
     if (field == 1) out.type = static_cast<int>(in.integer());
     if (field == 3) out.repetition = static_cast<int>(in.integer());
-    if (field == 4) out.name = in.text();
+    if (field == 4) out.name = in_one_line(in.text());
     if (field == 5) out.children = in.integer();
     if (field == 6) out.converted = static_cast<int>(in.integer());
     if (field == 10) read_logical(in, out);

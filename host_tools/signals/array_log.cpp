@@ -140,6 +140,8 @@ Numbers numbers_of(const LogRequest& request, const ArrayList& list, const Choic
   std::vector<std::vector<std::vector<double>*>> targets;  // array that is read, channel
   std::vector<ArrayOrder> orders;
   std::vector<std::size_t> place(list.arrays.size(), SIZE_MAX);
+  std::vector<std::pair<std::vector<double>*, std::vector<double>*>>
+      copies;  // a channel that is asked for by both its names
   const auto target_of = [&](std::size_t array, std::size_t channel) -> std::vector<double>*& {
     if (place[array] == SIZE_MAX) {
       place[array] = paths.size();
@@ -153,7 +155,10 @@ Numbers numbers_of(const LogRequest& request, const ArrayList& list, const Choic
     const ArrayColumn& column = group.columns[field];
     const int target = choice.layout.target[field];
     if (target < 0 || column.array == list.arrays.size()) continue;
-    target_of(column.array, column.channel) = &out.columns[static_cast<std::size_t>(target)];
+    std::vector<double>*& into = target_of(column.array, column.channel);
+    std::vector<double>* const own = &out.columns[static_cast<std::size_t>(target)];
+    if (into == nullptr) into = own;
+    if (into != own) copies.emplace_back(into, own);
   }
   for (std::size_t k = 0; k < group.other_times.size(); ++k) target_of(group.other_times[k], 0) = &out.other_times[k];
   constexpr std::uint64_t most_reserved = 1 << 22;  // a damaged file may claim any size
@@ -163,12 +168,17 @@ Numbers numbers_of(const LogRequest& request, const ArrayList& list, const Choic
   read_arrays(request.file, paths, [&](std::size_t which, std::uint64_t at, std::span<const double> some) {
     if (which >= paths.size()) return;
     const ArrayOrder& order = orders[which];
+    if (order.channels == 1) {  // no division for each number
+      if (std::vector<double>* const into = targets[which][0]) into->insert(into->end(), some.begin(), some.end());
+      return;
+    }
     for (const double number : some) {
       const std::uint64_t channel = order.sample_by_sample ? at % order.channels : at / group.samples;
       if (channel < order.channels && targets[which][channel] != nullptr) targets[which][channel]->push_back(number);
       ++at;
     }
   });
+  for (const auto& [from, to] : copies) *to = *from;
   return out;
 }
 
@@ -239,7 +249,11 @@ std::vector<LogColumns> array_columns(const std::filesystem::path& file) {
   const std::vector<ArrayGroup> groups = groups_in(list_arrays(file), "t", file.string());
   std::vector<LogColumns> out;
   out.reserve(groups.size());
-  for (const ArrayGroup& group : groups) out.push_back({group.topic, names_of(group)});
+  for (const ArrayGroup& group : groups) {
+    out.push_back({group.topic, {}});
+    for (const ArrayColumn& column : group.columns)
+      if (!column.has_better_name) out.back().names.push_back(column.name);
+  }
   return out;
 }
 

@@ -127,6 +127,48 @@ TEST(ParquetLog, ItsColumnsAreListed) {
   EXPECT_EQ(array_columns(files / "plain.parquet").at(0).topic, "/");
 }
 
+/// lerobot.parquet in a data set whose meta/info.json is that.
+std::filesystem::path data_set(const std::string& info) {
+  const auto root = test::folder() / "data_set", file = root / "data/chunk-000/file-000.parquet";
+  std::filesystem::create_directories(file.parent_path());
+  std::filesystem::create_directories(root / "meta");
+  std::filesystem::copy_file(files / "lerobot.parquet", file, std::filesystem::copy_options::overwrite_existing);
+  std::ofstream(root / "meta/info.json") << info;
+  return file;
+}
+
+TEST(ParquetLog, ADataSetNamesTheNumbersOfItsLists) {
+  const auto file = data_set(R"({"fps": 30, "features": {
+    "observation.state": {"dtype": "float32", "names": ["elbow.pos", "wrist.pos"]},
+    "observation.velocity": {"names": {"motors": ["elbow", "wrist"]}},
+    "observation.effort": {"names": ["twice", "twice"]}, "action": {"names": ["one"]}, "index": {"names": null}}})");
+  EXPECT_EQ(array_columns(file).at(0).names,
+            (std::vector<std::string>{"timestamp", "observation.state.elbow.pos", "observation.state.wrist.pos",
+                                      "observation.velocity.elbow", "observation.velocity.wrist", "observation.effort1",
+                                      "observation.effort2", "action1", "action2", "frame_index", "episode_index",
+                                      "index", "task_index", "next.done"}));
+  const Log numbered = read(file, of_lerobot("episode_4"));
+  LogFormat named = of_lerobot("episode_4");
+  named.columns.erase("q");
+  named.joint_columns["q"] = {"observation.state.wrist.pos", "observation.state.elbow.pos"};
+  const Log log = read(file, named);
+  EXPECT_TRUE(log.q.col(0) == numbered.q.col(1));
+  EXPECT_TRUE(log.q.col(1) == numbered.q.col(0));
+  // One column for two signals, by both its names.
+  named.joint_columns["tau"] = {"observation.state1", "observation.state2"};
+  const Log both = read(file, named);
+  EXPECT_TRUE(both.tau.col(0) == both.q.col(1));
+  EXPECT_TRUE(both.tau.col(1) == both.q.col(0));
+}
+
+TEST(ParquetLog, WithoutNamesItsNumbersAreReadTheSame) {
+  for (const char* info : {"", "{", "[]", R"({"features": 3})", R"({"features": {"observation.state": []}})"}) {
+    const auto file = data_set(info);
+    EXPECT_EQ(array_columns(file).at(0).names.at(1), "observation.state1") << info;
+    EXPECT_EQ(read(file, of_lerobot("episode_4")).samples(), 60) << info;
+  }
+}
+
 TEST(ParquetLog, AStructIsALogOfItsOwn) {
   const auto all = array_columns(files / "struct.parquet");
   ASSERT_EQ(all.size(), 1U);
@@ -172,6 +214,27 @@ std::string zeros() { return test::small_numbers(std::vector<double>(30)); }
 TEST(SmallParquet, IsRead) {
   EXPECT_EQ(read(small()).samples(), 30);
   EXPECT_EQ(read(small({.name = "tau2", .values = 30, .pages = test::small_page(30, zeros())})).tau(7, 1), 0);
+}
+
+/// Of a list that is the field itself, repeated: 0 and 1 by turns in groups of eight, then 60 times 1, then numbers.
+std::string repeated_field() {
+  const auto with_length = [](const std::string& runs) {
+    const auto length = static_cast<std::uint32_t>(runs.size());
+    return std::string(reinterpret_cast<const char*>(&length), sizeof length) + runs;
+  };
+  std::vector<double> numbers(60);
+  for (std::size_t k = 0; k < numbers.size(); ++k) numbers[k] = static_cast<double>(k);
+  return with_length("\x11" + std::string(8, '\xAA')) + with_length("\x78\x01") + test::small_numbers(numbers);
+}
+
+TEST(SmallParquet, AListMayBeAFieldThatIsRepeated) {
+  std::vector<test::SmallColumn> columns = small_columns();
+  columns.erase(columns.begin() + 3, columns.end());
+  columns.push_back({.name = "tau", .repetition = 2, .values = 60, .pages = test::small_page(60, repeated_field())});
+  const Log log = read(test::write("small.parquet", test::small_parquet(columns, 30)));
+  EXPECT_EQ(log.tau(0, 0), 0);
+  EXPECT_EQ(log.tau(0, 1), 1);
+  EXPECT_EQ(log.tau(29, 1), 59);
 }
 
 TEST(SmallParquet, PagesThatNoWriterMakesAreRefused) {

@@ -1,6 +1,8 @@
-// write_parquet.mjs FOLDER [SECONDS]: Parquet files by the writers that others use: the one of Arrow's Rust (parquet-wasm) and
+// write_parquet.mjs FOLDER [SECONDS [CAMERA_KILOBYTES]]: Parquet files by the writers that others use: the one of Arrow's Rust (parquet-wasm) and
 // hyparquet-writer. Without SECONDS the numbers of FOLDER/truth.csv, two joints, in many ways: what tests read in
 // tests/arrays/files. With SECONDS one motion of six joints at 500 Hz as truth.csv and in four files, and a data set of LeRobot's.
+// With CAMERA_KILOBYTES also camera.parquet, with an image of that size in each row.
+import { randomBytes } from "node:crypto";
 import fs from "node:fs";
 import path from "node:path";
 import * as arrow from "apache-arrow";
@@ -10,6 +12,7 @@ import * as parquet from "parquet-wasm";
 const { Compression, Encoding, WriterVersion } = parquet;
 const folder = process.argv[2];
 const seconds = Number(process.argv[3] ?? 0);
+const cameraKilobytes = Number(process.argv[4] ?? 0);
 fs.mkdirSync(folder, { recursive: true });
 
 const double = new arrow.Float64(), float = new arrow.Float32(), int32 = new arrow.Int32(), int64 = new arrow.Int64();
@@ -86,6 +89,11 @@ if (seconds > 0) {
   write("zstd.parquet", lists(fixedListOf(double, 6)), large(Compression.ZSTD, WriterVersion.V2));
   hyparquet("hyparquet.parquet", flat(), {});
   write("lerobot.parquet", lerobot([0, 1, 2], 500), large(Compression.SNAPPY, WriterVersion.V1));
+  if (cameraKilobytes > 0) {
+    const size = cameraKilobytes * 1000, noise = randomBytes(16 << 20); // longer than what packers look back
+    const images = all((row, k) => noise.subarray((k * size) % (noise.length - size)).subarray(0, size));
+    write("camera.parquet", { image: [new arrow.Binary(), images], ...flat() }, large(Compression.SNAPPY, WriterVersion.V1));
+  }
   process.exit(0);
 }
 

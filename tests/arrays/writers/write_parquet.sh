@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# write_parquet.sh WORK FOLDER [SECONDS]: the files of write_parquet.mjs in FOLDER. Packages of npm go to WORK.
+# write_parquet.sh WORK FOLDER [SECONDS [CAMERA_KILOBYTES]]: the files of write_parquet.mjs in FOLDER. Packages of npm go to WORK.
 set -euo pipefail
 work=$1
 shift
