@@ -230,6 +230,7 @@ std::string init_project(const std::vector<fs::path>& logs, const fs::path& urdf
   for (const fs::path& file : logs)
     if (format.time_unit_s > 0 && time_unit_in(file, robot) != format.time_unit_s) format.time_unit_s = 0;
   std::vector<Recorded> recorded;
+  recorded.reserve(logs.size());
   const LogFactOptions options;
   for (const fs::path& file : logs)
     recorded.push_back(recorded_of(file, read_in_its_unit(file, robot.size(), turns, format), options));

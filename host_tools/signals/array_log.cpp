@@ -3,13 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 
 #include "host_tools/arrays/arrays.hpp"
 #include "host_tools/signals/array_groups.hpp"
 #include "host_tools/signals/column_cut.hpp"
+#include "host_tools/signals/foreign_format.hpp"
 #include "host_tools/signals/log_reader.hpp"
 #include "host_tools/signals/time_unit.hpp"
 #include "host_tools/support/error.hpp"
+#include "host_tools/support/pipes.hpp"
 
 namespace fxdyn {
 namespace {
@@ -30,6 +33,26 @@ std::string arrays_of(const ArrayList& list) {
   for (const ArrayInfo& array : list.arrays)
     out.push_back(fmt::format("{} ({})", list.name_of(array.path), array.described()));
   return out.empty() ? "nothing" : listed(out);
+}
+
+/// A text under such a name, as what Git LFS leaves where the file itself was not fetched.
+std::string words_of_text(const std::filesystem::path& file) {
+  if (is_pipe(file)) return "";
+  std::string head(1024, '\0');
+  std::ifstream in(file, std::ios::binary);
+  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(in.gcount()));
+  if (head.empty() || head.find('\0') != std::string::npos) return "";
+  const std::string words = foreign_format(head);
+  return words.empty() && file.extension() == ".parquet" ? "is no Parquet, but text: copy the file again" : words;
+}
+
+/// @throws InputError see list_arrays()
+ArrayList list_of(const std::filesystem::path& file) {
+  const bool is_known = is_matlab(file) || is_hdf5(file) || is_parquet(file);
+  if (const std::string words = is_known ? "" : words_of_text(file); !words.empty())
+    throw InputError(fmt::format("{}: {}", file.string(), words));
+  return list_arrays(file);
 }
 
 std::string column_of(const LogFormat& format, const char* signal) {
@@ -224,7 +247,7 @@ void check_complete(const Numbers& numbers, const Choice& choice) {
 }  // namespace
 
 RecordedLog read_array_log(const LogRequest& request) {
-  const ArrayList list = list_arrays(request.file);
+  const ArrayList list = list_of(request.file);
   const std::vector<ArrayGroup> groups = groups_in(list, column_of(request.columns, "t"), request.file.string());
   const Choice choice = choose(groups, request);
   const ArrayGroup& group = *choice.group;
@@ -246,7 +269,7 @@ RecordedLog read_array_log(const LogRequest& request) {
 }
 
 std::vector<LogColumns> array_columns(const std::filesystem::path& file) {
-  const std::vector<ArrayGroup> groups = groups_in(list_arrays(file), "t", file.string());
+  const std::vector<ArrayGroup> groups = groups_in(list_of(file), "t", file.string());
   std::vector<LogColumns> out;
   out.reserve(groups.size());
   for (const ArrayGroup& group : groups) {

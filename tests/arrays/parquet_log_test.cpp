@@ -129,7 +129,8 @@ TEST(ParquetLog, ItsColumnsAreListed) {
 
 /// lerobot.parquet in a data set whose meta/info.json is that.
 std::filesystem::path data_set(const std::string& info) {
-  const auto root = test::folder() / "data_set", file = root / "data/chunk-000/file-000.parquet";
+  const auto root = test::folder() / "data_set";
+  auto file = root / "data/chunk-000/file-000.parquet";
   std::filesystem::create_directories(file.parent_path());
   std::filesystem::create_directories(root / "meta");
   std::filesystem::copy_file(files / "lerobot.parquet", file, std::filesystem::copy_options::overwrite_existing);
@@ -190,6 +191,14 @@ TEST(ParquetLog, WhatCanNotBeReadIsExplained) {
   refused("ragged.parquet", {"ragged.parquet: tau has lists of different lengths"});
   refused("types.parquet", {"note is text"}, {.columns = {{"tau", "note"}}});
   refused("plain.parquet", {"no column 'torque1'"}, {.columns = {{"tau", "torque"}}});
+}
+
+TEST(ParquetLog, TextUnderItsNameIsExplained) {
+  const auto pointer = test::write("file-000.parquet", "version https://git-lfs.github.com/spec/v1\noid sha256:12\n");
+  test::expect_refused(pointer, {"is a pointer of Git LFS", "git lfs pull"}, [&] { read(pointer); });
+  test::expect_refused(pointer, {"is a pointer of Git LFS"}, [&] { array_columns(pointer); });
+  const auto text = test::write("text.parquet", "t,q1,tau1\n0,1,2\n");
+  test::expect_refused(text, {"is no Parquet, but text"}, [&] { read(text); });
 }
 
 /// Two joints of 30 rows, but for one column.

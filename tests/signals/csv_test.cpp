@@ -118,18 +118,18 @@ TEST(Csv, CommentsAreSkippedAndMayNameTheColumns) {
 }
 
 TEST(Csv, FieldsMayBeApartByTabsOrBlanks) {
-  const std::string names = "t q1 tau1", rows = "0 1 2\n0.1 3 4\n";
+  const std::string names = "t q1 tau1", rows = "\n0 1 2\n0.1 3 4\n", table = names + rows;
   for (const char mark : {' ', '\t'}) {
     const auto with = [&](std::string text) {
       std::replace(text.begin(), text.end(), ' ', mark);
       return write("apart.csv", text);
     };
-    EXPECT_EQ(read(with(names + "\n" + rows)).tau(1, 0), 4);
+    EXPECT_EQ(read(with(table)).tau(1, 0), 4);
     EXPECT_EQ(read(with(names + " \r\n0 1 2 \r\n0.1 3 4 \r\n")).tau(1, 0), 4);
-    EXPECT_EQ(read(with("#" + names + "\n" + rows)).q(1, 0), 3);
-    const auto short_row = with(names + "\n" + rows + "0.2 1\n");
+    EXPECT_EQ(read(with("#" + table)).q(1, 0), 3);
+    const auto short_row = with(table + "0.2 1\n");
     test::expect_refused(short_row, {":4:", "2 fields where the header has 3"}, [&] { read(short_row); });
-    const auto empty = with(names + "\n" + rows + "0.2  1\n");
+    const auto empty = with(table + "0.2  1\n");
     test::expect_refused(empty, {":4:", "'q1'", "'' is not a number"}, [&] { read(empty); });
   }
   const auto commas = write("commas.csv", names + "\n0 1,5 2\n0,1 3,5 4\n");
