@@ -10,6 +10,7 @@
 #include <fstream>
 
 #include "host_tools/arrays/apart.hpp"
+#include "host_tools/arrays/lerobot.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/pipes.hpp"
 
@@ -135,6 +136,7 @@ bool is_matlab(const fs::path& file) {
 }
 
 bool is_parquet(const fs::path& file) {
+  if (is_lerobot(file)) return true;
   if (!is_plain_file(file)) return false;
   const std::string bytes = bytes_at(file, 0);
   return bytes.starts_with("PAR1") || bytes.starts_with("PARE");

@@ -34,7 +34,8 @@ struct ArrayList {
   std::string name_of(const ArrayPath& path) const;
 };
 
-/// Whether that is a file of MATLAB (4 by its name, 5, 7.3), of HDF5 or of Parquet. Look at the first bytes; read no
+/// Whether that is a file of MATLAB (4 by its name, 5, 7.3), of HDF5 or of Parquet (or the folder of a data set of
+/// LeRobot, of which one file has to be named). Look at the first bytes; read no
 /// pipe.
 bool is_matlab(const std::filesystem::path& file);
 bool is_hdf5(const std::filesystem::path& file);

@@ -13,4 +13,9 @@ namespace fxdyn {
 /// data sets of versions 2.0 to 3.0: features.COLUMN.names is a list, or lists of parts ("motors").
 std::map<std::string, std::vector<std::string>> lerobot_names(const std::filesystem::path& file);
 
+/// Whether a folder is such a data set, by its meta/info.json.
+bool is_lerobot(const std::filesystem::path& folder);
+/// Its first file of rows; empty: it has none.
+std::filesystem::path first_file_of_lerobot(const std::filesystem::path& folder);
+
 }  // namespace fxdyn

@@ -35,11 +35,19 @@ std::optional<std::uint64_t> numbers_each(const ParquetFooter& footer, std::size
   return each;
 }
 
+/// @throws InputError: it is a data set
+const std::filesystem::path& no_folder(const std::filesystem::path& file) {
+  if (!is_lerobot(file)) return file;
+  const std::filesystem::path first = first_file_of_lerobot(file);
+  throw InputError(fmt::format("{}: is a data set of LeRobot: name one of its files, as in {}", file.string(),
+                               (first.empty() ? file / "data/chunk-000/file-000.parquet" : first).string()));
+}
+
 /// An open file, its footer and its episodes.
 class ParquetFile {
  public:
   explicit ParquetFile(const std::filesystem::path& file)
-      : where_(file.string()), bytes_(file), footer_(read_parquet_footer(bytes_, where_)) {
+      : where_(file.string()), bytes_(no_folder(file)), footer_(read_parquet_footer(bytes_, where_)) {
     for (std::size_t k = 0; k < footer_.columns.size(); ++k) {
       ParquetColumn& column = footer_.columns[k];
       each_.push_back(numbers_each(footer_, k).value_or(0));

@@ -162,6 +162,17 @@ TEST(ParquetLog, ADataSetNamesTheNumbersOfItsLists) {
   EXPECT_TRUE(both.tau.col(1) == both.q.col(0));
 }
 
+TEST(ParquetLog, OfADataSetAFileIsToBeNamed) {
+  const auto root = data_set("{}").parent_path().parent_path().parent_path();
+  EXPECT_EQ(reader_of(root).name, "parquet");
+  const std::vector<std::string> words{"is a data set of LeRobot: name one of its files",
+                                       "data_set/data/chunk-000/file-000.parquet"};
+  test::expect_refused(root, words, [&] { read(root); });
+  test::expect_refused(root, words, [&] { array_columns(root); });
+  std::filesystem::remove_all(root / "data");
+  test::expect_refused(root, words, [&] { read(root); });
+}
+
 TEST(ParquetLog, WithoutNamesItsNumbersAreReadTheSame) {
   for (const char* info : {"", "{", "[]", R"({"features": 3})", R"({"features": {"observation.state": []}})"}) {
     const auto file = data_set(info);
