@@ -236,6 +236,27 @@ TEST(SmallParquet, IsRead) {
   EXPECT_EQ(read(small({.name = "tau2", .values = 30, .pages = test::small_page(30, zeros())})).tau(7, 1), 0);
 }
 
+TEST(SmallParquet, OlderWritersSayUnitsAndSignsInAnotherWay) {
+  constexpr int int64 = 2, milliseconds = 9, microseconds = 10, unsigned_64 = 14, decimal = 5;
+  const auto page = [](std::int64_t step, std::int64_t first) {
+    std::string bytes;
+    for (std::int64_t k = 0; k < 30; ++k) {
+      const std::int64_t number = first + k * step;
+      bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
+    }
+    return test::small_page(30, bytes);
+  };
+  const auto with = [&](const char* name, int converted, std::int64_t step, std::int64_t first = 0) {
+    return small({.name = name, .type = int64, .values = 30, .pages = page(step, first), .converted = converted});
+  };
+  for (const auto& [unit, step] : {std::pair(milliseconds, 10), std::pair(microseconds, 10'000)})
+    EXPECT_DOUBLE_EQ(read(with("t", unit, step)).t[29], 0.29);
+  EXPECT_EQ(read(with("tau2", unsigned_64, 0, -1)).tau(0, 1), 18446744073709551615.0);
+  EXPECT_EQ(read(with("tau2", -1, 0, -1)).tau(0, 1), -1);
+  const auto file = with("tau2", decimal, 1);
+  test::expect_refused(file, {"tau2 is decimal: write it as double"}, [&] { read(file); });
+}
+
 /// Of a list that is the field itself, repeated: 0 and 1 by turns in groups of eight, then 60 times 1, then numbers.
 std::string repeated_field() {
   const auto with_length = [](const std::string& runs) {

@@ -45,7 +45,8 @@ struct SmallColumn {
   std::string name;
   int type = 5, repetition = 0, codec = 0;  ///< as the format counts them: double, required, not packed
   std::int64_t values = 0;
-  std::string pages;  ///< heads and contents
+  std::string pages;   ///< heads and contents
+  int converted = -1;  ///< what older writers say of the type's meaning
 };
 
 /// A page of version 1: its head, then its content.
@@ -70,7 +71,10 @@ inline std::string small_parquet(const std::vector<SmallColumn>& columns, std::i
   std::vector<ThriftBytes> schema{ThriftBytes().text(4, "root").integer(5, static_cast<std::int64_t>(columns.size()))};
   std::vector<ThriftBytes> chunks;
   for (const SmallColumn& column : columns) {
-    schema.push_back(ThriftBytes().integer(1, column.type).integer(3, column.repetition).text(4, column.name));
+    ThriftBytes element;
+    element.integer(1, column.type).integer(3, column.repetition).text(4, column.name);
+    if (column.converted >= 0) element.integer(6, column.converted);
+    schema.push_back(element);
     chunks.push_back(ThriftBytes().structure(3, ThriftBytes()
                                                     .integer(1, column.type)
                                                     .integer(4, column.codec)
