@@ -67,7 +67,11 @@ ColumnGuess guess_topic(const std::vector<LogColumns>& topics, const Robot& robo
     }
     const bool named = guess.format.joint_columns.contains("q") && guess.format.joint_columns.contains("tau");
     if (!named) guess = guess_columns(CsvHead{topic.names, {}, topic.names.size()}, robot);
-    if (topics.size() > 1) guess.format.columns[topic_key] = topic.topic;
+    if (topics.size() > 1) {
+      guess.format.columns[topic_key] = topic.topic;
+      guess.notes.push_back(fmt::format("one of {} logs in the file, {} to {}; a [[log]] may have the topic of another",
+                                        topics.size(), topics.front().topic, topics.back().topic));
+    }
     if (guess.missing.empty()) return guess;
     if (!out) out = guess;
   }

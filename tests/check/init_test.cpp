@@ -175,6 +175,15 @@ TEST(Init, WritesTheUnitOfTimeThatEveryLogHas) {
   EXPECT_EQ(of({with("named.csv", 1000, "t_ms")}).find("time_unit"), std::string::npos);
 }
 
+TEST(Init, SaysThatAFileHasOtherLogsToo) {
+  const auto file = std::filesystem::path(FXDYN_SOURCE_DIR) / "tests/arrays/files/lerobot.parquet";
+  const std::string project = init_project({file}, two_joints(), test::folder());
+  expect_in("topic = \"episode_3\"\n", project);
+  expect_in("q = [\"observation.state1\", \"observation.state2\"]", project);
+  expect_in("tau = [\"observation.effort1\", \"observation.effort2\"]", project);
+  expect_in("# one of 3 logs in the file, episode_3 to episode_11; a [[log]] may have the topic of another\n", project);
+}
+
 TEST(Init, LeavesOutAVelocityInAnotherUnitThanThePosition) {
   const std::string degrees = recording(2, false, 0, 180 / std::numbers::pi), rad = recording(2, true, 0);
   std::istringstream q(degrees), all(rad);
