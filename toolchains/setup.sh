@@ -11,7 +11,7 @@ packages=(
   dpkg-dev
   # host libraries
   libeigen3-dev liburdfdom-dev libtomlplusplus-dev nlohmann-json3-dev libcli11-dev libfmt-dev zlib1g-dev
-  libzstd-dev liblz4-dev libsqlite3-dev libmatio-dev libhdf5-dev libsdformat-dev
+  libzstd-dev liblz4-dev libsnappy-dev libsqlite3-dev libmatio-dev libhdf5-dev libsdformat-dev
   # the module of Python
   pybind11-dev python3-dev python3-numpy
   # pins of the node on Linux

@@ -10,6 +10,7 @@
 #include <fstream>
 
 #include "host_tools/arrays/apart.hpp"
+#include "host_tools/arrays/lerobot.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/pipes.hpp"
 
@@ -134,7 +135,15 @@ bool is_matlab(const fs::path& file) {
   return extension == ".mat" && bytes.size() == 8 && bytes[2] == 0 && bytes[3] == 0;
 }
 
+bool is_parquet(const fs::path& file) {
+  if (is_lerobot(file)) return true;
+  if (!is_plain_file(file)) return false;
+  const std::string bytes = bytes_at(file, 0);
+  return bytes.starts_with("PAR1") || bytes.starts_with("PARE");
+}
+
 ArrayList list_arrays(const fs::path& file) {
+  if (is_parquet(file)) return list_parquet(file);  // no library that could be led astray
   ArrayList out;
   read_apart(
       file,
@@ -160,6 +169,7 @@ ArrayList list_arrays(const fs::path& file) {
 }
 
 void read_arrays(const fs::path& file, const std::vector<ArrayPath>& paths, const ArrayNumbers& numbers) {
+  if (is_parquet(file)) return read_parquet(file, paths, numbers);
   std::vector<double> values;
   read_apart(
       file,

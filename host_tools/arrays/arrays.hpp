@@ -20,6 +20,8 @@ struct ArrayInfo {
   std::string type;                  ///< for people: "double", "int16", "cell"
   std::string trouble;               ///< why it can't be read as numbers; empty: it can
   std::string text;                  ///< of short texts
+  /// What the file or its data set calls the numbers of a sample, where it does: LeRobot.
+  std::vector<std::string> channels{};
   std::uint64_t size() const;
   /// As its program says it: "3000 x 6 double".
   std::string described() const;
@@ -32,9 +34,12 @@ struct ArrayList {
   std::string name_of(const ArrayPath& path) const;
 };
 
-/// Whether that is a file of MATLAB (4 by its name, 5, 7.3) or of HDF5. Look at the first bytes; read no pipe.
+/// Whether that is a file of MATLAB (4 by its name, 5, 7.3), of HDF5 or of Parquet (or the folder of a data set of
+/// LeRobot, of which one file has to be named). Look at the first bytes; read no
+/// pipe.
 bool is_matlab(const std::filesystem::path& file);
 bool is_hdf5(const std::filesystem::path& file);
+bool is_parquet(const std::filesystem::path& file);
 
 /// What a file has, in its own order.
 /// @throws InputError naming the file: it can't be read, is cut or damaged
@@ -50,11 +55,14 @@ using ArrayNumbers = std::function<void(std::size_t which, std::uint64_t at, std
 /// @throws InputError as list_arrays()
 void read_arrays(const std::filesystem::path& file, const std::vector<ArrayPath>& paths, const ArrayNumbers& numbers);
 
-/// The formats. HDF5: groups and datasets, also those of MATLAB 7.3. MATLAB 4 and 5: by libmatio.
+/// The formats. HDF5: groups and datasets, also those of MATLAB 7.3. MATLAB 4 and 5: by libmatio. Parquet: columns; of
+/// a file with several episodes (episode_index of LeRobot), those of each as "episode_3", its rows alone.
 ArrayList list_hdf5(const std::filesystem::path& file);
 void read_hdf5(const std::filesystem::path& file, const std::vector<ArrayPath>& paths, const ArrayNumbers& numbers);
 ArrayList list_mat5(const std::filesystem::path& file);
 void read_mat5(const std::filesystem::path& file, const std::vector<ArrayPath>& paths, const ArrayNumbers& numbers);
+ArrayList list_parquet(const std::filesystem::path& file);
+void read_parquet(const std::filesystem::path& file, const std::vector<ArrayPath>& paths, const ArrayNumbers& numbers);
 
 /// What to say of arrays that hold something else than real numbers.
 std::string cell_trouble(const std::string& name);

@@ -12,18 +12,20 @@
 
 #include "host_tools/signals/foreign_format.hpp"
 #include "host_tools/signals/text_file.hpp"
+#include "host_tools/signals/time_unit.hpp"
 #include "host_tools/support/error.hpp"
 
 namespace fxdyn {
 namespace {
 
-std::vector<std::string> split(std::string_view line) {
+std::vector<std::string> split(std::string_view line, char separator) {
   std::vector<std::string> fields;
+  if (separator != ',') line = trim(line);
   for (;;) {
-    const std::size_t comma = line.find(',');
-    fields.emplace_back(trim(line.substr(0, comma)));
-    if (comma == std::string_view::npos) return fields;
-    line.remove_prefix(comma + 1);
+    const std::size_t end = line.find(separator);
+    fields.emplace_back(trim(line.substr(0, end)));
+    if (end == std::string_view::npos) return fields;
+    line.remove_prefix(end + 1);
   }
 }
 
@@ -70,6 +72,8 @@ std::optional<Kind> kind_of(const std::vector<std::string>& words) {
   if (has({"q", "pos", "qpos", "position", "positions", "angle", "angles"})) return position;
   if (has({"t", "time", "timestamp", "stamp", "timestamps", "stamps", "tout", "sec", "secs", "seconds", "clock"}))
     return time;
+  // LeRobot's observation.state, whose numbers are positions where it does not call them anything else.
+  if (has({"state"}) && has({"observation"})) return position;
   // A voltage has this letter, too, but more words beside it.
   if (words.size() == 2 && words.front() == "v" && std::isdigit(static_cast<unsigned char>(words.back()[0])) != 0)
     return velocity;
@@ -87,7 +91,7 @@ bool is_processed(const std::vector<std::string>& words) {
 bool is_command(const std::vector<std::string>& words) {
   return std::any_of(words.begin(), words.end(), [](const std::string& word) {
     return is_one_of(word, {"target", "desired", "cmd", "command", "commanded", "ref", "reference", "goal", "error",
-                            "des", "ext", "external", "residual"});
+                            "des", "ext", "external", "residual", "action", "actions"});
   });
 }
 
@@ -204,6 +208,25 @@ ColumnGuess by_names(const CsvHead& head, const Robot& robot) {
   return out;
 }
 
+/// The unit that the steps of a CSV's stamps show, as long as no name says one: 0 where it may be seconds.
+double time_unit_of(const CsvHead& head, const std::string& name) {
+  constexpr std::size_t most = 2000;
+  const auto named = std::find(head.names.begin(), head.names.end(), name);
+  const std::size_t column = head.names.empty() ? 0 : static_cast<std::size_t>(named - head.names.begin());
+  if (column >= head.columns || unit_in_name(name)) return 0;
+  std::vector<double> stamps;
+  for (const std::vector<double>& row : head.rows) {
+    if (stamps.size() == most || !std::isfinite(row[column])) break;
+    stamps.push_back(row[column]);
+  }
+  try {
+    const TimeUnit unit = unit_of_stamps(stamps, name);
+    return unit.per_second > 1 ? 1 / unit.per_second : 0;
+  } catch (const InputError&) {
+    return 0;  // said where the log is read
+  }
+}
+
 /// Whether column b is the time derivative of column a: over 50 ms, which a coarse encoder's steps do not hide, and
 /// over the whole file, which may begin at rest.
 bool is_derivative(const CsvHead& head, std::size_t a, std::size_t b) {
@@ -266,9 +289,10 @@ CsvHead read_head(const std::filesystem::path& file, std::size_t rows) {
   if (const std::string other = foreign_format(mapped.text()); !other.empty())
     throw InputError(fmt::format("{}: {}", file.string(), other));
   LineReader lines(mapped.text());
+  const char separator = separator_of(lines);
   std::string_view line;
   while (head.rows.size() < rows && lines.next(line)) {
-    const std::vector<std::string> fields = split(line);
+    const std::vector<std::string> fields = split(line, separator);
     if (head.columns == 0) {
       head.columns = fields.size();
       if (std::isnan(number_of(fields.front()))) {
@@ -288,7 +312,10 @@ CsvHead read_head(const std::filesystem::path& file, std::size_t rows) {
 }
 
 ColumnGuess guess_columns(const CsvHead& head, const Robot& robot) {
-  return head.names.empty() ? by_numbers(head, robot) : by_names(head, robot);
+  ColumnGuess out = head.names.empty() ? by_numbers(head, robot) : by_names(head, robot);
+  const auto time = out.format.columns.find("t");
+  if (time != out.format.columns.end() && !head.rows.empty()) out.format.time_unit_s = time_unit_of(head, time->second);
+  return out;
 }
 
 }  // namespace fxdyn

@@ -20,7 +20,8 @@ CsvHead read_head(const std::filesystem::path& file, std::size_t rows = 100'000)
 
 /// What the columns of a CSV hold, by their names, or by their number and numbers where they have none.
 struct ColumnGuess {
-  LogFormat format;                  ///< joint_columns of q and tau, of dq and ddq where they are there; columns["t"]
+  LogFormat format;                  ///< joint_columns of q and tau, of dq and ddq where they are there; columns["t"];
+                                     ///< time_unit_s where the stamps' steps show another one than seconds
   bool torque_is_current = false;    ///< the torque's columns are called currents
   std::vector<std::string> notes;    ///< what a reader should check
   std::vector<std::string> missing;  ///< what was not found: "t", "q of joint_3"

@@ -14,6 +14,7 @@
 #include "host_tools/check/course.hpp"
 #include "host_tools/project/log_entries.hpp"
 #include "host_tools/signals/log_reader.hpp"
+#include "host_tools/signals/time_unit.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/time_text.hpp"
 
@@ -66,7 +67,11 @@ ColumnGuess guess_topic(const std::vector<LogColumns>& topics, const Robot& robo
     }
     const bool named = guess.format.joint_columns.contains("q") && guess.format.joint_columns.contains("tau");
     if (!named) guess = guess_columns(CsvHead{topic.names, {}, topic.names.size()}, robot);
-    if (topics.size() > 1) guess.format.columns[topic_key] = topic.topic;
+    if (topics.size() > 1) {
+      guess.format.columns[topic_key] = topic.topic;
+      guess.notes.push_back(fmt::format("one of {} logs in the file, {} to {}; a [[log]] may have the topic of another",
+                                        topics.size(), topics.front().topic, topics.back().topic));
+    }
     if (guess.missing.empty()) return guess;
     if (!out) out = guess;
   }
@@ -108,7 +113,10 @@ ColumnGuess columns_in(const fs::path& file, const Robot& robot, const std::stri
     const auto is_named = [&](const std::string& signal) {
       return signal == "t" ? named.columns.contains(signal) : named.joint_columns.contains(signal);
     };
-    if (is_named("t")) guess.format.columns["t"] = named.columns.at("t");
+    if (is_named("t")) {
+      guess.format.columns["t"] = named.columns.at("t");
+      guess.format.time_unit_s = 0;  // was that of another column
+    }
     if (is_named("tau")) guess.torque_is_current = false;
     for (const auto& [signal, names] : named.joint_columns) guess.format.joint_columns[signal] = names;
     // "t in one column (..)"
@@ -121,6 +129,13 @@ ColumnGuess columns_in(const fs::path& file, const Robot& robot, const std::stri
                     file.string(), fmt::join(guess.missing, ", ")));
   }
   return guess;
+}
+
+/// Of one log; what stands for all of them has to be that of each.
+double time_unit_in(const fs::path& file, const Robot& robot) {
+  constexpr std::size_t rows = 2000;
+  if (reader_of(file).columns != nullptr) return 0;
+  return guess_columns(read_head(file, rows), robot).format.time_unit_s;
 }
 
 /// Roles by trajectories: repetitions of one motion share theirs. One motion: empty.
@@ -145,10 +160,13 @@ void write_signals(const ColumnGuess& guess, const LogFormat& format, const Robo
   const bool by_names = !format.columns.at("t").starts_with('#');
   const auto topic = format.columns.find(topic_key);
   if (is_default(format, robot) && !guess.torque_is_current && format.position_gain.empty() &&
-      topic == format.columns.end())
+      topic == format.columns.end() && format.time_unit_s == 0)
     return;
   out += "\n[signals]\n";
   if (topic != format.columns.end()) out += fmt::format("topic = \"{}\"\n", topic->second);
+  if (format.time_unit_s > 0)
+    out += fmt::format("time_unit = \"{}\"   # by the steps of the time stamps\n",
+                       unit_of_seconds(format.time_unit_s).name);
   if (!is_default(format, robot)) {
     out += fmt::format("# which column of the file holds what, joint by joint{}\n",
                        by_names ? "" : "; numbers count from 0");
@@ -213,7 +231,10 @@ std::string init_project(const std::vector<fs::path>& logs, const fs::path& urdf
   for (const Joint& joint : robot.joints) turns.push_back(joint.type == JointType::revolute);
   const ColumnGuess guess = columns_in(logs.front(), robot, columns);
   LogFormat format = guess.format;
+  for (const fs::path& file : logs)
+    if (format.time_unit_s > 0 && time_unit_in(file, robot) != format.time_unit_s) format.time_unit_s = 0;
   std::vector<Recorded> recorded;
+  recorded.reserve(logs.size());
   const LogFactOptions options;
   for (const fs::path& file : logs)
     recorded.push_back(recorded_of(file, read_in_its_unit(file, robot.size(), turns, format), options));

@@ -23,6 +23,11 @@ LogFormat with_joint_names(const fs::path& file, const LogFormat& format, const 
 }
 
 bool share_time(const LogEntry& a, const LogEntry& b) {
+  const auto topic = [](const LogEntry& entry) {
+    const auto found = entry.format.columns.find(topic_key);
+    return found == entry.format.columns.end() ? "" : found->second;
+  };
+  if (topic(a) != topic(b)) return false;
   constexpr double infinity = std::numeric_limits<double>::infinity();
   return std::max(a.from_s.value_or(-infinity), b.from_s.value_or(-infinity)) <
          std::min(a.to_s.value_or(infinity), b.to_s.value_or(infinity));

@@ -19,7 +19,8 @@ LogFormat columns_of(const std::string& text, const Robot& robot);
 /// signals/log_reader.hpp.
 LogFormat with_joint_names(const std::filesystem::path& file, const LogFormat& format, const Robot& robot);
 
-/// Whether the windows of two logs have a moment in common.
+/// Whether the windows of two logs have a moment in common. Two topics of a file are two logs: whether one of them is
+/// what is read where none is named, is seen by its motion.
 bool share_time(const LogEntry& a, const LogEntry& b);
 
 /// Whether two files hold the same bytes. Files that are missing are complained of where they are read.

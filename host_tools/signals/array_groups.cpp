@@ -163,6 +163,13 @@ class Grouping {
     return out;
   }
 
+  /// Empty: it has none of its own.
+  static std::string channel_name(const ArrayInfo& array, std::size_t channel) {
+    const auto& names = array.channels;
+    if (channel >= names.size() || std::count(names.begin(), names.end(), names[channel]) > 1) return "";
+    return names[channel];
+  }
+
   void add(const ArrayPath& path, std::size_t k, ArrayGroup& out) const {
     const ArrayInfo& array = list_.arrays[k];
     const std::string name = name_in(path, array.path);
@@ -180,8 +187,11 @@ class Grouping {
       out.columns.push_back({name, k, 0});
       return;
     }
-    for (std::size_t channel = 0; channel < order->channels; ++channel)
-      out.columns.push_back({fmt::format("{}{}", name, channel + 1), k, channel});
+    for (std::size_t channel = 0; channel < order->channels; ++channel) {
+      const std::string own = channel_name(array, channel);
+      out.columns.push_back({fmt::format("{}{}", name, channel + 1), k, channel, !own.empty()});
+      if (!own.empty()) out.columns.push_back({fmt::format("{}.{}", name, own), k, channel});
+    }
   }
 
   const ArrayList& list_;

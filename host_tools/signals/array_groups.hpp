@@ -13,6 +13,7 @@ namespace fxdyn {
 struct ArrayColumn {
   std::string name;
   std::size_t array, channel;
+  bool has_better_name = false;  ///< the next column is the same one, as the file itself calls it
 };
 
 /// Arrays with one common time: those of a file, of a struct or of a group.
@@ -41,7 +42,8 @@ bool is_time_name(std::string name);
 /// The logs of a file, by content. A group is what stands around a vector of stamps (t, time, timestamp, tout, or what
 /// `time_name` says); a demonstration of robomimic (demo_0, demo_1, ..) is one even without, if the file has their
 /// rate. Columns are called as in a CSV: "q1".."q6" of q with 6 channels, "tau" of a vector, "obs.q1" in a group
-/// within. Of Simulink's structure with time they have the signal's label, or the variable's name.
+/// within. Where a file names the channels of an array, a second column has that name: "obs.q.elbow". Of Simulink's
+/// structure with time they have the signal's label, or the variable's name.
 std::vector<ArrayGroup> groups_of(const ArrayList& list, const std::string& time_name);
 
 }  // namespace fxdyn

@@ -3,13 +3,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 
 #include "host_tools/arrays/arrays.hpp"
 #include "host_tools/signals/array_groups.hpp"
 #include "host_tools/signals/column_cut.hpp"
+#include "host_tools/signals/foreign_format.hpp"
 #include "host_tools/signals/log_reader.hpp"
 #include "host_tools/signals/time_unit.hpp"
 #include "host_tools/support/error.hpp"
+#include "host_tools/support/pipes.hpp"
 
 namespace fxdyn {
 namespace {
@@ -30,6 +33,26 @@ std::string arrays_of(const ArrayList& list) {
   for (const ArrayInfo& array : list.arrays)
     out.push_back(fmt::format("{} ({})", list.name_of(array.path), array.described()));
   return out.empty() ? "nothing" : listed(out);
+}
+
+/// A text under such a name, as what Git LFS leaves where the file itself was not fetched.
+std::string words_of_text(const std::filesystem::path& file) {
+  if (is_pipe(file)) return "";
+  std::string head(1024, '\0');
+  std::ifstream in(file, std::ios::binary);
+  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(in.gcount()));
+  if (head.empty() || head.find('\0') != std::string::npos) return "";
+  const std::string words = foreign_format(head);
+  return words.empty() && file.extension() == ".parquet" ? "is no Parquet, but text: copy the file again" : words;
+}
+
+/// @throws InputError see list_arrays()
+ArrayList list_of(const std::filesystem::path& file) {
+  const bool is_known = is_matlab(file) || is_hdf5(file) || is_parquet(file);
+  if (const std::string words = is_known ? "" : words_of_text(file); !words.empty())
+    throw InputError(fmt::format("{}: {}", file.string(), words));
+  return list_arrays(file);
 }
 
 std::string column_of(const LogFormat& format, const char* signal) {
@@ -81,7 +104,7 @@ void explain(const ArrayGroup& group, const LogRequest& request, const std::stri
     const Names names = by_joint ? given->second : Names{column_of(request.columns, signal.c_str())};
     for (const auto& [array, why] : group.unusable)
       for (const std::string& name : names)
-        if (!name.empty() && (array == name || array == without_number(name)))
+        if (!name.empty() && (array == name || array == without_number(name) || without_number(array) == name))
           throw InputError(fmt::format("{}: {} {}", where, array, why));
   }
 }
@@ -140,6 +163,8 @@ Numbers numbers_of(const LogRequest& request, const ArrayList& list, const Choic
   std::vector<std::vector<std::vector<double>*>> targets;  // array that is read, channel
   std::vector<ArrayOrder> orders;
   std::vector<std::size_t> place(list.arrays.size(), SIZE_MAX);
+  std::vector<std::pair<std::vector<double>*, std::vector<double>*>>
+      copies;  // a channel that is asked for by both its names
   const auto target_of = [&](std::size_t array, std::size_t channel) -> std::vector<double>*& {
     if (place[array] == SIZE_MAX) {
       place[array] = paths.size();
@@ -153,7 +178,10 @@ Numbers numbers_of(const LogRequest& request, const ArrayList& list, const Choic
     const ArrayColumn& column = group.columns[field];
     const int target = choice.layout.target[field];
     if (target < 0 || column.array == list.arrays.size()) continue;
-    target_of(column.array, column.channel) = &out.columns[static_cast<std::size_t>(target)];
+    std::vector<double>*& into = target_of(column.array, column.channel);
+    std::vector<double>* const own = &out.columns[static_cast<std::size_t>(target)];
+    if (into == nullptr) into = own;
+    if (into != own) copies.emplace_back(into, own);
   }
   for (std::size_t k = 0; k < group.other_times.size(); ++k) target_of(group.other_times[k], 0) = &out.other_times[k];
   constexpr std::uint64_t most_reserved = 1 << 22;  // a damaged file may claim any size
@@ -163,12 +191,17 @@ Numbers numbers_of(const LogRequest& request, const ArrayList& list, const Choic
   read_arrays(request.file, paths, [&](std::size_t which, std::uint64_t at, std::span<const double> some) {
     if (which >= paths.size()) return;
     const ArrayOrder& order = orders[which];
+    if (order.channels == 1) {  // no division for each number
+      if (std::vector<double>* const into = targets[which][0]) into->insert(into->end(), some.begin(), some.end());
+      return;
+    }
     for (const double number : some) {
       const std::uint64_t channel = order.sample_by_sample ? at % order.channels : at / group.samples;
       if (channel < order.channels && targets[which][channel] != nullptr) targets[which][channel]->push_back(number);
       ++at;
     }
   });
+  for (const auto& [from, to] : copies) *to = *from;
   return out;
 }
 
@@ -214,7 +247,7 @@ void check_complete(const Numbers& numbers, const Choice& choice) {
 }  // namespace
 
 RecordedLog read_array_log(const LogRequest& request) {
-  const ArrayList list = list_arrays(request.file);
+  const ArrayList list = list_of(request.file);
   const std::vector<ArrayGroup> groups = groups_in(list, column_of(request.columns, "t"), request.file.string());
   const Choice choice = choose(groups, request);
   const ArrayGroup& group = *choice.group;
@@ -236,10 +269,14 @@ RecordedLog read_array_log(const LogRequest& request) {
 }
 
 std::vector<LogColumns> array_columns(const std::filesystem::path& file) {
-  const std::vector<ArrayGroup> groups = groups_in(list_arrays(file), "t", file.string());
+  const std::vector<ArrayGroup> groups = groups_in(list_of(file), "t", file.string());
   std::vector<LogColumns> out;
   out.reserve(groups.size());
-  for (const ArrayGroup& group : groups) out.push_back({group.topic, names_of(group)});
+  for (const ArrayGroup& group : groups) {
+    out.push_back({group.topic, {}});
+    for (const ArrayColumn& column : group.columns)
+      if (!column.has_better_name) out.back().names.push_back(column.name);
+  }
   return out;
 }
 

@@ -14,13 +14,14 @@
 namespace fxdyn {
 namespace {
 
-std::vector<std::string> split(std::string_view line) {
+std::vector<std::string> split(std::string_view line, char separator) {
   std::vector<std::string> fields;
+  if (separator != ',') line = trim(line);
   while (true) {
-    const std::size_t comma = line.find(',');
-    fields.emplace_back(trim(line.substr(0, comma)));
-    if (comma == std::string_view::npos) return fields;
-    line.remove_prefix(comma + 1);
+    const std::size_t end = line.find(separator);
+    fields.emplace_back(trim(line.substr(0, end)));
+    if (end == std::string_view::npos) return fields;
+    line.remove_prefix(end + 1);
   }
 }
 
@@ -31,8 +32,8 @@ bool starts_with_number(std::string_view text) {
 
 class Rows {
  public:
-  Rows(const std::string& file, const ColumnLayout& layout)
-      : file_(file), layout_(layout), values_(layout.names.size()) {}
+  Rows(const std::string& file, const ColumnLayout& layout, char separator)
+      : file_(file), layout_(layout), separator_(separator), values_(layout.names.size()) {}
 
   /// Stamps as they stand, of the first rows.
   std::vector<double> first_stamps(LineReader lines) {
@@ -81,12 +82,13 @@ class Rows {
   }
 
   void parse(std::string_view line, int number) {
+    if (separator_ != ',') line = trim(line);
     const char* at = line.data();
     const char* const end = at + line.size();
     for (std::size_t field = 0; field < layout_.fields; ++field) {
       const int target = layout_.target[field];
       if (target >= 0) values_[static_cast<std::size_t>(target)] = value(at, end, number, target);
-      at = std::find(at, end, ',');
+      at = std::find(at, end, separator_);
       const bool last = field + 1 == layout_.fields;
       if (last != (at == end)) wrong_count(line, number);
       if (!last) ++at;
@@ -94,19 +96,19 @@ class Rows {
   }
 
   [[noreturn]] void wrong_count(std::string_view line, int number) const {
-    fail(number, fmt::format("{} fields where the header has {}", std::count(line.begin(), line.end(), ',') + 1,
+    fail(number, fmt::format("{} fields where the header has {}", std::count(line.begin(), line.end(), separator_) + 1,
                              layout_.fields));
   }
 
   /// The number at the start of a field.
   double value(const char* at, const char* end, int number, int target) const {
     const char* start = at;
-    while (start < end && (*start == ' ' || *start == '\t' || *start == '+')) ++start;
+    while (start < end && *start != separator_ && (*start == ' ' || *start == '\t' || *start == '+')) ++start;
     double result = 0;
     auto [stop, error] = std::from_chars(start, end, result);
-    while (stop < end && (*stop == ' ' || *stop == '\t' || *stop == '\r')) ++stop;
-    if (error != std::errc() || (stop < end && *stop != ',') || !std::isfinite(result)) {
-      const std::string_view text = trim({at, static_cast<std::size_t>(std::find(at, end, ',') - at)});
+    while (stop < end && *stop != separator_ && (*stop == ' ' || *stop == '\t' || *stop == '\r')) ++stop;
+    if (error != std::errc() || (stop < end && *stop != separator_) || !std::isfinite(result)) {
+      const std::string_view text = trim({at, static_cast<std::size_t>(std::find(at, end, separator_) - at)});
       fail(number, fmt::format("column '{}': '{}' is not a number; remove the row or repair it",
                                layout_.names[static_cast<std::size_t>(target)], text.substr(0, 40)));
     }
@@ -115,12 +117,13 @@ class Rows {
 
   std::string file_;
   const ColumnLayout& layout_;
+  char separator_;
   std::vector<double> values_;
 };
 
 /// Of a file that starts with a row of numbers the columns are called #0, #1, ...
-ColumnNames header(const std::string& file, int line, std::string_view text) {
-  std::vector<std::string> names = split(text);
+ColumnNames header(const std::string& file, int line, std::string_view text, char separator) {
+  std::vector<std::string> names = split(text, separator);
   const bool has_names = !starts_with_number(names.front());
   for (std::size_t field = 0; field < names.size() && !has_names; ++field) names[field] = fmt::format("#{}", field);
   return ColumnNames(fmt::format("{}:{}", file, line), std::move(names), has_names);
@@ -128,18 +131,18 @@ ColumnNames header(const std::string& file, int line, std::string_view text) {
 
 /// The line that names the columns: the first one, or the comment in front of it where that is a row of numbers (as
 /// numpy and rostopic write it).
-ColumnNames header_of(LineReader& lines, const std::string& where) {
+ColumnNames header_of(LineReader& lines, const std::string& where, char separator) {
   LineReader ahead = lines;
   std::string_view first;
   if (!ahead.next(first))
     throw InputError(where + ":1: empty file; the first line must name the columns (t,q1,...,tau1,...)");
   const std::string_view comment = ahead.comment();
   const bool named_before =
-      starts_with_number(trim(first)) && comment.find(',') != std::string_view::npos &&
-      std::count(comment.begin(), comment.end(), ',') == std::count(first.begin(), first.end(), ',');
-  if (named_before) return header(where, ahead.number() - 1, comment);
+      starts_with_number(trim(first)) && comment.find(separator) != std::string_view::npos &&
+      std::count(comment.begin(), comment.end(), separator) == std::count(first.begin(), first.end(), separator);
+  if (named_before) return header(where, ahead.number() - 1, comment, separator);
   lines = ahead;
-  return header(where, lines.number(), first);
+  return header(where, lines.number(), first, separator);
 }
 
 }  // namespace
@@ -150,10 +153,11 @@ RecordedLog read_csv(const LogRequest& request) {
   if (const std::string other = foreign_format(mapped.text()); !other.empty())
     throw InputError(fmt::format("{}: {}", where, other));
   LineReader lines(mapped.text());
-  ColumnNames header = header_of(lines, where);
+  const char separator = separator_of(lines);
+  ColumnNames header = header_of(lines, where, separator);
   const ColumnLayout layout = header.layout(request.joints, request.columns, request.torque_required);
   if (!header.has_names()) lines = LineReader(mapped.text());
-  Rows rows(where, layout);
+  Rows rows(where, layout, separator);
   const bool time_is_known = layout.unit.has_value();
   const TimeUnit unit = time_is_known ? *layout.unit : unit_of_stamps(rows.first_stamps(lines), where);
   ColumnTable table = rows.read(mapped, lines, request.from, request.to, unit);

@@ -16,9 +16,7 @@ struct Format {
 constexpr std::array formats{
     Format{"PK\x03\x04"sv, "is a spreadsheet (xlsx, ods) or another zip archive: save it as CSV, or unzip it"},
     Format{"\xD0\xCF\x11\xE0"sv, "is an old spreadsheet (xls): save it as CSV"},
-    Format{"PAR1"sv,
-           "is Parquet: write it as CSV, as in python3 -c \"import pandas; "
-           "pandas.read_parquet('IN').to_csv('OUT.csv', index=False)\""},
+    Format{"PAR1"sv, "is Parquet: name its file unpacked, it can't come through a pipe"},
     Format{"ARROW1"sv,
            "is Feather (Arrow): write it as CSV, as in python3 -c \"import pandas; "
            "pandas.read_feather('IN').to_csv('OUT.csv', index=False)\""},

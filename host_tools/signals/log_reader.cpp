@@ -15,6 +15,7 @@ constexpr std::array readers{
     LogReader{"rosbag2", ".db3", read_bag_log, is_bag, bag_columns, true},
     LogReader{"matlab", ".mat", read_array_log, is_matlab, array_columns},
     LogReader{"hdf5", ".h5", read_array_log, is_hdf5, array_columns},
+    LogReader{"parquet", ".parquet", read_array_log, is_parquet, array_columns},
     LogReader{"csv", ".csv", read_csv},
 };
 

@@ -77,8 +77,8 @@ RecordedLog read_csv(const LogRequest& request);
 /// "JOINT.command." with these. Two ends of a recording that carry no numbers are left out, and told.
 RecordedLog read_bag_log(const LogRequest& request);
 std::vector<LogColumns> bag_columns(const std::filesystem::path& file);
-/// Arrays of MATLAB (4, 5, 7.3) or HDF5 with a vector of stamps, see array_groups.hpp: one row or one column of each a
-/// sample. Samples at the end that were never filled (NaN) are left out, and told.
+/// Arrays of MATLAB (4, 5, 7.3), HDF5 or Parquet with a vector of stamps, see array_groups.hpp: one row or one column
+/// of each a sample. Samples at the end that were never filled (NaN) are left out, and told.
 RecordedLog read_array_log(const LogRequest& request);
 std::vector<LogColumns> array_columns(const std::filesystem::path& file);
 

@@ -129,4 +129,18 @@ bool LineReader::next(std::string_view& line) {
   return false;
 }
 
+char separator_of(LineReader lines) {
+  std::string_view first, second;
+  if (!lines.next(first) || !lines.next(second)) return ',';
+  for (const std::string_view line : {first, second})
+    if (line.find_first_of(",;") != std::string_view::npos) return ',';
+  first = trim(first);
+  second = trim(second);
+  for (const char mark : {'\t', ' '}) {
+    const auto fields = std::count(first.begin(), first.end(), mark);
+    if (fields > 0 && fields == std::count(second.begin(), second.end(), mark)) return mark;
+  }
+  return ',';
+}
+
 }  // namespace fxdyn

@@ -47,4 +47,8 @@ class LineReader {
   int number_ = 0;
 };
 
+/// What is between the fields of a table: a comma; or a tab or a blank, where the first two lines have no comma and as
+/// many of those each (record.py of Universal Robots, numpy.savetxt).
+char separator_of(LineReader lines);
+
 }  // namespace fxdyn

@@ -26,6 +26,8 @@ bool is_read(const std::filesystem::path& file) {
     for (const auto& group : array_columns(file)) {
       LogFormat format{.columns = {{topic_key, group.topic}}};
       if (group.topic.starts_with("data/")) format.columns.insert({{"q", "obs.q"}, {"tau", "obs.tau"}});
+      if (group.topic.starts_with("episode_"))
+        format.columns.insert({{"q", "observation.state"}, {"tau", "observation.effort"}});
       read_log(file, 2, {true, true}, format, {}, {});
     }
     return true;
@@ -66,7 +68,9 @@ TEST_P(DamagedArrays, FlippedBytesAreReadOrRefused) {
 }
 
 INSTANTIATE_TEST_SUITE_P(, DamagedArrays,
-                         testing::Values("plain.mat", "rows.mat", "scope.mat", "packed.hdf5", "robomimic.hdf5"));
+                         testing::Values("plain.mat", "rows.mat", "scope.mat", "packed.hdf5", "robomimic.hdf5",
+                                         "plain.parquet", "snappy.parquet", "gzip.parquet", "zstd.parquet",
+                                         "lz4.parquet", "types.parquet", "lerobot.parquet", "struct.parquet"));
 
 TEST(DamagedArray, APackedVariableMustUnpackToItsEnd) {
   std::string bytes = bytes_of("rows.mat");
@@ -76,7 +80,7 @@ TEST(DamagedArray, APackedVariableMustUnpackToItsEnd) {
 }
 
 TEST(DamagedArray, AnEmptyFileIsNone) {
-  for (const char* name : {"empty.mat", "empty.h5"}) EXPECT_FALSE(is_read(test::write(name, "")));
+  for (const char* name : {"empty.mat", "empty.h5", "empty.parquet"}) EXPECT_FALSE(is_read(test::write(name, "")));
   EXPECT_FALSE(is_read(test::write("text.mat", "t,q1,tau1\n0,1,2\n")));
 }
 

@@ -31,6 +31,11 @@ std::filesystem::path two_joints() {
   return write("two.urdf", text + "</robot>");
 }
 
+/// The columns of a file that names them, without its rows.
+ColumnGuess guess_of(const Names& names, const Robot& robot) {
+  return guess_columns(CsvHead{names, {}, names.size()}, robot);
+}
+
 CsvHead head_of(const std::string& line) { return read_head(write("head.csv", line + "\n0,1,2,3,4\n1,2,3,4,5\n")); }
 
 /// Rows of t, q, dq where asked for, tau of two joints: at rest for `rest_s` at both ends. q in steps of an encoder.
@@ -54,6 +59,43 @@ std::string init(const std::string& name, const std::string& text) {
 }
 void expect_in(const std::string& part, const std::string& text) {
   EXPECT_NE(text.find(part), std::string::npos) << part << "\nis not in\n" << text;
+}
+
+TEST(ColumnGuess, ADataSetsStateIsPositionsAndItsActionNone) {
+  const Robot robot = read_urdf(two_joints());
+  const ColumnGuess numbered = guess_of({"timestamp", "action1", "action2", "observation.state1", "observation.state2",
+                                         "observation.effort1", "observation.effort2", "observation.state3"},
+                                        robot);
+  EXPECT_EQ(numbered.format.joint_columns.at("q"), (Names{"observation.state1", "observation.state2"}));
+  EXPECT_EQ(numbered.format.joint_columns.at("tau"), (Names{"observation.effort1", "observation.effort2"}));
+  const ColumnGuess named =
+      guess_of({"timestamp", "action.elbow.pos", "action.shoulder.pos", "observation.state.elbow.pos",
+                "observation.state.elbow.vel", "observation.state.elbow.torque", "observation.state.shoulder.pos",
+                "observation.state.shoulder.vel", "observation.state.shoulder.torque"},
+               robot);
+  EXPECT_EQ(named.format.joint_columns.at("q"),
+            (Names{"observation.state.shoulder.pos", "observation.state.elbow.pos"}));
+  EXPECT_EQ(named.format.joint_columns.at("dq"),
+            (Names{"observation.state.shoulder.vel", "observation.state.elbow.vel"}));
+  EXPECT_EQ(named.format.joint_columns.at("tau"),
+            (Names{"observation.state.shoulder.torque", "observation.state.elbow.torque"}));
+  // Of the tool, and no joints.
+  const ColumnGuess tool = guess_of({"timestamp", "observation.state.x", "observation.state.y", "tau1", "tau2"}, robot);
+  EXPECT_EQ(tool.missing, Names{"q"});
+}
+
+TEST(ColumnGuess, ARecordOfUrRtdeHasCurrentsAndNoTorque) {
+  const Robot robot = read_urdf(two_joints());
+  const Names names{"timestamp",        "target_q_0",        "target_q_1",       "actual_q_0",
+                    "actual_q_1",       "actual_qd_0",       "actual_qd_1",      "target_current_0",
+                    "target_current_1", "target_moment_0",   "target_moment_1",  "actual_current_0",
+                    "actual_current_1", "actual_TCP_pose_0", "actual_TCP_pose_1"};
+  const ColumnGuess guess = guess_of(names, robot);
+  EXPECT_EQ(guess.format.columns.at("t"), "timestamp");
+  EXPECT_EQ(guess.format.joint_columns.at("q"), (Names{"actual_q_0", "actual_q_1"}));
+  EXPECT_EQ(guess.format.joint_columns.at("dq"), (Names{"actual_qd_0", "actual_qd_1"}));
+  EXPECT_EQ(guess.format.joint_columns.at("tau"), (Names{"actual_current_0", "actual_current_1"}));
+  EXPECT_TRUE(guess.torque_is_current);
 }
 
 TEST(ColumnGuess, TakesNamesOfJointsAndNumbersFromZeroOrOne) {
@@ -111,6 +153,35 @@ TEST(Init, WritesColumnsByNumberAndWindowsWithoutStandstill) {
 TEST(Init, WritesThatDegreesBecomeRadians) {
   const std::string project = init("degrees.csv", recording(2, true, 0, 180 / std::numbers::pi));
   expect_in("position_gain = [0.01745329252, 0.01745329252]", project);
+}
+
+TEST(Init, WritesTheUnitOfTimeThatEveryLogHas) {
+  const auto with = [](const std::string& name, double unit, const std::string& column = "time") {
+    std::string text = column + " q_0 q_1 tau_0 tau_1\n";
+    for (int k = 0; k < 3000; ++k) {
+      const double t = 0.002 * k;
+      text += fmt::format("{:.6g} {:.5f} {:.5f} {:.4f} {:.4f}\n", t * unit, std::sin(2 * t), std::sin(3 * t),
+                          std::cos(t), std::cos(5 * t));
+    }
+    return write(name, text);
+  };
+  const auto of = [](const std::vector<std::filesystem::path>& logs) {
+    return init_project(logs, two_joints(), test::folder());
+  };
+  expect_in("time_unit = \"ms\"   # by the steps of the time stamps\n", of({with("ms.csv", 1000)}));
+  expect_in("role = \"test\"", of({with("ms.csv", 1000)}));
+  EXPECT_EQ(of({with("s.csv", 1)}).find("time_unit"), std::string::npos);
+  EXPECT_EQ(of({with("ms.csv", 1000), with("s.csv", 1)}).find("time_unit"), std::string::npos);
+  EXPECT_EQ(of({with("named.csv", 1000, "t_ms")}).find("time_unit"), std::string::npos);
+}
+
+TEST(Init, SaysThatAFileHasOtherLogsToo) {
+  const auto file = std::filesystem::path(FXDYN_SOURCE_DIR) / "tests/arrays/files/lerobot.parquet";
+  const std::string project = init_project({file}, two_joints(), test::folder());
+  expect_in("topic = \"episode_3\"\n", project);
+  expect_in("q = [\"observation.state1\", \"observation.state2\"]", project);
+  expect_in("tau = [\"observation.effort1\", \"observation.effort2\"]", project);
+  expect_in("# one of 3 logs in the file, episode_3 to episode_11; a [[log]] may have the topic of another\n", project);
 }
 
 TEST(Init, LeavesOutAVelocityInAnotherUnitThanThePosition) {

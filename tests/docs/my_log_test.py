@@ -2,6 +2,7 @@
 """my_log_test.py FXDYN: makes a log of each kind of docs/guide/my-log.md out of one simulated robot, and runs the commands of its
 section in a folder of their own. They have to end well, `check` must not find anything wrong, and what it has read of each joint has to be
 the robot's range and torque: then columns, units and signs came through."""
+import json
 import math
 import pathlib
 import re
@@ -13,6 +14,7 @@ import tempfile
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / 'tests/support'))
 import matlab_files
+import parquet_files
 import ros2_bags
 PAGE = ROOT / 'docs/guide/my-log.md'
 DEMO = ROOT / 'host_tools/demo'
@@ -105,6 +107,27 @@ def matlab(folder, rows):
         matrix('qd', list(zip(*velocities(rows)))), matrix('torque', [row[2] for row in rows]), matrix('rate', [[250.0]])))
 
 
+def lerobot(folder, rows):
+    """Version 3: two episodes in one file, of floats; the first is the whole motion. Names are beside it."""
+    episodes = [rows, rows[:len(rows) // 2]]
+    of = lambda value: [value(e, row, k) for e, some in enumerate(episodes) for k, row in enumerate(some)]
+    columns = {
+        'observation.state': (parquet_files.FLOAT, of(lambda e, row, k: row[1])),
+        'observation.effort': (parquet_files.FLOAT, of(lambda e, row, k: row[2])),
+        'action': (parquet_files.FLOAT, of(lambda e, row, k: [x + 0.1 for x in row[1]])),
+        'timestamp': (parquet_files.FLOAT, of(lambda e, row, k: row[0])),
+        'frame_index': (parquet_files.INT64, of(lambda e, row, k: k)),
+        'episode_index': (parquet_files.INT64, of(lambda e, row, k: e))}
+    chunk = folder / 'my_data/data/chunk-000'
+    chunk.mkdir(parents=True)
+    (chunk / 'file-000.parquet').write_bytes(parquet_files.file(columns))
+    (folder / 'my_data/meta').mkdir()
+    names = [f'{name}.pos' for name in joint_names()]
+    (folder / 'my_data/meta/info.json').write_text(json.dumps(
+        {'codebase_version': 'v3.0', 'fps': 250, 'features': {'observation.state': {'dtype': 'float32', 'shape': [JOINTS], 'names': names},
+                                                             'action': {'dtype': 'float32', 'shape': [JOINTS], 'names': names}}}))
+
+
 def odrive(folder, rows):
     names = ['t'] + [f'pos{j + 1}' for j in range(JOINTS)] + [f'iq{j + 1}' for j in range(JOINTS)]
     table(folder / 'odrive.csv', ','.join(names), [[t, *(x * r / (2 * math.pi) for x, r in zip(q, ODRIVE_RATIO)),
@@ -130,7 +153,8 @@ def can_sniffer(folder, rows):
 
 
 KINDS = {'Universal Robots (RTDE)': universal_robots, 'Franka (libfranka)': franka, 'KUKA (RSI)': kuka, 'Staubli': staubli,
-         'ROS 2': ros_2, 'MATLAB and HDF5': matlab, 'ODrive': odrive, 'moteus': moteus, 'A CAN sniffer (CiA 402)': can_sniffer}
+         'ROS 2': ros_2, 'MATLAB and HDF5': matlab, 'Parquet and LeRobot': lerobot,
+         'ODrive': odrive, 'moteus': moteus, 'A CAN sniffer (CiA 402)': can_sniffer}
 
 
 def commands_of(page):

@@ -35,6 +35,7 @@ import good
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "support"))
 import matlab_files
+import parquet_files
 import ros2_bags
 TIMEOUT_S = 60
 
@@ -71,6 +72,22 @@ def make_matlab(kind, text):
     return data[:len(data) // 2] if kind == "cut" else data
 
 
+def make_parquet(kind, text):
+    """The log's columns as Parquet: time stamps, and a list each of position and torque."""
+    rows = [list(map(float, line.split(","))) for line in text.splitlines()[1:]]
+    tau = [row[3:5] for row in rows]
+    if kind == "with a null":
+        tau[700] = [tau[700][0], None]
+    columns = {"timestamp": (parquet_files.DOUBLE, [row[0] for row in rows]), "q": (parquet_files.DOUBLE, [row[1:3] for row in rows]),
+               "tau": (parquet_files.DOUBLE, tau)}
+    if kind == "with two episodes":
+        columns["episode_index"] = (parquet_files.INT64, [2 * k // len(rows) for k in range(len(rows))])
+    data = bytearray(parquet_files.file(columns))
+    if kind == "damaged":
+        data[4:40] = bytes(36)
+    return bytes(data[:len(data) // 2] if kind == "cut" else data)
+
+
 def make_bytes(kind, text, file):
     """The log's text as other programs would store it; None: `file` was written."""
     data = text.encode()
@@ -78,6 +95,8 @@ def make_bytes(kind, text, file):
         return make_bag(kind.removeprefix("bag "), text)
     if kind.startswith("matlab "):
         return make_matlab(kind.removeprefix("matlab "), text)
+    if kind.startswith("parquet "):
+        return make_parquet(kind.removeprefix("parquet "), text)
     if kind == "gzip":
         return gzip.compress(data, 1)
     if kind == "gzip, cut":
@@ -90,7 +109,7 @@ def make_bytes(kind, text, file):
         with zipfile.ZipFile(file, "w") as archive:
             archive.writestr("xl/worksheets/sheet1.xml", text)
         return None
-    magic = {"parquet": b"PAR1\x15\x04\x15\x80", "hdf5": b"\x89HDF\r\n\x1a\n\0\0", "matlab": b"MATLAB 5.0 MAT-file\0",
+    magic = {"hdf5": b"\x89HDF\r\n\x1a\n\0\0", "matlab": b"MATLAB 5.0 MAT-file\0",
              "ros bag": b"#ROSBAG V2.0\n\x45\0\0\0", "sqlite": b"SQLite format 3\0", "numpy": b"\x93NUMPY\x01\0v\0",
              "zstd": b"\x28\xb5\x2f\xfd\x04\x58",
              # a block of the type that the format reserves

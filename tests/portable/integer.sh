@@ -31,6 +31,6 @@ for source in "${sources[@]}"; do
 done
 clang++-14 -fsanitize=integer,undefined "${objects[@]}" -o "$build/test" \
   -Wl,--start-group "${libraries[@]}" -Wl,--end-group -lrapidcheck -lgtest_main -lgtest -lpthread -lfmt \
-  -ltomlplusplus -lz -lzstd -llz4 -lsqlite3 $(pkg-config --libs matio hdf5-serial) -Wl,--as-needed -lurdfdom_model -ltinyxml -lconsole_bridge
+  -ltomlplusplus -lz -lzstd -llz4 -lsnappy -lsqlite3 $(pkg-config --libs matio hdf5-serial) -Wl,--as-needed -lurdfdom_model -ltinyxml -lconsole_bridge
 rm "${objects[@]}"
 UBSAN_OPTIONS=print_stacktrace=1 RC_PARAMS=seed=1 timeout 300 "$build/test"

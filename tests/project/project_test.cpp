@@ -76,6 +76,9 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"copy",
             robot + log + "[[log]]\nfile = \"copy.csv\"\nrole = \"validate\"\n",
             {":6:", "overlaps the log in line 3", "same content under another name"}},
+        Bad{"same_topic",
+            robot + log + "topic = \"episode_0\"\n[[log]]\nfile = \"a.csv\"\ntopic = \"episode_0\"\nrole = \"test\"\n",
+            {":7:", "overlaps the log in line 3", "same file"}},
         Bad{"time_unit", robot + log + "time_unit = \"nsec\"\n", {":6:", "unknown unit of time 'nsec'", "'ns'"}},
         Bad{"good_enough", robot + "[report]\ngood_enough = 1.5\n" + log, {":4:", "share of rated torque"}},
         Bad{"accept_error", robot + "[target]\naccept_error = 5\n" + log, {":4:", "share of rated torque"}},
@@ -301,6 +304,12 @@ void write_scenario(const std::string& name, const std::vector<std::pair<std::st
 
 std::string scenario_log(const char* scenario, const char* name, const char* role) {
   return std::string("[[log]]\nscenario = \"") + scenario + "\"\nlog = \"" + name + "\"\nrole = \"" + role + "\"\n";
+}
+
+TEST(Project, TwoTopicsOfAFileAreTwoLogs) {
+  const Project project = read_project(
+      write_project("two_topics", robot + log + "topic = \"episode_0\"\n" + log + "topic = \"episode_1\"\n"));
+  EXPECT_EQ(project.logs.size(), 2U);
 }
 
 TEST(Project, TheSameDataMayNotTrainAndValidateUnderTwoNamesOfAScenario) {

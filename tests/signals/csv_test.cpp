@@ -117,6 +117,25 @@ TEST(Csv, CommentsAreSkippedAndMayNameTheColumns) {
   EXPECT_EQ(read(write("rostopic.csv", "%t,q1,tau1\n" + rows)).tau(1, 0), 4);
 }
 
+TEST(Csv, FieldsMayBeApartByTabsOrBlanks) {
+  const std::string names = "t q1 tau1", rows = "\n0 1 2\n0.1 3 4\n", table = names + rows;
+  for (const char mark : {' ', '\t'}) {
+    const auto with = [&](std::string text) {
+      std::replace(text.begin(), text.end(), ' ', mark);
+      return write("apart.csv", text);
+    };
+    EXPECT_EQ(read(with(table)).tau(1, 0), 4);
+    EXPECT_EQ(read(with(names + " \r\n0 1 2 \r\n0.1 3 4 \r\n")).tau(1, 0), 4);
+    EXPECT_EQ(read(with("#" + table)).q(1, 0), 3);
+    const auto short_row = with(table + "0.2 1\n");
+    test::expect_refused(short_row, {":4:", "2 fields where the header has 3"}, [&] { read(short_row); });
+    const auto empty = with(table + "0.2  1\n");
+    test::expect_refused(empty, {":4:", "'q1'", "'' is not a number"}, [&] { read(empty); });
+  }
+  const auto commas = write("commas.csv", names + "\n0 1,5 2\n0,1 3,5 4\n");
+  test::expect_refused(commas, {":1:", "separate columns by commas"}, [&] { read(commas); });
+}
+
 TEST(Csv, SineInRadiansIsFine) {
   EXPECT_EQ(read(write("sine.csv", sine(1, 1))).samples(), 4000);
   EXPECT_EQ(read(write("sine_q.csv", sine(1, 1, 1, false))).samples(), 4000);

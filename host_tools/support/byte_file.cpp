@@ -1,4 +1,4 @@
-#include "host_tools/bags/byte_file.hpp"
+#include "host_tools/support/byte_file.hpp"
 
 #include <fcntl.h>
 #include <sys/stat.h>
