@@ -6,6 +6,7 @@
 #include "host_tools/diagnose/base_parameters.hpp"
 #include "host_tools/diagnose/design_matrix.hpp"
 #include "host_tools/diagnose/features.hpp"
+#include "host_tools/diagnose/load_places.hpp"
 #include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/parallel.hpp"
@@ -120,6 +121,31 @@ std::vector<MatrixXd> Linearised::make(const Group& group) const {
     if (out[j].size() > 0 && background_[j]) out[j] = background_[j]->eliminate(out[j]);
   }
   return out;
+}
+
+const std::vector<MatrixXd>& Linearised::load_columns() const {
+  std::call_once(load_made_, [&] {
+    load_.resize(joints());
+    for (std::size_t l = 0; l < logs().size(); ++l) {
+      if (logs()[l].healthy) continue;
+      const ProcessedLog& log = logs()[l].log;
+      const Block& b = blocks().of_log[l];
+      const PointLoads loads(log_columns_, l);
+      for (Index place = 0; place < moments_of_load; ++place) {
+        const MatrixXd torque = loads.torque(place);
+        for (std::size_t j = 0; j < joints(); ++j) {
+          if (load_[j].size() == 0) load_[j].setZero(blocks().rows(), moments_of_load);
+          load_[j].col(place).segment(b.first, b.count) =
+              noise_.apply(l, j, log.decimate(log.filter_columns(torque.col(static_cast<Index>(j)))));
+        }
+      }
+    }
+    for (std::size_t j = 0; j < joints(); ++j) {
+      load_[j] = load_[j] * moments_from_places();
+      if (background_[j]) load_[j] = background_[j]->eliminate(load_[j]);
+    }
+  });
+  return load_;
 }
 
 namespace {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <memory>
+#include <mutex>
 #include <vector>
 
 #include "host_tools/diagnose/background.hpp"
@@ -54,6 +55,9 @@ class Linearised {
   /// Columns of candidates (current session), whitened: per joint rows x columns, below them those that the joint's
   /// background adds; 0 x 0 where nothing is felt. Safe from several threads.
   std::vector<Eigen::MatrixXd> make(const Group& group) const;
+  /// Columns of a load that is any body: d torque / d (mass, first moment, second moment: xx, yy, zz, and twice xy, xz,
+  /// yz), as make() has them; made once. Safe from several threads.
+  const std::vector<Eigen::MatrixXd>& load_columns() const;
   /// Appends them as a group; returns its index.
   std::size_t add(Group group, const std::vector<Eigen::MatrixXd>& columns);
   void add_all(std::vector<Group> groups);
@@ -71,6 +75,8 @@ class Linearised {
   std::unique_ptr<BlockSolver> solver_;
   NoiseModel noise_;
   std::vector<std::unique_ptr<Background>> background_;  ///< per joint
+  mutable std::once_flag load_made_;
+  mutable std::vector<Eigen::MatrixXd> load_;
 };
 
 /// Covariance of the base parameters, whatever else is fitted.

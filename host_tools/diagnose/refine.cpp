@@ -5,6 +5,8 @@
 
 #include "host_tools/diagnose/dictionary.hpp"
 #include "host_tools/diagnose/gain.hpp"
+#include "host_tools/diagnose/load_places.hpp"
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/regression/search_beside.hpp"
 #include "host_tools/regression/solver.hpp"
@@ -17,9 +19,9 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// Tries shapes of one candidate beside the columns of a fit.
-class ShapeSearch {
+class Refinement {
  public:
-  ShapeSearch(const Linearised& problem, const LinearFit& beside, const Group& start)
+  Refinement(const Linearised& problem, const LinearFit& beside, const Group& start)
       : group_(start), problem_(problem), columns_(beside.columns) {
     MatrixXd gram;
     problem_.solver().normal(columns_, problem_.blocks().fit, gram, projection_);
@@ -45,6 +47,23 @@ class ShapeSearch {
     value = best;
   }
 
+  /// A load is a body: its second moment brakes and drives as well. Columns around no load lack that, and what they
+  /// take for it may be a mass of less than nothing. So they are made around where the load is.
+  void place_load() {
+    const std::vector<MatrixXd>& any = problem_.load_columns();
+    const Reduced body = reduced(any, moments_of_load);
+    const auto centre = best_place(body.gram, body.projection);
+    if (!centre) return;
+    std::vector<MatrixXd> made(any.size());
+    for (std::size_t j = 0; j < any.size(); ++j) {
+      if (best_columns_[j].size() > 0) made[j] = any[j] * moments_around(*centre);
+    }
+    const double square = gain_with(made);
+    if (square <= best_) return;
+    best_ = square;
+    best_columns_ = std::move(made);
+  }
+
   /// The candidate as it is tried next.
   Group& group() { return group_; }
   std::optional<Refined> result() {
@@ -56,18 +75,25 @@ class ShapeSearch {
   /// @param made its columns
   double gain(std::vector<MatrixXd>& made) const {
     made = problem_.make(group_);
-    Reduced reduced;
-    reduced.gram = MatrixXd::Zero(group_.count, group_.count);
-    reduced.projection = VectorXd::Zero(group_.count);
-    MatrixXd cross = MatrixXd::Zero(static_cast<Index>(columns_.size()), group_.count);
+    return gain_with(made);
+  }
+  double gain_with(const std::vector<MatrixXd>& made) const {
+    return gain_of(reduced(made, group_.count), group_.lower, is_share(group_), problem_.options().search.beyond_bound)
+        .square;
+  }
+  Reduced reduced(const std::vector<MatrixXd>& made, Index count) const {
+    Reduced out;
+    out.gram = MatrixXd::Zero(count, count);
+    out.projection = VectorXd::Zero(count);
+    MatrixXd cross = MatrixXd::Zero(static_cast<Index>(columns_.size()), count);
     for (std::size_t j = 0; j < problem_.joints(); ++j) {
-      if (made[j].size() > 0) add_products(j, made[j], reduced, cross);
+      if (made[j].size() > 0) add_products(j, made[j], out, cross);
     }
-    reduced.size = reduced.gram.diagonal();
+    out.size = out.gram.diagonal();
     const MatrixXd z = inverse_ * cross;
-    reduced.gram -= cross.transpose() * z;
-    reduced.projection -= z.transpose() * projection_;
-    return gain_of(reduced, group_.lower, is_share(group_), problem_.options().search.beyond_bound).square;
+    out.gram -= cross.transpose() * z;
+    out.projection -= z.transpose() * projection_;
+    return out;
   }
 
   /// @param cross between the fit's columns and the candidate's
@@ -121,8 +147,13 @@ double first_ratio(const Linearised& problem, const EffectCandidate& candidate, 
 }  // namespace
 
 std::optional<Refined> refined(const Linearised& problem, const LinearFit& beside, const Group& start) {
-  if (searched_shape(start.candidate) < 0 && !start.rotor) return std::nullopt;
-  ShapeSearch search(problem, beside, start);
+  const bool load = is_load(start.candidate.effect);
+  if (searched_shape(start.candidate) < 0 && !start.rotor && !load) return std::nullopt;
+  Refinement search(problem, beside, start);
+  if (load) {
+    search.place_load();
+    return search.result();
+  }
   const EffectInfo& info = *find_effect(start.candidate.effect);
   const std::vector<std::size_t> shapes = info.refined_shapes();
   // One at a time: the best value of one depends on the others.
