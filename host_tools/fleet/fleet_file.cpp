@@ -8,6 +8,7 @@
 #include <map>
 #include <sstream>
 
+#include "host_tools/support/pipes.hpp"
 #include "host_tools/support/toml.hpp"
 
 namespace fxdyn::fleet {
@@ -84,13 +85,20 @@ class FleetReader {
   }
 
  private:
-  fs::path path(const std::string& text) const { return (fleet_.file.parent_path() / text).lexically_normal(); }
+  fs::path path(const Value& value) const {
+    try {
+      return (fleet_.file.parent_path() / with_home(with_variable(value.string()))).lexically_normal();
+    } catch (const InputError& error) {
+      value.place().fail(error.what());
+    }
+  }
 
   void read_projects(const Value& value) {
     const std::vector<Value> patterns = value.is_string() ? std::vector{value} : value.items();
     for (const Value& pattern : patterns) {
-      const fs::path open = path(pattern.string());
-      const auto files = files_of(open);
+      const fs::path open = path(pattern);
+      auto files = files_of(open);
+      std::erase(files, fleet_.file);  // "*.toml" finds it, too
       if (files.empty())
         pattern.place().fail(fmt::format("no file '{}'; paths are relative to the fleet file", open.string()));
       for (const fs::path& file : files) add({id_of(file, open), file, {}, {}, pattern.place().line}, pattern.place());
@@ -104,8 +112,8 @@ class FleetReader {
     const auto project = table.find("project");
     if (const auto baseline = table.find("baseline")) {
       for (const Value& log : baseline->is_string() ? std::vector{*baseline} : baseline->items()) {
-        member.baseline.push_back(path(log.string()));
-        if (!fs::is_regular_file(member.baseline.back()))
+        member.baseline.push_back(path(log));
+        if (!fs::is_regular_file(member.baseline.back()) && !fs::is_directory(member.baseline.back()))
           log.place().fail(
               fmt::format("no file '{}': name a log of this robot's healthy session, relative to the fleet "
                           "file",
@@ -121,7 +129,7 @@ class FleetReader {
     }
     table.finish();
     if (project) {
-      member.project = path(project->string());
+      member.project = path(*project);
       return add(std::move(member), table.place());
     }
     const auto found = members_.find(member.id);

@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
 #include "host_tools/fleet/file_hashes.hpp"
 #include "host_tools/fleet/fleet_file.hpp"
+#include "host_tools/fleet/inputs.hpp"
+#include "host_tools/fleet/run.hpp"
 #include "host_tools/fleet/summary.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
@@ -143,6 +146,90 @@ TEST_F(FleetFile, ATableSaysMoreOfARobotThatThePatternFound) {
   EXPECT_EQ(found.members[0].project, folder_.path() / "cells/a.toml");
   EXPECT_EQ(found.members[0].baseline.front(), folder_.path() / "healthy.csv");
   EXPECT_NE(found.members[0].overrides.find("max_effects = 1"), std::string::npos);
+}
+
+// "*.toml" beside the robots finds the fleet file, too.
+TEST_F(FleetFile, IsNoRobotOfItself) {
+  write("a.toml", "");
+  const auto found = read("projects = \"*.toml\"");
+  ASSERT_EQ(found.members.size(), 1u);
+  EXPECT_EQ(found.members[0].id, "a");
+}
+
+TEST_F(FleetFile, PathsMayStartWithAVariableOrTheHomeFolder) {
+  write("cells/a.toml", "");
+  const char* const home = std::getenv("HOME");
+  const std::string before = home == nullptr ? folder_.path().string() : home;
+  ::setenv("HOME", folder_.path().c_str(), 1);
+  ::setenv("FXDYN_TEST_CELLS", (folder_.path() / "cells").c_str(), 1);
+  EXPECT_EQ(read("projects = \"~/cells/*.toml\"").members.size(), 1u);
+  EXPECT_EQ(read("projects = \"${FXDYN_TEST_CELLS}/*.toml\"").members.size(), 1u);
+  ::unsetenv("FXDYN_TEST_CELLS");
+  ::setenv("HOME", before.c_str(), 1);
+  EXPECT_NE(complaint("projects = \"${FXDYN_TEST_CELLS}/*.toml\"").find("FXDYN_TEST_CELLS is not set"),
+            std::string::npos);
+}
+
+constexpr const char* pendulum =
+    "<robot name=\"pendulum\"><link name=\"base\"/><link name=\"arm\"/>"
+    "<joint name=\"hinge\" type=\"continuous\"><parent link=\"base\"/><child link=\"arm\"/>"
+    "<axis xyz=\"0 1 0\"/></joint></robot>";
+
+class FleetInputs : public FleetFile {
+ protected:
+  fleet::Inputs inputs(const std::string& project, const std::string& more = "") const {
+    write("robot.urdf", pendulum);
+    write("a.toml", "[robot]\nurdf = \"robot.urdf\"\n" + project);
+    const auto found = read("[[robot]]\nid = \"a\"\nproject = \"a.toml\"\n" + more);
+    return fleet::inputs_of(found, found.members.front(), folder_.path() / "out");
+  }
+};
+
+TEST_F(FleetInputs, ARecordingMayBeAFolder) {
+  const std::string project = "[[log]]\nfile = \"bag\"\nrole = \"train\"\n";
+  write("bag/metadata.yaml", "a");
+  write("bag/bag_0.db3", "b");
+  const std::string first = inputs(project).hash;
+  EXPECT_EQ(inputs(project).hash, first);
+  write("bag/bag_0.db3", "c");
+  const std::string second = inputs(project).hash;
+  EXPECT_NE(second, first);
+  write("bag/bag_1.db3", "");
+  EXPECT_NE(inputs(project).hash, second);
+}
+
+// A project that is written anew elsewhere names the same files.
+TEST_F(FleetInputs, OverridesLeaveTheLogsWhereTheyAre) {
+  write("logs/run.csv", "t,q1,tau1\n");
+  ::setenv("FXDYN_TEST_LOGS", (folder_.path() / "logs").c_str(), 1);
+  const auto made = inputs("[[log]]\nfile = \"${FXDYN_TEST_LOGS}/run.csv\"\nrole = \"train\"\n",
+                           "overrides = { diagnose = { max_effects = 1 } }");
+  ::unsetenv("FXDYN_TEST_LOGS");
+  const std::string text = read_file(made.project);
+  EXPECT_NE(text.find((folder_.path() / "logs/run.csv").string()), std::string::npos) << text;
+}
+
+// The program of those effects reads it; this one only asks whether it has changed.
+TEST_F(FleetInputs, AProjectMayNeedAnotherProgramsEffects) {
+  write("run.csv", "t,q1,tau1\n");
+  const std::string project = "[[log]]\nfile = \"run.csv\"\nrole = \"train\"\n[effects]\nlibrary = \"of_others\"\n";
+  const std::string first = inputs(project).hash;
+  write("run.csv", "t,q1,tau1\n0,0,0\n");
+  EXPECT_NE(inputs(project).hash, first);
+}
+
+TEST_F(FleetFile, WhatIsAtWorkIsToldWhileNothingEnds) {
+  write("a.toml", "");
+  write("slow.sh", "#!/bin/sh\necho reading logs\nsleep 1\nexit 3\n");
+  std::filesystem::permissions(folder_.path() / "slow.sh", std::filesystem::perms::owner_all);
+  const auto found = read("projects = \"a.toml\"");
+  testing::internal::CaptureStderr();
+  fleet::run_tasks(found, {{&found.members.front(), found.members.front().project, "hash"}}, folder_.path() / "out",
+                   {folder_.path() / "slow.sh", 1, 0.2});
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_NE(said.find("[0/1] at work: a for "), std::string::npos) << said;
+  EXPECT_NE(said.find(" s (reading logs)\n"), std::string::npos) << said;
+  EXPECT_NE(said.find("a: failed: reading logs\n"), std::string::npos) << said;
 }
 
 TEST_F(FleetFile, SaysWhatIsWrongAndWhere) {
