@@ -73,7 +73,10 @@ class FleetReader {
     }
     if (const auto projects = root.find("projects")) read_projects(*projects);
     if (const auto robots = root.find("robot")) {
-      if (!robots->is_list()) robots->place().fail("write [[robot]], one for each");
+      if (!robots->is_list())
+        robots->place().fail(
+            "a fleet file has [[robot]], one for each; is this the project of a robot? Then name it in one: "
+            "projects = \"cells/*/robot.toml\"");
       for (const Value& robot : robots->items()) read_robot(Table(robot));
     }
     root.finish();

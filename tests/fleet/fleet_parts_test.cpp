@@ -9,6 +9,7 @@
 #include "host_tools/fleet/file_hashes.hpp"
 #include "host_tools/fleet/fleet_file.hpp"
 #include "host_tools/fleet/inputs.hpp"
+#include "host_tools/fleet/robot_folder.hpp"
 #include "host_tools/fleet/run.hpp"
 #include "host_tools/fleet/summary.hpp"
 #include "host_tools/support/error.hpp"
@@ -55,7 +56,7 @@ TEST(FalseDiscovery, IsThatOfThePapersExample) {
   const auto found = benjamini_hochberg(p, 0.05);
   EXPECT_EQ(found.hypotheses, 15u);
   EXPECT_EQ(found.discoveries, 4u);
-  EXPECT_NEAR(found.log10_threshold, std::log10(0.0095), 1e-12);
+  EXPECT_NEAR(found.log10_threshold, std::log10(0.05 * 4 / 15), 1e-12);
 }
 
 TEST(FalseDiscovery, OfNothingIsNothing) {
@@ -218,6 +219,30 @@ TEST_F(FleetInputs, AProjectMayNeedAnotherProgramsEffects) {
   EXPECT_NE(inputs(project).hash, first);
 }
 
+// A joint passes by its strongest effect. What else was found there is not chance because it is weaker than that.
+TEST_F(FleetFile, AWeakerEffectOfTheSameJointIsADiscoveryToo) {
+  write("a.toml", "");
+  const auto found = read("projects = \"a.toml\"");
+  fleet::RobotState state;
+  state.verdict = Verdict::explained;
+  state.baseline = true;
+  state.joints = {{"hinge",
+                   "N*m",
+                   Verdict::explained,
+                   {},
+                   {{"presliding", true, 2000, {}}, {"ripple", true, 20, {}}, {"spring", false, 1.3, {}}},
+                   {}}};
+  fleet::RobotFolder(folder_.path() / "out", "a").finish(state, 1);
+  const fleet::Summary summary = fleet::summarise(found, folder_.path() / "out");
+  EXPECT_EQ(summary.false_discovery.discoveries, 1u);  // of the joint and the robot as a whole
+  EXPECT_NEAR(summary.false_discovery.log10_threshold, std::log10(0.05 / 2), 1e-12);
+  const auto& findings = summary.robots.front().findings;
+  ASSERT_EQ(findings.size(), 3u);
+  EXPECT_TRUE(findings[0].discovered);
+  EXPECT_TRUE(findings[1].discovered);
+  EXPECT_FALSE(findings[2].discovered);  // twice 10^-1.3 is more than 0.025
+}
+
 TEST_F(FleetFile, WhatIsAtWorkIsToldWhileNothingEnds) {
   write("a.toml", "");
   write("slow.sh", "#!/bin/sh\necho reading logs\nsleep 1\nexit 3\n");
@@ -246,6 +271,7 @@ TEST_F(FleetFile, SaysWhatIsWrongAndWhere) {
   said("projects = \"z/*.toml\"", "paths are relative to the fleet file");
   said("project = \"x/*.toml\"", "nearest is 'projects'");
   said("projects = \"?/*.toml\"", "two robots have the id 'a'");
+  said("[robot]\nurdf = \"a.urdf\"", "is this the project of a robot?");
   said("[[robot]]\nid = \"a/b\"\nproject = \"x/a.toml\"", "letters, digits");
   said("[[robot]]\nproject = \"x/a.toml\"", "key 'id' is missing");
   said("[[robot]]\nid = \"a\"", "key 'project' is missing");
