@@ -160,8 +160,9 @@ class FleetReader {
         const auto [owner, added] = owners.try_emplace(fs::weakly_canonical(log), &member);
         if (!added && owner->second != &member)
           throw InputError(
-              fmt::format("{}:{}: robot '{}': its baseline is that of '{}', too ({}): name a log of its own", name_,
-                          member.line, member.id, owner->second->id, log.string()));
+              fmt::format("{}:{}: robot '{}': its baseline is that of '{}', too ({}): name a log of its own; sessions "
+                          "of one robot name it in their projects",
+                          name_, member.line, member.id, owner->second->id, log.string()));
       }
     }
   }

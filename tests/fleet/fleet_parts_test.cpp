@@ -11,6 +11,7 @@
 #include "host_tools/fleet/inputs.hpp"
 #include "host_tools/fleet/robot_folder.hpp"
 #include "host_tools/fleet/run.hpp"
+#include "host_tools/fleet/slurm.hpp"
 #include "host_tools/fleet/summary.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
@@ -255,6 +256,31 @@ TEST_F(FleetFile, WhatIsAtWorkIsToldWhileNothingEnds) {
   EXPECT_NE(said.find("[0/1] at work: a for "), std::string::npos) << said;
   EXPECT_NE(said.find(" s (reading logs)\n"), std::string::npos) << said;
   EXPECT_NE(said.find("a: failed: reading logs\n"), std::string::npos) << said;
+}
+
+// A queue may hold a job for hours, and a node that is drained for ever.
+TEST_F(FleetFile, WhatTheQueueSaysIsToldWhileNothingEnds) {
+  write("a.toml", "");
+  write("state/jobs", "");
+  const auto found = read("projects = \"a.toml\"");
+  const std::string path = std::getenv("PATH");
+  ::setenv("PATH", (FXDYN_SOURCE_DIR "/tests/fleet/fake_slurm:" + path).c_str(), 1);
+  ::setenv("FAKE_SLURM", (folder_.path() / "state").c_str(), 1);
+  ::setenv("FAKE_SLURM_ELSEWHERE", "1", 1);
+  ::setenv("FAKE_SLURM_PENDS", "2", 1);
+  fleet::SlurmOptions options;
+  options.chunk_size = 1;
+  options.look_s = options.ask_s = options.settle_s = 0.1;
+  options.tell_s = 0.2;
+  options.useless_rounds = 1;
+  testing::internal::CaptureStderr();
+  EXPECT_THROW(fleet::run_on_slurm(found, {{&found.members.front(), found.members.front().project, "hash"}},
+                                   folder_.path() / "out", {"/bin/true", 1}, options),
+               DataError);
+  const std::string said = testing::internal::GetCapturedStderr();
+  for (const char* name : {"FAKE_SLURM", "FAKE_SLURM_ELSEWHERE", "FAKE_SLURM_PENDS"}) ::unsetenv(name);
+  ::setenv("PATH", path.c_str(), 1);
+  EXPECT_NE(said.find("[0/1] job 1: 1 PENDING Resources\n"), std::string::npos) << said;
 }
 
 TEST_F(FleetFile, SaysWhatIsWrongAndWhere) {
