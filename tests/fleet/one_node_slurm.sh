@@ -51,12 +51,11 @@ node=$!
 # A controller that has lost its last seconds finds jobs on the node that it does not know, and drains it. An administrator
 # takes it back.
 while sleep 2; do
-  ! sinfo -h -o %T 2>/dev/null | grep -q '^drain' || scontrol update NodeName="$(hostname -s)" State=RESUME
+  ! sinfo -h -o %T 2>/dev/null | grep -q '^drain' || scontrol update NodeName="$(hostname -s)" State=RESUME || true
 done >"$dir/administrator.txt" 2>&1 &
 administrator=$!
 finish() {
-  kill $administrator 2>/dev/null
-  kill -9 $node "$(cat "$dir/controller.pid")" 2>/dev/null
+  kill -9 $administrator $node "$(cat "$dir/controller.pid")" 2>/dev/null || true
   while kill -0 $node || kill -0 "$(cat "$dir/controller.pid")"; do sleep 0.1; done 2>/dev/null
 }
 trap finish EXIT
