@@ -38,7 +38,7 @@ std::map<std::string, json> run_fleet(const RunSettings& settings, const std::ve
 
 fs::path diagnosis_of(const fs::path& out, const json& robot) {
   for (const json& file : robot.at("files")) {
-    const fs::path path = fleet_folder(out) / file.get<std::string>();
+    fs::path path = fleet_folder(out) / file.get<std::string>();
     if (path.filename() == "diagnosis.json") return path;
   }
   return {};

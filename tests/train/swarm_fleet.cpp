@@ -21,7 +21,7 @@ std::string quoted(const fs::path& path) { return "'" + path.string() + "'"; }
 
 /// A fleet calls its program as PROGRAM VERB PROJECT --out DIR.
 fs::path write_program(const FleetOptions& options) {
-  const fs::path file = options.folder / "seed.sh";
+  fs::path file = options.folder / "seed.sh";
   std::string text = fmt::format("#!/bin/sh\nexec {} --seed-of \"$2\" --out \"$4\" --particles {} --generations {}",
                                  quoted(options.self), options.budget.particles, options.budget.generations);
   if (!options.joints.empty()) text += fmt::format(" --joints {}", fmt::join(options.joints, ","));
