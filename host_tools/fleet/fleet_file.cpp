@@ -8,6 +8,7 @@
 #include <map>
 #include <sstream>
 
+#include "host_tools/support/pipes.hpp"
 #include "host_tools/support/toml.hpp"
 
 namespace fxdyn::fleet {
@@ -72,7 +73,10 @@ class FleetReader {
     }
     if (const auto projects = root.find("projects")) read_projects(*projects);
     if (const auto robots = root.find("robot")) {
-      if (!robots->is_list()) robots->place().fail("write [[robot]], one for each");
+      if (!robots->is_list())
+        robots->place().fail(
+            "a fleet file has [[robot]], one for each; is this the project of a robot? Then name it in one: "
+            "projects = \"cells/*/robot.toml\"");
       for (const Value& robot : robots->items()) read_robot(Table(robot));
     }
     root.finish();
@@ -84,13 +88,20 @@ class FleetReader {
   }
 
  private:
-  fs::path path(const std::string& text) const { return (fleet_.file.parent_path() / text).lexically_normal(); }
+  fs::path path(const Value& value) const {
+    try {
+      return (fleet_.file.parent_path() / with_home(with_variable(value.string()))).lexically_normal();
+    } catch (const InputError& error) {
+      value.place().fail(error.what());
+    }
+  }
 
   void read_projects(const Value& value) {
     const std::vector<Value> patterns = value.is_string() ? std::vector{value} : value.items();
     for (const Value& pattern : patterns) {
-      const fs::path open = path(pattern.string());
-      const auto files = files_of(open);
+      const fs::path open = path(pattern);
+      auto files = files_of(open);
+      std::erase(files, fleet_.file);  // "*.toml" finds it, too
       if (files.empty())
         pattern.place().fail(fmt::format("no file '{}'; paths are relative to the fleet file", open.string()));
       for (const fs::path& file : files) add({id_of(file, open), file, {}, {}, pattern.place().line}, pattern.place());
@@ -104,8 +115,8 @@ class FleetReader {
     const auto project = table.find("project");
     if (const auto baseline = table.find("baseline")) {
       for (const Value& log : baseline->is_string() ? std::vector{*baseline} : baseline->items()) {
-        member.baseline.push_back(path(log.string()));
-        if (!fs::is_regular_file(member.baseline.back()))
+        member.baseline.push_back(path(log));
+        if (!fs::is_regular_file(member.baseline.back()) && !fs::is_directory(member.baseline.back()))
           log.place().fail(
               fmt::format("no file '{}': name a log of this robot's healthy session, relative to the fleet "
                           "file",
@@ -121,7 +132,7 @@ class FleetReader {
     }
     table.finish();
     if (project) {
-      member.project = path(project->string());
+      member.project = path(*project);
       return add(std::move(member), table.place());
     }
     const auto found = members_.find(member.id);
@@ -149,8 +160,9 @@ class FleetReader {
         const auto [owner, added] = owners.try_emplace(fs::weakly_canonical(log), &member);
         if (!added && owner->second != &member)
           throw InputError(
-              fmt::format("{}:{}: robot '{}': its baseline is that of '{}', too ({}): name a log of its own", name_,
-                          member.line, member.id, owner->second->id, log.string()));
+              fmt::format("{}:{}: robot '{}': its baseline is that of '{}', too ({}): name a log of its own; sessions "
+                          "of one robot name it in their projects",
+                          name_, member.line, member.id, owner->second->id, log.string()));
       }
     }
   }

@@ -64,15 +64,23 @@ std::vector<char*> pointers(std::vector<std::string>& words) {
 /// What a program said last of why it stopped: the line that fxdyn writes, else the last one.
 std::string last_words(const fs::path& output) {
   std::ifstream in(output);
-  std::string said, last;
+  std::string said;
   for (std::string line; std::getline(in, line);) {
     if (line.starts_with("fxdyn: ")) said = line.substr(7);
-    if (!line.empty()) last = line;
   }
-  return said.empty() ? last : said;
+  return said.empty() ? last_line(output) : said;
 }
 
 }  // namespace
+
+std::string last_line(const fs::path& output) {
+  std::ifstream in(output);
+  std::string last;
+  for (std::string line; std::getline(in, line);) {
+    if (!line.empty()) last = line;
+  }
+  return last;
+}
 
 Program start(const std::vector<std::string>& words, const Limits& limits, const fs::path& output,
               std::size_t threads) {

@@ -24,6 +24,9 @@ Program start(const std::vector<std::string>& words, const Limits& limits, const
 /// It and all that it started.
 void end(const Program& program);
 
+/// That it has printed so far, but empty ones; empty: none.
+std::string last_line(const std::filesystem::path& output);
+
 /// What the end of a program means.
 struct Ending {
   std::string complaint;  ///< one line; empty: it is well

@@ -116,10 +116,16 @@ void add_diagnosis(RobotState& state, const DiagnosisResult& diagnosis) {
   }
 }
 
-json parsed(const fs::path& file) {
-  if (!fs::is_regular_file(file))
-    throw InputError(file.filename().string() + " is missing: the program did not write it");
-  return json::parse(read_file(file));
+/// Another program than fxdyn may have written it.
+template <class Codec>
+auto read_with(Codec codec, const fs::path& file) {
+  const std::string name = file.filename().string();
+  if (!fs::is_regular_file(file)) throw InputError(name + " is missing: the program did not write it");
+  try {
+    return codec(json::parse(read_file(file)));
+  } catch (const json::exception& error) {
+    throw InputError(fmt::format("{}: not as fxdyn writes it ({}): check --program", name, error.what()));
+  }
 }
 
 }  // namespace
@@ -162,9 +168,10 @@ RobotState robot_state_of(const json& file) {
 RobotState read_results_of(const fs::path& folder) {
   const fs::path out = folder / "out";
   RobotState state;
-  state.robot = parsed(out / "model.json").at("robot").at("name");
-  add_metrics(state, metrics_of(parsed(out / "metrics.json")));
-  if (fs::exists(out / "diagnosis.json")) add_diagnosis(state, diagnosis_of(parsed(out / "diagnosis.json")));
+  state.robot =
+      read_with([](const json& model) { return model.at("robot").at("name").get<std::string>(); }, out / "model.json");
+  add_metrics(state, read_with(metrics_of, out / "metrics.json"));
+  if (fs::exists(out / "diagnosis.json")) add_diagnosis(state, read_with(diagnosis_of, out / "diagnosis.json"));
   constexpr std::array shown{"out/report.html", "out/diagnosis.json", "out/metrics.json", "output.txt"};
   for (const char* file : shown) {
     if (fs::exists(folder / file)) state.files.emplace_back(file);

@@ -1,6 +1,7 @@
 #include "host_tools/fleet/run.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -55,6 +56,7 @@ class Runner {
       if (signal != 0 && signal != SIGCHLD) stop(signal);
       end_late_ones();
       collect();
+      if (!running_.empty() && seconds_since(said_) > options_.tell_s) say_what_is_at_work();
     }
   }
 
@@ -79,7 +81,7 @@ class Runner {
 
   /// [s], at most a second.
   double until_the_next_is_late() const {
-    double left = 1;
+    double left = std::min(1.0, options_.tell_s);
     for (const auto& [process, running] : running_)
       left = std::min(left, fleet_.limits.time_s - seconds_since(running.program.started));
     constexpr double shortest = 0.01;  // one that was ended is not yet collected
@@ -138,6 +140,25 @@ class Runner {
     ++ended_;
     const double left = seconds_since(started_) / static_cast<double>(ended_) * static_cast<double>(total_ - ended_);
     fmt::print(stderr, "[{}/{}, {:.0f} s left] {}: {}\n", ended_, total_, left, id, what);
+    said_ = Clock::now();
+  }
+
+  /// A robot of an hour is not a robot that hangs.
+  void say_what_is_at_work() {
+    constexpr std::size_t shown = 8;  // of a line that can be read
+    std::vector<std::string> words;
+    for (const auto& [process, running] : running_) {
+      if (words.size() == shown) {
+        words.push_back(fmt::format("and {} more", running_.size() - shown));
+        break;
+      }
+      const std::string& id = running.task->member->id;
+      const std::string step = last_line(RobotFolder(directory_, id).output());
+      words.push_back(fmt::format("{} for {:.0f} s{}", id, seconds_since(running.program.started),
+                                  step.empty() ? "" : fmt::format(" ({})", step)));
+    }
+    fmt::print(stderr, "[{}/{}] at work: {}\n", ended_, total_, fmt::join(words, ", "));
+    said_ = Clock::now();
   }
 
   [[noreturn]] void stop(int signal) const {
@@ -150,7 +171,7 @@ class Runner {
   const RunOptions& options_;
   std::map<pid_t, Running> running_;
   std::size_t total_, ended_ = 0, threads_ = 1;
-  Clock::time_point started_ = Clock::now();
+  Clock::time_point started_ = Clock::now(), said_ = started_;
 };
 
 }  // namespace

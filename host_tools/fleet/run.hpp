@@ -12,6 +12,7 @@ namespace fxdyn::fleet {
 struct RunOptions {
   std::filesystem::path program;  ///< started as PROGRAM VERB PROJECT --out DIR/robots/ID/out; absolute
   std::size_t jobs = 1;           ///< programs at once
+  double tell_s = 30;             ///< where none ends, a line says so often what is at work [s]; hand
 };
 
 /// A robot whose result is missing or of other inputs.

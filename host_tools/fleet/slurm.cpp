@@ -80,6 +80,10 @@ double mean_seconds(const Fleet& fleet, const fs::path& directory) {
   return count > 0 ? sum / count : 0;
 }
 
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
 class Submitter {
  public:
   Submitter(const Fleet& fleet, const fs::path& directory, const RunOptions& run, const SlurmOptions& options)
@@ -166,31 +170,34 @@ class Submitter {
     const HeldSignals signals;
     double since_asked = 0;
     std::size_t shown = 0;
-    auto last = std::chrono::steady_clock::now();
+    auto last = std::chrono::steady_clock::now(), told = last;
     while (true) {
       const auto ended = static_cast<std::size_t>(std::count_if(missing.begin(), missing.end(), [&](const Task& task) {
         return RobotFolder(directory_, task.member->id).is_ended();
       }));
       if (ended != shown) {
         fmt::print(stderr, "[{}/{}]\n", ended, missing.size());
-        last = std::chrono::steady_clock::now();
+        last = told = std::chrono::steady_clock::now();
       }
       shown = ended;
       if (ended == missing.size()) return;
       pause(signals, options_.look_s);
-      if (is_stuck(std::chrono::steady_clock::now() - last)) return pause(signals, options_.settle_s);
+      if (is_stuck(seconds_since(last))) return pause(signals, options_.settle_s);
       since_asked += options_.look_s;
       if (since_asked < options_.ask_s) continue;
       since_asked = 0;
       if (is_gone()) return pause(signals, options_.settle_s);
+      if (seconds_since(told) < options_.tell_s) continue;
+      fmt::print(stderr, "[{}/{}] job {}: {}\n", ended, missing.size(), job_, in_queue_);
+      told = std::chrono::steady_clock::now();
     }
   }
 
   /// Every worker ends a robot within its time limit. A controller that was killed may believe for ever that a task
   /// runs whose end it has missed.
-  bool is_stuck(std::chrono::duration<double> quiet) const {
-    if (!has_started() || quiet.count() < fleet_.limits.time_s + options_.margin_s) return false;
-    fmt::print(stderr, "job {} has ended no robot for {:.0f} s: cancelled\n", job_, quiet.count());
+  bool is_stuck(double quiet_s) const {
+    if (!has_started() || quiet_s < fleet_.limits.time_s + options_.margin_s) return false;
+    fmt::print(stderr, "job {} has ended no robot for {:.0f} s: cancelled\n", job_, quiet_s);
     if (!in_path("scancel").empty()) ask({"scancel", job_}, directory_);
     return true;
   }
@@ -203,8 +210,10 @@ class Submitter {
   }
 
   /// A controller that does not answer says nothing of the job.
-  bool is_gone() const {
-    const Answer answer = ask({"squeue", "-h", "-j", job_, "-o", "%i"}, directory_);
+  bool is_gone() {
+    const Answer answer = ask({"squeue", "-h", "-j", job_, "-o", "%i %T %r"}, directory_);
+    in_queue_ = answer.text.empty() ? "not in the queue" : answer.text;
+    std::replace(in_queue_.begin(), in_queue_.end(), '\n', ';');
     return answer.good ? answer.text.empty() : answer.text.find("Invalid job id") != std::string::npos;
   }
 
@@ -226,6 +235,7 @@ class Submitter {
   const RunOptions& run_;
   const SlurmOptions& options_;
   std::string job_;
+  std::string in_queue_;  ///< what squeue said last of the job: tasks, states, reasons
   std::size_t chunks_ = 0;
 };
 

@@ -17,6 +17,7 @@ struct SlurmOptions {
   std::size_t most_tasks = 1000;  ///< of an array: Slurm's MaxArraySize is 1001 by default
   double look_s = 1;              ///< between two looks at the files [s]; hand
   double ask_s = 3;               ///< between two questions to squeue [s]; hand
+  double tell_s = 30;             ///< where no robot ends, a line says so often what squeue says [s]; hand
   double settle_s = 2;   ///< after a job is gone, until a shared file system shows what its nodes wrote [s]; hand
   double margin_s = 30;  ///< beyond a robot's time limit, before an array that ends no robot counts as stuck [s]; hand
   /// Arrays in a row that end no robot, before it is given up; hand: a controller that crashes loses a job that it took

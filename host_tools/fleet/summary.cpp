@@ -208,9 +208,10 @@ FalseDiscovery benjamini_hochberg(std::vector<double> log10_p, double rate) {
   FalseDiscovery out{rate, log10_p.size(), 0, 0};
   const auto m = static_cast<double>(log10_p.size());
   for (std::size_t k = 1; k <= log10_p.size(); ++k) {
-    if (log10_p[k - 1] > std::log10(rate * static_cast<double>(k) / m)) continue;
+    const double limit = std::log10(rate * static_cast<double>(k) / m);
+    if (log10_p[k - 1] > limit) continue;
     out.discoveries = k;
-    out.log10_threshold = log10_p[k - 1];
+    out.log10_threshold = limit;
   }
   return out;
 }

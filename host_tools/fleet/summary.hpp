@@ -62,7 +62,9 @@ struct Cluster {
 struct FalseDiscovery {
   double rate = 0;
   std::size_t hypotheses = 0, discoveries = 0;
-  double log10_threshold = 0;  ///< of p; discoveries are at or below it. Without any: 0
+  /// log10 of rate k / m, k the number of discoveries, which are at or below it. It, and not the largest p among them,
+  /// is what a further effect at one of their joints is held against. Without any: 0
+  double log10_threshold = 0;
 };
 
 struct Summary {

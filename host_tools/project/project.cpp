@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <iterator>
 #include <limits>
 #include <sstream>
@@ -115,25 +114,17 @@ class ProjectReader {
  private:
   std::size_t joints() const { return project_.robot.size(); }
 
-  /// "${NAME:-default}/rest": the environment variable, else the default.
   static std::string expand(const Value& value) {
-    std::string text = value.string();
-    const std::size_t from = text.find("${");
-    if (from == std::string::npos) return text;
-    const std::size_t to = text.find('}', from);
-    if (to == std::string::npos) value.place().fail("'${' without '}'");
-    const std::string inner = text.substr(from + 2, to - from - 2);
-    const std::size_t split = inner.find(":-");
-    const char* set = std::getenv(inner.substr(0, split).c_str());
-    if (set == nullptr && split == std::string::npos) {
-      value.place().fail(fmt::format("environment variable {} is not set", inner));
+    try {
+      return with_home(with_variable(value.string()));
+    } catch (const InputError& error) {
+      value.place().fail(error.what());
     }
-    return text.replace(from, to - from + 1, set != nullptr ? set : inner.substr(split + 2));
   }
 
   /// `log`: "-" (standard input), a FIFO and the folder of a bag are files, too.
   fs::path path(const Value& value, bool log = false) const {
-    const std::string text = with_home(expand(value));
+    const std::string text = expand(value);
     if (log && text == "-") return text;
     const fs::path path = (project_.file.parent_path() / text).lexically_normal();
     if (!fs::is_regular_file(path) && !(log && (is_pipe(path) || fs::is_directory(path)))) {

@@ -63,4 +63,17 @@ std::string with_home(const std::string& path) {
   return home == nullptr || *home == '\0' ? path : home + path.substr(1);
 }
 
+std::string with_variable(const std::string& path) {
+  const std::size_t from = path.find("${");
+  if (from == std::string::npos) return path;
+  const std::size_t to = path.find('}', from);
+  if (to == std::string::npos) throw InputError("'${' without '}'");
+  const std::string inner = path.substr(from + 2, to - from - 2);
+  const std::size_t split = inner.find(":-");
+  const char* set = std::getenv(inner.substr(0, split).c_str());
+  if (set == nullptr && split == std::string::npos)
+    throw InputError(fmt::format("environment variable {} is not set", inner));
+  return path.substr(0, from) + (set != nullptr ? set : inner.substr(split + 2)) + path.substr(to + 1);
+}
+
 }  // namespace fxdyn

@@ -14,5 +14,8 @@ bool is_pipe(const std::filesystem::path& file);
 
 /// "~" and "~/x" with the home folder in front, as a shell has it; every other text as it is.
 std::string with_home(const std::string& path);
+/// "${NAME:-default}/rest": the environment variable, else the default. Every other text as it is.
+/// @throws InputError: not closed, or not set and without a default
+std::string with_variable(const std::string& path);
 
 }  // namespace fxdyn

@@ -4,15 +4,15 @@
 
 #include <CLI/CLI.hpp>
 #include <atomic>
-#include <chrono>
 #include <cstdio>
 #include <cstdlib>
-#include <mutex>
+#include <map>
 #include <thread>
 
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
 #include "host_tools/support/heap.hpp"
+#include "tests/campaign/case_fleet.hpp"
 #include "tests/campaign/run_case.hpp"
 #include "tests/campaign/write_up.hpp"
 
@@ -22,46 +22,50 @@ using namespace fxdyn;
 using namespace fxdyn::campaign;
 namespace fs = std::filesystem;
 using nlohmann::json;
-using Clock = std::chrono::steady_clock;
 
-/// A line a case: how far it is, and what came out.
-class Reporter {
- public:
-  explicit Reporter(std::size_t total) : total_(total) {}
-  void finished(const json& result) {
-    const std::lock_guard lock(mutex_);
-    ++done_;
-    passed_ += static_cast<std::size_t>(result.at("passed").get<bool>());
-    const double elapsed = std::chrono::duration<double>(Clock::now() - start_).count();
-    const double left = elapsed / static_cast<double>(done_) * static_cast<double>(total_ - done_);
-    const std::string status = result.at("status") == "done"
-                                   ? (result.at("passed").get<bool>() ? "passed" : "not passed")
-                                   : result.at("status").get<std::string>();
-    fmt::print("[{}/{}, {} passed, {:.0f} min left] {}: {}\n", done_, total_, passed_, std::ceil(left / 60),
-               result.at("name").get<std::string>(), status);
-    std::fflush(stdout);
-  }
-
- private:
-  std::mutex mutex_;
-  std::size_t total_, done_ = 0, passed_ = 0;
-  Clock::time_point start_ = Clock::now();
-};
-
-std::vector<json> run_all(const std::vector<Case>& cases, const RunSettings& settings, std::size_t jobs) {
-  std::vector<json> results(cases.size());
-  Reporter reporter(cases.size());
+/// made_case() of each. Its steps are many and short beside a diagnosis, so threads of this process do them.
+std::vector<json> make_all(const std::vector<Case>& cases, const RunSettings& settings, std::size_t jobs) {
+  std::vector<json> made(cases.size());
   std::atomic<std::size_t> next = 0;
   std::vector<std::jthread> workers;
   for (std::size_t i = 0; i < jobs; ++i) {
     workers.emplace_back([&] {
       for (std::size_t at; (at = next++) < cases.size();) {
-        results[at] = run_case(cases[at], settings);
-        reporter.finished(results[at]);
+        made[at] = made_case(cases[at], settings);
+        fmt::print("made {}{}\n", cases[at].name,
+                   made[at].contains("status") ? ": " + made[at].at("message").get<std::string>() : "");
+        std::fflush(stdout);
       }
     });
   }
   workers.clear();
+  return made;
+}
+
+/// What fxdyn says of the cases, as a fleet, and what that is worth. Results of an earlier run are taken as they are.
+std::vector<json> run_all(const std::vector<Case>& cases, const RunSettings& settings, std::size_t jobs,
+                          const std::vector<std::string>& fleet_words) {
+  std::vector<json> results;
+  std::vector<Case> left;
+  for (const Case& one : cases) {
+    results.push_back(earlier_result(one, settings));
+    if (results.back().is_null()) left.push_back(one);
+  }
+  const std::vector<json> made = make_all(left, settings, jobs);
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    if (!made[i].contains("status")) names.push_back(left[i].name);
+  }
+  std::map<std::string, json> robots;
+  if (!names.empty()) {
+    write_fleet(names, settings);
+    robots = run_fleet(settings, fleet_words);
+  }
+  auto at = results.begin();
+  for (std::size_t i = 0; i < left.size(); ++i, ++at) {
+    while (!at->is_null()) ++at;
+    *at = scored_case(left[i], settings, made[i], robots[left[i].name]);
+  }
   return results;
 }
 
@@ -123,25 +127,50 @@ std::vector<std::string> complaints(const std::vector<json>& results) {
   return list;
 }
 
+/// Which cases.
+struct Choice {
+  bool small = false;
+  std::size_t drawn = 0, most = 0;  ///< 0: no drawn ones; no limit
+  std::uint64_t seed = 0;
+  std::vector<std::string> filters;
+};
+
+std::vector<Case> chosen(const Choice& choice) {
+  std::vector<Case> cases = choice.drawn > 0 ? drawn_cases(choice.seed, choice.drawn)
+                            : choice.small   ? small_cases()
+                                             : all_cases();
+  std::erase_if(cases, [&](const Case& one) {
+    return !choice.filters.empty() &&
+           std::none_of(choice.filters.begin(), choice.filters.end(),
+                        [&](const std::string& filter) { return one.name.find(filter) != std::string::npos; });
+  });
+  if (choice.most == 0 || choice.most >= cases.size()) return cases;
+  std::vector<Case> some;
+  for (std::size_t i = 0; i < choice.most; ++i) some.push_back(cases[i * cases.size() / choice.most]);
+  return some;
+}
+
 int run(int argc, char** argv) {
   CLI::App app("Generates robots with hidden effects, lets fxdyn diagnose them, and scores what it says");
   RunSettings settings;
   settings.program = FXDYN_PROGRAM;
-  std::size_t jobs = 2, most = 0;
-  bool small = false, check = false, list = false;
-  std::string commit;
-  std::vector<std::string> filters;
-  std::uint64_t seed = 0;
-  std::size_t drawn = 0;
+  Choice choice;
+  std::size_t jobs = 2;
+  bool check = false, list = false, slurm = false;
+  std::string commit, slurm_args;
   app.add_option("--out", settings.out, "folder for cases and results; what is there already is not run again")
       ->required();
-  app.add_flag("--small", small, "the cases of the test");
-  app.add_option("--drawn", drawn, "the second campaign: so many robots, frictions and recordings drawn at random");
-  app.add_option("--seed", seed, "of the first of them; thresholds are chosen on 1000 .. 1999, judged from 5000 on")
+  app.add_flag("--small", choice.small, "the cases of the test");
+  app.add_option("--drawn", choice.drawn,
+                 "the second campaign: so many robots, frictions and recordings drawn at random");
+  app.add_option("--seed", choice.seed,
+                 "of the first of them; thresholds are chosen on 1000 .. 1999, judged from 5000 on")
       ->needs("--drawn");
-  app.add_option("--cases", most, "at most so many, spread over the list");
-  app.add_option("--filter", filters, "only cases with one of these in their name");
+  app.add_option("--cases", choice.most, "at most so many, spread over the list");
+  app.add_option("--filter", choice.filters, "only cases with one of these in their name");
   app.add_option("--jobs", jobs, "cases at a time")->check(CLI::Range(1, 64));
+  app.add_flag("--slurm", slurm, "the diagnoses as a job array of Slurm: --out has to be seen by all nodes");
+  app.add_option("--slurm-args", slurm_args, "further arguments of sbatch")->needs("--slurm");
   app.add_option("--program", settings.program, "the fxdyn to test");
   app.add_option("--commit", commit, "what the program was built from, for the page");
   app.add_option("--time-limit", settings.time_limit_s, "of one diagnosis, seconds");
@@ -156,25 +185,18 @@ int run(int argc, char** argv) {
   // Cases side by side: each diagnosis keeps to its core.
   setenv("FXDYN_THREADS", "1", 1);
 
-  std::vector<Case> cases = drawn > 0 ? drawn_cases(seed, drawn) : small ? small_cases() : all_cases();
-  std::erase_if(cases, [&](const Case& one) {
-    return !filters.empty() && std::none_of(filters.begin(), filters.end(), [&](const std::string& filter) {
-      return one.name.find(filter) != std::string::npos;
-    });
-  });
-  if (most > 0 && most < cases.size()) {
-    std::vector<Case> some;
-    for (std::size_t i = 0; i < most; ++i) some.push_back(cases[i * cases.size() / most]);
-    cases = some;
-  }
+  const std::vector<Case> cases = chosen(choice);
   if (list) {
     for (const Case& one : cases) fmt::print("{}\n", one.name);
     return 0;
   }
   settings.out = fs::absolute(settings.out);
-  // Scores are this program's, answers the other's.
-  settings.program_hash = hash_of_file(settings.program) + hash_of_file("/proc/self/exe");
-  const std::vector<json> results = run_all(cases, settings, jobs);
+  settings.program = fs::absolute(settings.program);
+  settings.program_hash = hash_of_file(settings.program);
+  settings.own_hash = hash_of_file("/proc/self/exe");
+  std::vector<std::string> words{"--jobs", fmt::format("{}", jobs)};
+  if (slurm) words = {"--slurm", "--slurm-args", slurm_args};
+  const std::vector<json> results = run_all(cases, settings, jobs, words);
 
   const std::string command =
       fmt::format("campaign {}", fmt::join(std::vector<std::string>(argv + 1, argv + argc), " "));
@@ -187,7 +209,7 @@ int run(int argc, char** argv) {
   }
   fmt::print("{}\n", (settings.out / "campaign.md").string());
   if (!check) return 0;
-  const auto wrong = drawn > 0 ? drawn_complaints(results) : complaints(results);
+  const auto wrong = choice.drawn > 0 ? drawn_complaints(results) : complaints(results);
   for (const std::string& line : wrong) fmt::print("{}\n", line);
   return wrong.empty() ? 0 : 1;
 }

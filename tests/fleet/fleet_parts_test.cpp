@@ -2,11 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
 #include "host_tools/fleet/file_hashes.hpp"
 #include "host_tools/fleet/fleet_file.hpp"
+#include "host_tools/fleet/inputs.hpp"
+#include "host_tools/fleet/robot_folder.hpp"
+#include "host_tools/fleet/run.hpp"
+#include "host_tools/fleet/slurm.hpp"
 #include "host_tools/fleet/summary.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
@@ -52,7 +57,7 @@ TEST(FalseDiscovery, IsThatOfThePapersExample) {
   const auto found = benjamini_hochberg(p, 0.05);
   EXPECT_EQ(found.hypotheses, 15u);
   EXPECT_EQ(found.discoveries, 4u);
-  EXPECT_NEAR(found.log10_threshold, std::log10(0.0095), 1e-12);
+  EXPECT_NEAR(found.log10_threshold, std::log10(0.05 * 4 / 15), 1e-12);
 }
 
 TEST(FalseDiscovery, OfNothingIsNothing) {
@@ -145,6 +150,139 @@ TEST_F(FleetFile, ATableSaysMoreOfARobotThatThePatternFound) {
   EXPECT_NE(found.members[0].overrides.find("max_effects = 1"), std::string::npos);
 }
 
+// "*.toml" beside the robots finds the fleet file, too.
+TEST_F(FleetFile, IsNoRobotOfItself) {
+  write("a.toml", "");
+  const auto found = read("projects = \"*.toml\"");
+  ASSERT_EQ(found.members.size(), 1u);
+  EXPECT_EQ(found.members[0].id, "a");
+}
+
+TEST_F(FleetFile, PathsMayStartWithAVariableOrTheHomeFolder) {
+  write("cells/a.toml", "");
+  const char* const home = std::getenv("HOME");
+  const std::string before = home == nullptr ? folder_.path().string() : home;
+  ::setenv("HOME", folder_.path().c_str(), 1);
+  ::setenv("FXDYN_TEST_CELLS", (folder_.path() / "cells").c_str(), 1);
+  EXPECT_EQ(read("projects = \"~/cells/*.toml\"").members.size(), 1u);
+  EXPECT_EQ(read("projects = \"${FXDYN_TEST_CELLS}/*.toml\"").members.size(), 1u);
+  ::unsetenv("FXDYN_TEST_CELLS");
+  ::setenv("HOME", before.c_str(), 1);
+  EXPECT_NE(complaint("projects = \"${FXDYN_TEST_CELLS}/*.toml\"").find("FXDYN_TEST_CELLS is not set"),
+            std::string::npos);
+}
+
+constexpr const char* pendulum =
+    "<robot name=\"pendulum\"><link name=\"base\"/><link name=\"arm\"/>"
+    "<joint name=\"hinge\" type=\"continuous\"><parent link=\"base\"/><child link=\"arm\"/>"
+    "<axis xyz=\"0 1 0\"/></joint></robot>";
+
+class FleetInputs : public FleetFile {
+ protected:
+  fleet::Inputs inputs(const std::string& project, const std::string& more = "") const {
+    write("robot.urdf", pendulum);
+    write("a.toml", "[robot]\nurdf = \"robot.urdf\"\n" + project);
+    const auto found = read("[[robot]]\nid = \"a\"\nproject = \"a.toml\"\n" + more);
+    return fleet::inputs_of(found, found.members.front(), folder_.path() / "out");
+  }
+};
+
+TEST_F(FleetInputs, ARecordingMayBeAFolder) {
+  const std::string project = "[[log]]\nfile = \"bag\"\nrole = \"train\"\n";
+  write("bag/metadata.yaml", "a");
+  write("bag/bag_0.db3", "b");
+  const std::string first = inputs(project).hash;
+  EXPECT_EQ(inputs(project).hash, first);
+  write("bag/bag_0.db3", "c");
+  const std::string second = inputs(project).hash;
+  EXPECT_NE(second, first);
+  write("bag/bag_1.db3", "");
+  EXPECT_NE(inputs(project).hash, second);
+}
+
+// A project that is written anew elsewhere names the same files.
+TEST_F(FleetInputs, OverridesLeaveTheLogsWhereTheyAre) {
+  write("logs/run.csv", "t,q1,tau1\n");
+  ::setenv("FXDYN_TEST_LOGS", (folder_.path() / "logs").c_str(), 1);
+  const auto made = inputs("[[log]]\nfile = \"${FXDYN_TEST_LOGS}/run.csv\"\nrole = \"train\"\n",
+                           "overrides = { diagnose = { max_effects = 1 } }");
+  ::unsetenv("FXDYN_TEST_LOGS");
+  const std::string text = read_file(made.project);
+  EXPECT_NE(text.find((folder_.path() / "logs/run.csv").string()), std::string::npos) << text;
+}
+
+// The program of those effects reads it; this one only asks whether it has changed.
+TEST_F(FleetInputs, AProjectMayNeedAnotherProgramsEffects) {
+  write("run.csv", "t,q1,tau1\n");
+  const std::string project = "[[log]]\nfile = \"run.csv\"\nrole = \"train\"\n[effects]\nlibrary = \"of_others\"\n";
+  const std::string first = inputs(project).hash;
+  write("run.csv", "t,q1,tau1\n0,0,0\n");
+  EXPECT_NE(inputs(project).hash, first);
+}
+
+// A joint passes by its strongest effect. What else was found there is not chance because it is weaker than that.
+TEST_F(FleetFile, AWeakerEffectOfTheSameJointIsADiscoveryToo) {
+  write("a.toml", "");
+  const auto found = read("projects = \"a.toml\"");
+  fleet::RobotState state;
+  state.verdict = Verdict::explained;
+  state.baseline = true;
+  state.joints = {{"hinge",
+                   "N*m",
+                   Verdict::explained,
+                   {},
+                   {{"presliding", true, 2000, {}}, {"ripple", true, 20, {}}, {"spring", false, 1.3, {}}},
+                   {}}};
+  fleet::RobotFolder(folder_.path() / "out", "a").finish(state, 1);
+  const fleet::Summary summary = fleet::summarise(found, folder_.path() / "out");
+  EXPECT_EQ(summary.false_discovery.discoveries, 1u);  // of the joint and the robot as a whole
+  EXPECT_NEAR(summary.false_discovery.log10_threshold, std::log10(0.05 / 2), 1e-12);
+  const auto& findings = summary.robots.front().findings;
+  ASSERT_EQ(findings.size(), 3u);
+  EXPECT_TRUE(findings[0].discovered);
+  EXPECT_TRUE(findings[1].discovered);
+  EXPECT_FALSE(findings[2].discovered);  // twice 10^-1.3 is more than 0.025
+}
+
+TEST_F(FleetFile, WhatIsAtWorkIsToldWhileNothingEnds) {
+  write("a.toml", "");
+  write("slow.sh", "#!/bin/sh\necho reading logs\nsleep 1\nexit 3\n");
+  std::filesystem::permissions(folder_.path() / "slow.sh", std::filesystem::perms::owner_all);
+  const auto found = read("projects = \"a.toml\"");
+  testing::internal::CaptureStderr();
+  fleet::run_tasks(found, {{&found.members.front(), found.members.front().project, "hash"}}, folder_.path() / "out",
+                   {folder_.path() / "slow.sh", 1, 0.2});
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_NE(said.find("[0/1] at work: a for "), std::string::npos) << said;
+  EXPECT_NE(said.find(" s (reading logs)\n"), std::string::npos) << said;
+  EXPECT_NE(said.find("a: failed: reading logs\n"), std::string::npos) << said;
+}
+
+// A queue may hold a job for hours, and a node that is drained for ever.
+TEST_F(FleetFile, WhatTheQueueSaysIsToldWhileNothingEnds) {
+  write("a.toml", "");
+  write("state/jobs", "");
+  const auto found = read("projects = \"a.toml\"");
+  const std::string path = std::getenv("PATH");
+  ::setenv("PATH", (FXDYN_SOURCE_DIR "/tests/fleet/fake_slurm:" + path).c_str(), 1);
+  ::setenv("FAKE_SLURM", (folder_.path() / "state").c_str(), 1);
+  ::setenv("FAKE_SLURM_ELSEWHERE", "1", 1);
+  ::setenv("FAKE_SLURM_PENDS", "2", 1);
+  fleet::SlurmOptions options;
+  options.chunk_size = 1;
+  options.look_s = options.ask_s = options.settle_s = 0.1;
+  options.tell_s = 0.2;
+  options.useless_rounds = 1;
+  testing::internal::CaptureStderr();
+  EXPECT_THROW(fleet::run_on_slurm(found, {{&found.members.front(), found.members.front().project, "hash"}},
+                                   folder_.path() / "out", {"/bin/true", 1}, options),
+               DataError);
+  const std::string said = testing::internal::GetCapturedStderr();
+  for (const char* name : {"FAKE_SLURM", "FAKE_SLURM_ELSEWHERE", "FAKE_SLURM_PENDS"}) ::unsetenv(name);
+  ::setenv("PATH", path.c_str(), 1);
+  EXPECT_NE(said.find("[0/1] job 1: 1 PENDING Resources\n"), std::string::npos) << said;
+}
+
 TEST_F(FleetFile, SaysWhatIsWrongAndWhere) {
   write("x/a.toml", "");
   write("y/a.toml", "");
@@ -159,6 +297,7 @@ TEST_F(FleetFile, SaysWhatIsWrongAndWhere) {
   said("projects = \"z/*.toml\"", "paths are relative to the fleet file");
   said("project = \"x/*.toml\"", "nearest is 'projects'");
   said("projects = \"?/*.toml\"", "two robots have the id 'a'");
+  said("[robot]\nurdf = \"a.urdf\"", "is this the project of a robot?");
   said("[[robot]]\nid = \"a/b\"\nproject = \"x/a.toml\"", "letters, digits");
   said("[[robot]]\nproject = \"x/a.toml\"", "key 'id' is missing");
   said("[[robot]]\nid = \"a\"", "key 'project' is missing");

@@ -128,13 +128,13 @@ class Fleets(unittest.TestCase):
         self.assertEqual(drifting, {robot: {kind} for robot, kind in kinds.items()})
 
     def test_a_robot_that_fails_costs_nobody_else(self):
-        self.robots("a", "b", "slow", "memory", "silent", "crash", "nothing")
+        self.robots("a", "b", "slow", "memory", "silent", "crash", "nothing", "other")
         self.fleet('projects = "*.robot"\n[limits]\ntime_s = 1.5\nmemory_mb = 500\n')
         started = time.monotonic()
         self.complains(self.fake("--jobs", 3), 1, "robots failed")
         self.assertLess(time.monotonic() - started, 30)
         expected = {"slow": "took longer than 1.5 s", "memory": "MemoryError", "silent": "exit code 3",
-                    "crash": "signal 11", "nothing": "did not write it"}
+                    "crash": "signal 11", "nothing": "did not write it", "other": "model.json: not as fxdyn writes it"}
         for robot in self.result()["robots"]:
             if robot["id"] in expected:
                 self.assertIn(expected[robot["id"]], robot["error"])
@@ -142,7 +142,7 @@ class Fleets(unittest.TestCase):
             else:
                 self.assertIsNone(robot["error"])
         self.assertEqual(subprocess.run(["pgrep", "-f", str(self.folder)], capture_output=True).stdout, b"")
-        self.assertIn("5 of 7 robots to do", self.fake().stderr)
+        self.assertIn("6 of 8 robots to do", self.fake().stderr)
 
     def interrupted(self, number, after_s):
         """Whether it was still at work when the signal came."""

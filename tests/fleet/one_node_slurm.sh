@@ -43,16 +43,22 @@ cat >"$dir/controller" <<SH
 "$root/usr/sbin/slurmctld-wlm" -D >>"$dir/controller.txt" 2>&1 &
 echo \$! >"$dir/controller.pid"
 SH
+export PATH=$root/usr/bin:$PATH SLURM_TEST_CONTROLLER=$dir/controller
 chmod +x "$dir/controller"
 "$dir/controller"
 "$root/usr/sbin/slurmd-wlm" -D -d "$root/usr/sbin/slurmstepd-wlm" >"$dir/slurmd.txt" 2>&1 &
 node=$!
+# A controller that has lost its last seconds finds jobs on the node that it does not know, and drains it. An administrator
+# takes it back.
+while sleep 2; do
+  ! sinfo -h -o %T 2>/dev/null | grep -q '^drain' || scontrol update NodeName="$(hostname -s)" State=RESUME || true
+done >"$dir/administrator.txt" 2>&1 &
+administrator=$!
 finish() {
-  kill -9 $node "$(cat "$dir/controller.pid")" 2>/dev/null
+  kill -9 $administrator $node "$(cat "$dir/controller.pid")" 2>/dev/null || true
   while kill -0 $node || kill -0 "$(cat "$dir/controller.pid")"; do sleep 0.1; done 2>/dev/null
 }
 trap finish EXIT
-export PATH=$root/usr/bin:$PATH SLURM_TEST_CONTROLLER=$dir/controller
 for _ in $(seq 100); do
   sinfo -h -o %t 2>/dev/null | grep -qx idle && ready=1 && break
   sleep 0.3
