@@ -177,10 +177,10 @@ std::vector<CheckFinding> check_one_log(const Project& project, const TorqueSamp
   if (!disagrees(project.robot, train, samples, options)) return out;
   std::vector<CheckFinding> found = check_columns(alone, logs, options, &train);
   std::erase_if(found, [](const CheckFinding& finding) { return !finding.error; });
-  if (found.empty()) found = what_makes_it_agree(alone, train, samples, signals_in(logs), options);
+  // What changed since the healthy session, such as a gain or a zero, is for the diagnosis to find.
+  if (found.empty() && role != Role::baseline)
+    found = what_makes_it_agree(alone, train, samples, signals_in(logs), options);
   for (CheckFinding& finding : found) {
-    // A gain that was another one in the healthy session is for the diagnosis to find.
-    if (!finding.error && role == Role::baseline) continue;
     finding.log = name;
     out.push_back(std::move(finding));
   }
