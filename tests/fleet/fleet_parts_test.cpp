@@ -77,7 +77,7 @@ TEST(FileHashes, RemembersWhatNobodyTouched) {
   const auto write = [&](const std::string& text) { std::ofstream(file) << text; };
   const auto hash = [&] {
     fleet::FileHashes hashes(memory);
-    const std::string out = hashes.of(file);
+    std::string out = hashes.of(file);
     hashes.keep();
     return out;
   };
@@ -263,7 +263,8 @@ TEST_F(FleetFile, WhatTheQueueSaysIsToldWhileNothingEnds) {
   write("a.toml", "");
   write("state/jobs", "");
   const auto found = read("projects = \"a.toml\"");
-  const std::string path = std::getenv("PATH");
+  const char* const found_path = std::getenv("PATH");
+  const std::string path = found_path == nullptr ? "" : found_path;
   ::setenv("PATH", (FXDYN_SOURCE_DIR "/tests/fleet/fake_slurm:" + path).c_str(), 1);
   ::setenv("FAKE_SLURM", (folder_.path() / "state").c_str(), 1);
   ::setenv("FAKE_SLURM_ELSEWHERE", "1", 1);
