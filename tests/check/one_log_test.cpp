@@ -1,38 +1,33 @@
 #include <gtest/gtest.h>
 
-#include <filesystem>
-
 #include "host_tools/check/check.hpp"
 #include "host_tools/project/project.hpp"
 #include "host_tools/simulate/recordings.hpp"
+#include "host_tools/support/temporary_folder.hpp"
 #include "tests/campaign/generate.hpp"
 
 namespace fxdyn {
 namespace {
 
-namespace fs = std::filesystem;
-
 /// A robot of the second campaign: its logs, those of its train role as the fit sees them.
 struct Recordings {
-  fs::path folder = fs::path(testing::TempDir()) / "one_log_test";
+  TemporaryFolder folder;
   Project project;
   GateData gate;
   TorqueSamples train;
 
   explicit Recordings(std::uint64_t seed) {
-    fs::remove_all(folder);
     campaign::Case wanted = campaign::drawn_cases(seed, 1).front();
     wanted.validate = true;
-    campaign::generate(wanted, folder / "data", folder / "truth");
-    project = read_project(folder / "data" / "project.toml");
-    gate = read_gate_data(project, folder / "data");
+    campaign::generate(wanted, folder.path() / "data", folder.path() / "truth");
+    project = read_project(folder.path() / "data" / "project.toml");
+    gate = read_gate_data(project, folder.path() / "data");
     std::vector<ProcessedLog> logs = gate.logs;
     std::erase_if(logs, [](const ProcessedLog& log) { return log.role != Role::train; });
     train = sample_torque(logs, ArrangementOptions{}.samples);
   }
-  ~Recordings() { fs::remove_all(folder); }
 
-  std::vector<Log> judging() const { return read_logs(project, Role::validate, folder / "data"); }
+  std::vector<Log> judging() const { return read_logs(project, Role::validate, folder.path() / "data"); }
   std::vector<CheckFinding> check(Log log) const { return check_one_log(project, train, std::move(log), gate.filter); }
 };
 
