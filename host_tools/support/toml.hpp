@@ -23,11 +23,11 @@ namespace fxdyn::toml_input {
 
 using Names = std::vector<std::string>;
 
-/// What was named in place of a TOML file, as far as its first line shows; else empty.
+/// What was named in place of a TOML file, as far as its first line that is no comment shows; else empty.
 inline std::string other_file(const std::filesystem::path& file) {
   std::string line;
   std::ifstream in(file);
-  std::getline(in, line);
+  while (std::getline(in, line) && (line.empty() || line.starts_with('#'))) continue;
   if (line.find('<') < 4) return "is XML (a URDF?)";
   if (line.find('\0') != std::string::npos) return "is no text";
   if (line.starts_with('{')) return "is JSON";
