@@ -5,13 +5,13 @@
 #include <numbers>
 
 #include "host_tools/diagnose/deviations.hpp"
-#include "host_tools/diagnose/explore.hpp"
 #include "host_tools/diagnose/refit.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
 
 using Eigen::Index;
+using Eigen::VectorXd;
 
 /// Of chi^2, a factor of ten in likelihood.
 constexpr double variances_per_decade = 2 * std::numbers::ln10;
@@ -67,6 +67,42 @@ void weigh_evidence(Outcome& outcome, const Gate& gate) {
     const double form = group.on_body ? gate.robot_closure[i] : gate.own[i].form;
     const bool holds = group.on_body ? gate.robot_closure[i] >= options.least_closure : gate.believed[i];
     judge(evidence, holds, form, options);
+  }
+}
+
+namespace {
+
+/// Whether the second of two outcomes errs less on what judges: in the mean of the joints, and at none by much more.
+bool errs_less(const VectorXd& before, const VectorXd& after, const GateOptions& options) {
+  double sum = 0;
+  for (Index j = 0; j < before.size(); ++j) {
+    if (is_worse(options, before, after, j)) return false;
+    if (before[j] > 0 && after[j] > 0) sum += std::log(after[j] / before[j]);
+  }
+  return sum < 0;
+}
+
+const Finding* undecided(const Outcome& outcome, const std::vector<EffectId>& tried) {
+  for (const Finding& finding : outcome.found) {
+    if (finding.evidence.undecided && std::find(tried.begin(), tried.end(), finding.id) == tried.end()) return &finding;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+void settle_rivals(Outcome& outcome, Gate& gate, const Retrial& retrial, Progress& progress) {
+  std::vector<EffectId> tried;
+  while (const Finding* finding = undecided(outcome, tried)) {
+    tried.push_back(finding->id);
+    Outcome other = explore_rival(outcome, *finding, retrial.logs, retrial.task, progress);
+    Gate of_other = pass(other, retrial.nominal, retrial.logs, retrial.still);
+    const VectorXd before = judged_error(outcome, retrial.logs, gate);
+    if (!errs_less(before, judged_error(other, retrial.logs, of_other), outcome.models.options.gate)) continue;
+    weigh_evidence(other, of_other);
+    outcome = std::move(other);
+    gate = std::move(of_other);
+    return;  // its findings have other ids: one exchange, not a walk in circles
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "host_tools/diagnose/explore.hpp"
 #include "host_tools/diagnose/gate.hpp"
 #include "host_tools/effects/joint_fit.hpp"
 
@@ -14,6 +15,20 @@ void judge(Evidence& evidence, bool holds, double form, const GateOptions& optio
 
 /// What speaks for each finding, with all of them in the model.
 void weigh_evidence(Outcome& outcome, const Gate& gate);
+
+/// What a model was before the search, and what the search may do.
+struct Retrial {
+  const IdentifiedModel& nominal;
+  const std::vector<SessionLog>& logs;
+  const std::vector<bool>& still;
+  const SearchTask& task;
+};
+
+/// Of a finding and its rival that the odds don't tell apart, the rival is tried in its place, with all that is fitted
+/// and searched around it: odds are of fits that are linear around the finding, whose other parameters suit it. The one
+/// whose model errs less on what judges stays.
+/// @param outcome, gate with evidence; what they become has it too
+void settle_rivals(Outcome& outcome, Gate& gate, const Retrial& retrial, Progress& progress);
 
 /// An effect that is not sure enough for the model.
 struct Likely {

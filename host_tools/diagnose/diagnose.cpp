@@ -90,15 +90,15 @@ class Diagnoser {
          {static_cast<const std::vector<ProcessedLog>*>(&data_.logs), &baseline_, &test_}) {
       for (const ProcessedLog& log : *logs) models_.smallest_step_s = std::min(models_.smallest_step_s, log.step_s);
     }
-    settings_.max_effects = static_cast<std::size_t>(project_.diagnose.max_effects);
+    task_.settings.max_effects = static_cast<std::size_t>(project_.diagnose.max_effects);
     // Few things change at once; a robot of which nothing is known may lack more.
     // A change beside a baseline is something or other; without one every joint may lack all that it is asked for.
-    settings_.most = 4 + joints() * (models_.has_baseline ? 1 : settings_.max_effects);
+    task_.settings.most = 4 + joints() * (models_.has_baseline ? 1 : task_.settings.max_effects);
     logs_ = sessions(data_.logs, baseline_, session_, options.session);
     for (std::size_t j = 0; j < joints(); ++j) {
       if (!still_[j]) continue;
       for (const std::string_view effect : joint_effect_names()) {
-        if (!find_effect(effect)->curve) never_.push_back({std::string(effect), j, {}});
+        if (!find_effect(effect)->curve) task_.never.push_back({std::string(effect), j, {}});
       }
     }
   }
@@ -141,11 +141,12 @@ class Diagnoser {
     add_deviations(before, Linearised(before, logs_));
     result.nominal = before.current;
 
-    Outcome outcome = explore(models_, logs_, settings_, never_, 2, progress_);
+    Outcome outcome = explore(models_, logs_, task_, 2, progress_);
     refuse_faulty_recordings(start, outcome);
     Gate gate = pass(outcome, models_.current, logs_, still_);
     if (refit_links(outcome)) gate = pass(outcome, models_.current, logs_, still_);
     weigh_evidence(outcome, gate);
+    settle_rivals(outcome, gate, {models_.current, logs_, still_, task_}, progress_);
     const std::vector<Likely> likely = set_aside(outcome, gate, logs_, still_);
     result.nominal = finished(result.nominal);
     const IdentifiedModel judged_against = deflections_.found.empty() ? result.nominal : finished(models_.current);
@@ -215,7 +216,7 @@ class Diagnoser {
   /// The model has the curves that are told of, where validate logs confirm each: beyond the motion that fitted it, a
   /// curve is a guess.
   void take_curves(const Outcome& outcome, Diagnosis& result) const {
-    if (settings_.max_effects == 0) return;  // the BLS is to learn what is left
+    if (task_.settings.max_effects == 0) return;  // the BLS is to learn what is left
     std::vector<JointDiagnosis>& told = result.report.joints;
     std::vector<bool> without = still_;
     for (std::size_t j = 0; j < joints(); ++j) without[j] = without[j] || !told[j].curve;
@@ -309,7 +310,7 @@ class Diagnoser {
                                        [&](const ProcessedLog& log) { return linked(log) && log.has_link[j]; });
       if (!encoded && !judged[j]) continue;
       for (const EffectInfo& info : effect_infos()) {
-        if (info.acts_on == ActsOn::position) never_.push_back({std::string(info.name), j, {}});
+        if (info.acts_on == ActsOn::position) task_.never.push_back({std::string(info.name), j, {}});
       }
     }
   }
@@ -412,8 +413,8 @@ class Diagnoser {
     background.models = alone;
     background.look_again(before);
     // All that has a form: what stays is taken out of today's logs without one.
-    SearchSettings modest = settings_;
-    modest.most = std::max<std::size_t>(2, joints() * settings_.max_effects);
+    SearchSettings modest = task_.settings;
+    modest.most = std::max<std::size_t>(2, joints() * task_.settings.max_effects);
     bool structured = background.structured();
     if (!structured) {
       // Ripple is finer than the functions that the test knows.
@@ -422,7 +423,7 @@ class Diagnoser {
       structured = !ripples_only.run({}, progress_).groups.empty();
     }
     if (structured) {
-      background = explore(alone, before, modest, never_, 2, progress_);
+      background = explore(alone, before, {modest, task_.never}, 2, progress_);
       alone = background.models;
       for (std::size_t j = 0; j < joints(); ++j) {
         for (EffectFit& fit : alone.current.joints[j].effects) {
@@ -458,10 +459,9 @@ class Diagnoser {
   Progress& progress_;
   const FinishModel& finish_;
   Models models_;
-  SearchSettings settings_;
+  SearchTask task_;
   std::optional<Session> session_;
   std::vector<SessionLog> logs_;
-  std::vector<EffectCandidate> never_;
   Deflections deflections_;
   std::vector<DeflectionEffect> bent_already_;
   std::vector<std::string> notes_;

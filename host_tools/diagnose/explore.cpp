@@ -63,44 +63,20 @@ std::vector<EffectCandidate> friction_of_background(const Models& models) {
   return out;
 }
 
-}  // namespace
-
-bool Outcome::structured() const {
-  return std::any_of(lack.begin(), lack.end(),
-                     [&](const LackOfFit& l) { return l.structured(models.options.lack_of_fit); });
-}
-
-bool Outcome::structured(std::size_t joint) const { return lack[joint].structured(models.options.lack_of_fit); }
-
-void Outcome::look_again(const std::vector<SessionLog>& logs) {
-  problem = std::make_unique<Linearised>(models, logs, whitening);
-  whitening = problem->noise().whitening();
-  features.resize(problem->joints());
-  lack.resize(problem->joints());
-  const std::vector<Index> columns = problem->columns_of(in_model(*problem));
-  const LinearFit fit = problem->solver().solve(columns);
-  std::optional<LinearFit> alone;
-  if (models.has_baseline) alone = problem->solver().solve(columns, problem->blocks().fit_of(true));
-  parallel_for(problem->joints(), [&](std::size_t j) {
-    features[j] = diagnosis::features(*problem, j, models.has_baseline);
-    lack[j] = lack_of_fit(*problem, j, fit, alone ? &*alone : nullptr, features[j]);
-  });
-}
-
-Outcome explore(Models models, const std::vector<SessionLog>& logs, const SearchSettings& settings,
-                const std::vector<EffectCandidate>& never, int passes, Progress& progress) {
+/// @param passes the first one and the one after the last: the first of all also says what can't be seen
+Outcome explore_passes(Models models, std::vector<VectorXd> whitening, const std::vector<SessionLog>& logs,
+                       const SearchTask& task, std::pair<int, int> passes, Progress& progress) {
   Outcome out;
-  std::vector<VectorXd> whitening = colours(models, logs);
-  for (int pass = 0; pass < passes; ++pass) {
+  for (int pass = passes.first; pass < passes.second; ++pass) {
     progress.stage(pass == 0 ? "looking for what is missing" : "looking again, around what was found", 8);
     Linearised problem(models, logs, whitening);
-    std::vector<EffectCandidate> skip = never;
+    std::vector<EffectCandidate> skip = task.never;
     for (const std::size_t g : in_model(problem)) skip.push_back(problem.groups()[g].candidate);
     std::erase_if(skip, [](const EffectCandidate& c) { return find_effect(c.effect)->several; });
     for (const EffectCandidate& has : friction_of_background(models)) skip.push_back(has);
     problem.add_all(dictionary(problem, skip));
     progress.step();
-    Search search(problem, settings);
+    Search search(problem, task.settings);
     const std::vector<std::size_t> start = in_model(problem);
     Choice choice = search.unite(search.run(start, progress));
     if (pass == 0) out.not_identifiable = blind_spots(problem, search);
@@ -141,6 +117,51 @@ Outcome explore(Models models, const std::vector<SessionLog>& logs, const Search
     out.look_again(logs);
     if (!changed || (!out.structured() && out.found.size() < 2)) break;
   }
+  return out;
+}
+
+}  // namespace
+
+bool Outcome::structured() const {
+  return std::any_of(lack.begin(), lack.end(),
+                     [&](const LackOfFit& l) { return l.structured(models.options.lack_of_fit); });
+}
+
+bool Outcome::structured(std::size_t joint) const { return lack[joint].structured(models.options.lack_of_fit); }
+
+void Outcome::look_again(const std::vector<SessionLog>& logs) {
+  problem = std::make_unique<Linearised>(models, logs, whitening);
+  whitening = problem->noise().whitening();
+  features.resize(problem->joints());
+  lack.resize(problem->joints());
+  const std::vector<Index> columns = problem->columns_of(in_model(*problem));
+  const LinearFit fit = problem->solver().solve(columns);
+  std::optional<LinearFit> alone;
+  if (models.has_baseline) alone = problem->solver().solve(columns, problem->blocks().fit_of(true));
+  parallel_for(problem->joints(), [&](std::size_t j) {
+    features[j] = diagnosis::features(*problem, j, models.has_baseline);
+    lack[j] = lack_of_fit(*problem, j, fit, alone ? &*alone : nullptr, features[j]);
+  });
+}
+
+Outcome explore(Models models, const std::vector<SessionLog>& logs, const SearchTask& task, int passes,
+                Progress& progress) {
+  std::vector<VectorXd> whitening = colours(models, logs);
+  return explore_passes(std::move(models), std::move(whitening), logs, task, {0, passes}, progress);
+}
+
+Outcome explore_rival(const Outcome& outcome, const Finding& finding, const std::vector<SessionLog>& logs,
+                      const SearchTask& task, Progress& progress) {
+  Models models = outcome.models;
+  std::vector<EffectId> others;
+  for (const Finding& found : outcome.found) {
+    if (!(found.id == finding.id)) others.push_back(found.id);
+  }
+  take_back(models, others, finding.id);
+  name(models, finding.rival->group, finding.rival->coefficients);
+  refit(models, logs, outcome.whitening, 8);
+  Outcome out = explore_passes(std::move(models), outcome.whitening, logs, task, {1, 2}, progress);
+  out.not_identifiable = outcome.not_identifiable;
   return out;
 }
 

@@ -27,9 +27,18 @@ struct Outcome {
   void look_again(const std::vector<SessionLog>& logs);
 };
 
+/// What a search is asked for.
+struct SearchTask {
+  SearchSettings settings;
+  std::vector<EffectCandidate> never;  ///< effects that are not tried
+};
+
 /// Search, name, fit again around what was named; again where that left structure or found several effects.
 /// @param passes at most
-Outcome explore(Models models, const std::vector<SessionLog>& logs, const SearchSettings& settings,
-                const std::vector<EffectCandidate>& never, int passes, Progress& progress);
+Outcome explore(Models models, const std::vector<SessionLog>& logs, const SearchTask& task, int passes,
+                Progress& progress);
+/// One such pass around an outcome in which the rival of a finding is in that finding's place.
+Outcome explore_rival(const Outcome& outcome, const Finding& finding, const std::vector<SessionLog>& logs,
+                      const SearchTask& task, Progress& progress);
 
 }  // namespace fxdyn::diagnosis

@@ -421,6 +421,11 @@ std::optional<EffectId> harmful_finding(const Outcome& outcome, const Identified
   return {};
 }
 
+VectorXd judged_error(const Outcome& outcome, const std::vector<SessionLog>& logs, const Gate& gate) {
+  const VectorXd validated = plain_error(outcome.models.current, logs);
+  return validated.size() > 0 ? validated : judged_plainly(outcome, logs, gate).after;
+}
+
 void take_out(Outcome& outcome, const EffectId& gone, const std::vector<SessionLog>& logs) {
   std::erase_if(outcome.found, [&](const Finding& f) { return f.id == gone; });
   std::vector<EffectId> ids;

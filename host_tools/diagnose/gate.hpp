@@ -57,6 +57,9 @@ Gate judge_again(const Outcome& outcome, const std::vector<SessionLog>& logs, co
 
 /// Mean squares of the filtered error on the logs that judge, by joint; empty: there are none.
 Eigen::VectorXd plain_error(const IdentifiedModel& model, const std::vector<SessionLog>& logs);
+/// Mean squares of the filtered error, or sums of them, on what judged: plain_error(), and where there are no such logs
+/// that of train logs that judge one another.
+Eigen::VectorXd judged_error(const Outcome& outcome, const std::vector<SessionLog>& logs, const Gate& gate);
 /// Whether a joint's error is larger than before by more than a name may raise it. @param before, after plain_error()
 bool is_worse(const GateOptions& options, const Eigen::VectorXd& before, const Eigen::VectorXd& after,
               Eigen::Index joint);

@@ -482,8 +482,10 @@ std::vector<Found> Search::explain(const Choice& choice, std::optional<Choice>& 
         least = gain;
         better = instead;
       }
-      if (!found.rival || gain < found.rival->gain)
-        found.rival = Rival{problem_.groups()[groups.back()].candidate, gain};
+      if (!found.rival || gain < found.rival->gain) {
+        const Group& rival = problem_.groups()[groups.back()];
+        found.rival = Rival{rival, instead.fit.x.tail(rival.count), gain};
+      }
     }
     std::sort(found.alternatives.begin(), found.alternatives.end(),
               [](const Alternative& a, const Alternative& b) { return a.behind < b.behind; });

@@ -34,7 +34,8 @@ struct Alternative {
 
 /// The effect that comes nearest to a chosen one.
 struct Rival {
-  EffectCandidate candidate;
+  Group group;
+  Eigen::VectorXd coefficients;  ///< beside the rest of the set
   /// What the set with the chosen one is better by on data that fitted neither [noise variances], and by the penalty of
   /// the rival's further parameters: no data refute what has the chosen one as a special case.
   double gain = 0;

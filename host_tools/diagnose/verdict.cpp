@@ -141,7 +141,7 @@ class ReportWriter {
     out.established = finding.evidence.certainty == Certainty::established;
     out.odds_nothing = finding.evidence.against_nothing;
     out.odds_rival = finding.evidence.against_rival;
-    if (finding.rival) out.rival = finding.rival->candidate.effect;
+    if (finding.rival) out.rival = finding.rival->group.candidate.effect;
     return out;
   }
 
@@ -154,7 +154,7 @@ class ReportWriter {
 
   /// An effect and its rival, of which one is there.
   std::vector<std::string> undecided(const EffectFit& fit, const Finding& finding) {
-    const EffectCandidate& rival = finding.rival->candidate;
+    const EffectCandidate& rival = finding.rival->group.candidate;
     advise_between(fit.effect, finding.id, rival);
     const bool on_body = find_effect(rival.effect)->acts_on == ActsOn::body;
     const bool elsewhere = !on_body && (finding.id.body || rival.joint != finding.id.joint);
