@@ -72,11 +72,11 @@ void weigh_evidence(Outcome& outcome, const Gate& gate) {
 
 namespace {
 
-/// Whether the second of two outcomes errs less on what judges: in the mean of the joints, and at none by much more.
-bool errs_less(const VectorXd& before, const VectorXd& after, const GateOptions& options) {
+/// Whether the second of two outcomes errs less on what judges, in the geometric mean of the joints. pass() has seen to
+/// it that neither harms one.
+bool errs_less(const VectorXd& before, const VectorXd& after) {
   double sum = 0;
   for (Index j = 0; j < before.size(); ++j) {
-    if (is_worse(options, before, after, j)) return false;
     if (before[j] > 0 && after[j] > 0) sum += std::log(after[j] / before[j]);
   }
   return sum < 0;
@@ -98,7 +98,7 @@ void settle_rivals(Outcome& outcome, Gate& gate, const Retrial& retrial, Progres
     Outcome other = explore_rival(outcome, *finding, retrial.logs, retrial.task, progress);
     Gate of_other = pass(other, retrial.nominal, retrial.logs, retrial.still);
     const VectorXd before = judged_error(outcome, retrial.logs, gate);
-    if (!errs_less(before, judged_error(other, retrial.logs, of_other), outcome.models.options.gate)) continue;
+    if (!errs_less(before, judged_error(other, retrial.logs, of_other))) continue;
     weigh_evidence(other, of_other);
     outcome = std::move(other);
     gate = std::move(of_other);

@@ -59,36 +59,52 @@ class Firmware {
   std::optional<Formats> unloaded_;
 };
 
-/// Setpoints outside of the limits that the tables hold: the firmware clamps them, and its torque is that of another
-/// motion.
-std::vector<std::string> clamped(const IdentifiedModel& model, const std::vector<const ProcessedLog*>& logs) {
-  // Of the samples. Beyond a position limit gravity is another's; single spikes of derivatives are not worth a word.
-  constexpr double worth_a_word[] = {0, 1e-3, 1e-3};
-  std::vector<std::string> out;
-  for (std::size_t j = 0; j < model.joints.size(); ++j) {
-    const JointFit& joint = model.joints[j];
-    const auto k = static_cast<Index>(j);
-    Index beyond[3] = {0, 0, 0}, all = 0;
-    for (const ProcessedLog* log : logs) {
-      const MotionRows motion = log->motion(log->first, log->last - log->first);
+/// Samples outside of the limits that the tables hold. Of a setpoint there the firmware's torque is that of another
+/// motion; a torque there it cuts off.
+class Clamped {
+ public:
+  explicit Clamped(const IdentifiedModel& model)
+      : model_(model), beyond_(Eigen::MatrixXd::Zero(static_cast<Index>(model.joints.size()), 4)) {}
+
+  /// @param torque of the model, samples x joints [N*m | N]
+  void add(const ProcessedLog& log, const Eigen::MatrixXd& torque) {
+    const Index count = log.last - log.first;
+    const MotionRows motion = log.motion(log.first, count);
+    for (Index k = 0; k < beyond_.rows(); ++k) {
+      const JointFit& joint = model_.joints[static_cast<std::size_t>(k)];
       const auto q = motion.q.col(k).array();
-      beyond[0] += (q < joint.q_lower || q > joint.q_upper).count();
-      beyond[1] += (motion.dq.col(k).array().abs() > joint.dq_limit).count();
-      beyond[2] += (motion.ddq.col(k).array().abs() > joint.ddq_limit).count();
-      all += q.size();
+      const auto outside = [](const auto& values, double limit) { return (values.abs() > limit).count(); };
+      const Index found[] = {(q < joint.q_lower || q > joint.q_upper).count(),
+                             outside(motion.dq.col(k).array(), joint.dq_limit),
+                             outside(motion.ddq.col(k).array(), joint.ddq_limit),
+                             outside(torque.col(k).segment(log.first, count).array(), joint.tau_limit)};
+      for (Index i = 0; i < 4; ++i) beyond_(k, i) += static_cast<double>(found[i]);
     }
-    const char* const names[] = {"position", "velocity", "acceleration"};
-    for (int i = 0; i < 3; ++i) {
-      const double share = static_cast<double>(beyond[i]) / static_cast<double>(std::max<Index>(all, 1));
-      if (share == 0 || share < worth_a_word[i]) continue;
-      out.push_back(
-          fmt::format("{}: {:.2g} % of the held-out samples are beyond its {} limit, where the firmware clamps; "
-                      "[limits] sets wider ones",
-                      model.robot.joints[j].name, 100 * share, names[i]));
-    }
+    samples_ += static_cast<double>(count);
   }
-  return out;
-}
+  std::vector<std::string> notes() const {
+    // Of the samples. Beyond a position limit gravity is another's; single spikes of derivatives are not worth a word.
+    constexpr double worth_a_word[] = {0, 1e-3, 1e-3, 1e-3};
+    const char* const names[] = {"position", "velocity", "acceleration", "torque"};
+    std::vector<std::string> out;
+    for (Index k = 0; k < beyond_.rows(); ++k) {
+      for (Index i = 0; i < 4; ++i) {
+        const double share = beyond_(k, i) / std::max(samples_, 1.0);
+        if (share == 0 || share < worth_a_word[i]) continue;
+        out.push_back(
+            fmt::format("{}: {:.2g} % of the held-out samples are beyond its {} limit, where the firmware clamps; "
+                        "[limits] sets wider ones",
+                        model_.robot.joints[static_cast<std::size_t>(k)].name, 100 * share, names[i]));
+      }
+    }
+    return out;
+  }
+
+ private:
+  const IdentifiedModel& model_;
+  Eigen::MatrixXd beyond_;  ///< joints x (position, velocity, acceleration, torque)
+  double samples_ = 0;
+};
 
 }  // namespace
 
@@ -97,6 +113,7 @@ HeldOutEvidence held_out_evidence(const IdentifiedModel& nominal, const Identifi
   HeldOutEvidence out;
   Pooled before, after, fixed, noise;
   Firmware firmware(diagnosed);
+  Clamped clamped(diagnosed);
   std::vector<const ProcessedLog*> judged;
   std::optional<std::string> why_not_fixed;
   for (const ProcessedLog& log : held_out) {
@@ -104,7 +121,9 @@ HeldOutEvidence held_out_evidence(const IdentifiedModel& nominal, const Identifi
     judged.push_back(&log);
     out.held_out.push_back({log.name, log.role, log.from_s, log.to_s});
     before.add(judge(log, predict(nominal, log)), &JointMetrics::rmse, log);
-    const auto with_effects = judge(log, predict(diagnosed, log));
+    const Eigen::MatrixXd torque = predict(diagnosed, log);
+    clamped.add(log, torque);
+    const auto with_effects = judge(log, torque);
     after.add(with_effects, &JointMetrics::rmse, log);
     noise.add(with_effects, &JointMetrics::noise_floor, log);
     if (why_not_fixed) continue;
@@ -130,7 +149,7 @@ HeldOutEvidence held_out_evidence(const IdentifiedModel& nominal, const Identifi
     out.joints.push_back({diagnosed.robot.joints[j].name, diagnosed.robot.joints[j].torque_unit(), figure(before),
                           figure(after), figure(fixed), figure(noise)});
   }
-  out.fixed_point = {!why_not_fixed, why_not_fixed.value_or(""), clamped(diagnosed, judged)};
+  out.fixed_point = {!why_not_fixed, why_not_fixed.value_or(""), clamped.notes()};
   out.forward = play_forward(nominal, diagnosed, judged);
   if (held_out.front().role == Role::validate)
     out.note = "no test log: the validate logs fitted nothing, but decided which names stay";

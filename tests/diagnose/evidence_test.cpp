@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "host_tools/effects/identified_model.hpp"
 #include "tests/diagnose/arm.hpp"
 
@@ -79,6 +81,22 @@ TEST(Evidence, AModelThatFixedPointCannotHoldIsSaidAndNotFatal) {
   EXPECT_NE(evidence.fixed_point.why_not, "");
   EXPECT_FALSE(evidence.joints.at(0).after_fixed);
   EXPECT_TRUE(evidence.joints.at(0).after);
+}
+
+TEST(Evidence, ATorqueThatTheFirmwareCutsOffIsSaid) {
+  const test::Arm arm("cut_off");
+  const std::vector<ProcessedLog> logs{arm.log(0)};
+  IdentifiedModel truth = arm.truth(logs[0]);
+  truth.joints[0].tau_limit = 1.1 * logs[0].tau.col(0).cwiseAbs().maxCoeff();
+  truth.joints[1].tau_limit = 0.5 * logs[0].tau.col(1).cwiseAbs().maxCoeff();
+  const std::vector<std::string> notes = held_out_evidence(truth, truth, logs).fixed_point.notes;
+  const auto said = [&](const std::string& joint) {
+    return std::any_of(notes.begin(), notes.end(), [&](const std::string& note) {
+      return note.starts_with(joint) && note.find("beyond its torque limit") != std::string::npos;
+    });
+  };
+  EXPECT_FALSE(said("shoulder"));
+  EXPECT_TRUE(said("elbow"));
 }
 
 TEST(Evidence, WithoutAHeldOutLogItSaysSo) {

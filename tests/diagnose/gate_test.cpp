@@ -1,6 +1,7 @@
 // Names on data that fitted no coefficient, and what diagnosis.json says of them.
 
 #include "host_tools/diagnose/gate.hpp"
+#include "host_tools/diagnose/certainty.hpp"
 #include "host_tools/diagnose/explore.hpp"
 
 #include <gtest/gtest.h>
@@ -8,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/diagnose/verdict.hpp"
+#include "host_tools/support/progress.hpp"
 #include "tests/diagnose/small_problem.hpp"
 
 namespace fxdyn::diagnosis {
@@ -153,6 +155,54 @@ TEST_F(NamesAtTheGate, WhatRaisesAJointsErrorGoesEvenIfItPassedBefore) {
   ASSERT_EQ(outcome_.found.size(), 1U);
   EXPECT_EQ(outcome_.found[0].id.joint, 2U);
   EXPECT_EQ(outcome_.models.current.joints[1].find("ripple"), nullptr);
+}
+
+TEST_F(NamesAtTheGate, StayWhereAFitInTheWholeBandCuresAJoint) {
+  auto& effects = outcome_.models.current.joints[1].effects;
+  for (EffectFit& fit : effects) {
+    if (fit.effect == "viscous") fit.linear[0] += 2;  // as whitened rows may have it
+  }
+  outcome_.look_again(logs_);
+  const Eigen::VectorXd before = plain_error(nominal_, logs_);
+  ASSERT_TRUE(is_worse(outcome_.models.options.gate, before, plain_error(outcome_.models.current, logs_), 1));
+  pass(outcome_, nominal_, logs_, still_);
+  ASSERT_EQ(outcome_.found.size(), 1U);
+  EXPECT_NE(outcome_.models.current.joints[1].find("ripple"), nullptr);
+}
+
+/// A finding at joint 2 that its rival comes near to.
+class Rivals : public NamesAtTheGate {
+ protected:
+  void settle(const EffectFit& chosen, const EffectFit& rival) {
+    IdentifiedModel& model = outcome_.models.current;
+    model.joints[2].effects.pop_back();
+    model.joints[1].effects.back() = chosen;
+    outcome_.found.resize(1);
+    Group group;
+    group.candidate = {rival.effect, 1, rival.shape};
+    outcome_.found[0].rival = Rival{group, Eigen::Map<const Eigen::VectorXd>(rival.linear.data(), 2), 5};
+    outcome_.look_again(logs_);
+    Gate gate = judge_again(outcome_, logs_, still_);
+    outcome_.found[0].evidence.undecided = true;
+    Progress progress;
+    settle_rivals(outcome_, gate, {nominal_, logs_, still_, SearchTask{}}, progress);
+  }
+  const EffectFit ripple_ = test::named_effect("ripple", {14}, {0.5, 0.2}),
+                  spring_ = test::named_effect("spring", {}, {0.01, 0});
+};
+
+TEST_F(Rivals, TheOneThatErrsLessTakesThePlace) {
+  settle(spring_, ripple_);
+  ASSERT_EQ(outcome_.found.size(), 1U);
+  EXPECT_NE(outcome_.models.current.joints[1].find("ripple"), nullptr);
+  EXPECT_EQ(outcome_.models.current.joints[1].find("spring"), nullptr);
+  EXPECT_TRUE(outcome_.found[0].evidence.there);
+}
+
+TEST_F(Rivals, TheOneThatErrsMoreDoesNot) {
+  settle(ripple_, spring_);
+  ASSERT_EQ(outcome_.found.size(), 1U);
+  EXPECT_NE(outcome_.models.current.joints[1].find("ripple"), nullptr);
 }
 
 /// The same, of two train logs that judge one another.
