@@ -65,8 +65,7 @@ void weigh_evidence(Outcome& outcome, const Gate& gate) {
     const double share = gate.gap[j] > 0 ? gate.held.alone[i][j] / gate.gap[j] : 0;
     evidence.closure = group.on_body ? gate.robot_closure[i] : share;
     const double form = group.on_body ? gate.robot_closure[i] : gate.own[i].form;
-    const bool holds = group.on_body ? gate.robot_closure[i] >= options.least_closure : gate.believed[i];
-    judge(evidence, holds, form, options);
+    judge(evidence, gate.believed[i], form, options);
   }
 }
 

@@ -338,18 +338,23 @@ std::size_t Gate::place(const Linearised& problem, const EffectId& id) const {
 
 namespace {
 
-/// An effect on the robot: what comes back without it against what it leaves on the joints that it reaches.
+/// An effect on the robot: what comes back without it against what it leaves on the joints that it reaches. It is
+/// believed where it closes their gaps, or its form holds, whatever else is missing there.
 void judge_robot(Gate& gate, const Outcome& outcome) {
+  const GateOptions& options = outcome.models.options.gate;
   const HeldOut& held = gate.held;
   gate.robot_closure.assign(gate.groups.size(), 0.0);
   for (std::size_t i = 0; i < gate.groups.size(); ++i) {
     if (!outcome.problem->groups()[gate.groups[i]].on_body) continue;
     double left = 0;
     for (Index j = 0; j < held.excess.size(); ++j) {
-      if (held.alone[i][j] > outcome.models.options.gate.least_felt) left += held.excess[j];
+      if (held.alone[i][j] > options.least_felt) left += held.excess[j];
     }
     const double back = held.alone[i].sum();
     gate.robot_closure[i] = back / std::max(back + left, 1e-300);
+    gate.believed[i] = gate.robot_closure[i] >= options.least_closure ||
+                       (back >= options.sure_gain &&
+                        form_on_robot(*outcome.problem, gate.groups, gate.groups[i]) >= options.sure_closure);
   }
 }
 

@@ -41,7 +41,7 @@ struct Gate {
   std::vector<bool> remains;          ///< structure that counts is left
   std::vector<bool> accepted;         ///< the joint's gap is closed by its names
   std::vector<OwnEvidence> own;       ///< by group; effects at a joint only
-  std::vector<bool> believed;         ///< by group; effects at a joint only
+  std::vector<bool> believed;         ///< by group
 
   /// Place of an effect in `groups`; groups.size(): it has none.
   std::size_t place(const Linearised& problem, const EffectId& id) const;

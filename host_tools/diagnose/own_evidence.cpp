@@ -141,7 +141,39 @@ class AtJoint {
   std::vector<OwnEvidence> evidence_;
 };
 
+/// Sum over the joints of weighed squares on what judges.
+double judged_robot(const Linearised& problem, const std::vector<std::size_t>& groups) {
+  const BlockSolver& solver = problem.solver();
+  double sum = 0;
+  for (const Fold& fold : problem.blocks().folds)
+    sum += solver.square(solver.solve(problem.columns_of(groups), fold.fit), fold.judge).dot(solver.weights());
+  return sum;
+}
+
 }  // namespace
+
+double form_on_robot(Linearised& problem, const std::vector<std::size_t>& groups, std::size_t effect) {
+  const Group group = problem.groups()[effect];
+  std::vector<std::size_t> others = groups;
+  std::erase(others, effect);
+  std::vector<std::size_t> freed = others;
+  for (std::size_t j = 0; j < problem.joints(); ++j) {
+    const JointRows& rows = problem.solver().rows(j);
+    const Index place = rows.place(group.first);
+    if (place < 0) continue;
+    std::vector<MatrixXd> of_joint(problem.joints());
+    of_joint[j].resize(rows.x.rows() + rows.extra_x.rows(), group.count);
+    of_joint[j].topRows(rows.x.rows()) = rows.x.middleCols(place, group.count);
+    if (rows.extra_x.rows() > 0)
+      of_joint[j].bottomRows(rows.extra_x.rows()) = rows.extra_x.middleCols(place, group.count);
+    Group one = group;
+    one.in_model = false;
+    freed.push_back(problem.add(one, of_joint));
+  }
+  const double nothing = judged_robot(problem, others), common = judged_robot(problem, groups),
+               own = judged_robot(problem, freed);
+  return nothing > own ? std::max(0.0, nothing - common) / (nothing - own) : 1.0;
+}
 
 std::vector<OwnEvidence> own_evidence(const Linearised& problem, const std::vector<std::size_t>& groups,
                                       const std::vector<MatrixXd>& features) {

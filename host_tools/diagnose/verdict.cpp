@@ -281,12 +281,18 @@ class ReportWriter {
             {{"t", 0, impacts.t - 0.05, impacts.t + 0.05, {}, {}, impacts.log}}};
   }
 
-  /// Whether the model has an effect at a joint whose name is not established.
+  /// Whether the model has an effect that a joint feels and whose name is not established.
   bool is_there(std::size_t j) const {
     const auto& found = conclusion_.outcome.found;
     return std::any_of(found.begin(), found.end(), [&](const Finding& f) {
-      return !f.id.body && f.id.joint == j && f.evidence.there && f.evidence.certainty != Certainty::established;
+      return f.evidence.there && f.evidence.certainty != Certainty::established &&
+             (f.id.body ? is_felt(f.id, j) : f.id.joint == j);
     });
+  }
+  bool is_felt(const EffectId& on_robot, std::size_t j) const {
+    const Gate& gate = conclusion_.gate;
+    const std::size_t i = gate.place(problem_, on_robot);
+    return i < gate.groups.size() && gate.held.alone[i][static_cast<Index>(j)] > problem_.options().gate.least_felt;
   }
 
   JointDiagnosis moving(std::size_t j) {
