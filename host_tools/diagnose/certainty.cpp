@@ -81,19 +81,37 @@ bool errs_less(const VectorXd& before, const VectorXd& after) {
   return sum < 0;
 }
 
-const Finding* undecided(const Outcome& outcome, const std::vector<EffectId>& tried) {
+using Tried = std::vector<EffectCandidate>;
+
+EffectCandidate candidate_of(const Outcome& outcome, const Finding& finding) {
+  return {fit_of(outcome.models.current, finding.id).effect, finding.id.joint, {}};
+}
+
+/// The finding that is there for sure under a name that is not, and whose rival is nearest, but for those that were
+/// tried; null: there is none.
+const Finding* without_a_sure_name(const Outcome& outcome, const Tried& tried) {
+  const Finding* out = nullptr;
   for (const Finding& finding : outcome.found) {
-    if (finding.evidence.undecided && std::find(tried.begin(), tried.end(), finding.id) == tried.end()) return &finding;
+    const Evidence& evidence = finding.evidence;
+    if (!evidence.there || evidence.certainty == Certainty::established || !finding.rival) continue;
+    const EffectCandidate candidate = candidate_of(outcome, finding);
+    const bool known = std::any_of(tried.begin(), tried.end(), [&](const EffectCandidate& other) {
+      return other.effect == candidate.effect && other.joint == candidate.joint;
+    });
+    if (!known && (out == nullptr || finding.rival->gain < out->rival->gain)) out = &finding;
   }
-  return nullptr;
+  return out;
 }
 
 }  // namespace
 
 void settle_rivals(Outcome& outcome, Gate& gate, const Retrial& retrial, Progress& progress) {
-  std::vector<EffectId> tried;
-  while (const Finding* finding = undecided(outcome, tried)) {
-    tried.push_back(finding->id);
+  constexpr std::size_t most = 4;  // a pass of the search each
+  Tried tried;
+  while (tried.size() < most) {
+    const Finding* finding = without_a_sure_name(outcome, tried);
+    if (finding == nullptr) return;
+    tried.push_back(candidate_of(outcome, *finding));
     Outcome other = explore_rival(outcome, *finding, retrial.logs, retrial.task, progress);
     Gate of_other = pass(other, retrial.nominal, retrial.logs, retrial.still);
     const VectorXd before = judged_error(outcome, retrial.logs, gate);
@@ -101,7 +119,6 @@ void settle_rivals(Outcome& outcome, Gate& gate, const Retrial& retrial, Progres
     weigh_evidence(other, of_other);
     outcome = std::move(other);
     gate = std::move(of_other);
-    return;  // its findings have other ids: one exchange, not a walk in circles
   }
 }
 

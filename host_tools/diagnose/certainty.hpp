@@ -24,9 +24,9 @@ struct Retrial {
   const SearchTask& task;
 };
 
-/// Of a finding and its rival that the odds don't tell apart, the rival is tried in its place, with all that is fitted
-/// and searched around it: odds are of fits that are linear around the finding, whose other parameters suit it. The one
-/// whose model errs less on what judges stays.
+/// Of a finding that is there for sure, under a name that is not, the rival is tried in its place, with all that is
+/// fitted and searched around it: odds are of fits that are linear around the finding, whose other parameters suit it.
+/// The one whose model errs less on what judges stays.
 /// @param outcome, gate with evidence; what they become has it too
 void settle_rivals(Outcome& outcome, Gate& gate, const Retrial& retrial, Progress& progress);
 

@@ -242,28 +242,49 @@ void believe(Gate& gate, const Outcome& outcome) {
   }
 }
 
+/// Of several findings the one without which the model harms fewest joints, and of such errs least.
+std::size_t culprit(const std::vector<std::size_t>& suspects, const Gate& gate, const Outcome& outcome,
+                    const IdentifiedModel& nominal, const std::vector<SessionLog>& logs) {
+  const GateOptions& options = outcome.models.options.gate;
+  std::size_t out = suspects.front();
+  if (suspects.size() == 1) return out;
+  std::pair<std::size_t, double> least{outcome.lack.size() + 1, 0};
+  for (const std::size_t i : suspects) {
+    Models without = outcome.models;
+    std::vector<EffectId> none;
+    take_back(without, none, outcome.problem->groups()[gate.groups[i]].id);
+    refit(without, logs, outcome.whitening, 3);
+    const std::pair left{count_harmed(options, nominal, without.current, logs), log_error(without.current, logs)};
+    if (left >= least) continue;
+    least = left;
+    out = i;
+  }
+  return out;
+}
+
 /// The named effect that goes first, as a place in the gate's groups; their number: all hold.
 /// @param before, after squares of the plain error on what judges
-std::size_t weakest(const Gate& gate, const Outcome& outcome, const VectorXd& before, const VectorXd& after) {
+std::size_t weakest(const Gate& gate, const Outcome& outcome, const VectorXd& before, const VectorXd& after,
+                    const IdentifiedModel& nominal, const std::vector<SessionLog>& logs) {
   const auto rises = [&](Index j) { return is_worse(outcome.models.options.gate, before, after, j); };
   const std::size_t none = gate.groups.size();
-  const std::vector<double> off_nothing = deviations_off_nothing(*outcome.problem, gate.groups);
-  std::size_t worst = none;
-  bool worst_on_body = false;
+  std::vector<std::size_t> spoilers;
   for (std::size_t i = 0; i < none; ++i) {
     const Group& group = outcome.problem->groups()[gate.groups[i]];
     bool spoils = !group.on_body && rises(static_cast<Index>(group.candidate.joint));
     // Whatever it brings there: a load that others make up for in the linear fit may be far off in the model.
     for (std::size_t j = 0; group.on_body && j < outcome.problem->joints(); ++j)
       spoils |= outcome.problem->solver().rows(j).place(group.first) >= 0 && rises(static_cast<Index>(j));
+    if (spoils) spoilers.push_back(i);
+  }
+  // An effect on the robot may have bent those of the joints, or one of them that joint.
+  if (!spoilers.empty()) return culprit(spoilers, gate, outcome, nominal, logs);
+  const std::vector<double> off_nothing = deviations_off_nothing(*outcome.problem, gate.groups);
+  std::size_t worst = none;
+  for (std::size_t i = 0; i < none; ++i) {
     const bool sure = off_nothing[i] >= outcome.models.options.gate.sure_deviations;
-    if (!spoils && sure && holds(outcome, group, gate.held, i)) continue;
-    // An effect on the robot that spoils joints goes before theirs, which may have been bent by it.
-    const bool on_body = spoils && group.on_body;
-    const bool first = worst == none || (on_body && !worst_on_body);
-    if (!first && (worst_on_body != on_body || gate.held.alone[i].sum() >= gate.held.alone[worst].sum())) continue;
-    worst = i;
-    worst_on_body = on_body;
+    if (sure && holds(outcome, outcome.problem->groups()[gate.groups[i]], gate.held, i)) continue;
+    if (worst == none || gate.held.alone[i].sum() < gate.held.alone[worst].sum()) worst = i;
   }
   if (worst != none) return worst;
   // What is found elsewhere may spoil a joint at which nothing is.
@@ -290,44 +311,6 @@ std::size_t weakest(const Gate& gate, const Outcome& outcome, const VectorXd& be
 }
 
 }  // namespace
-
-namespace {
-
-/// Squares of the filtered error on today's logs that fit, or on those that judge only.
-VectorXd squares_of(const IdentifiedModel& model, const std::vector<SessionLog>& logs, bool fitted) {
-  std::vector<VectorXd> squares(logs.size());
-  parallel_for(logs.size(), [&](std::size_t l) {
-    if (logs[l].fits != fitted || logs[l].healthy) return;
-    const ProcessedLog& log = logs[l].log;
-    const MatrixXd error = log.filter_columns(log.tau - predict(model, log));
-    squares[l] = error.middleRows(log.first, log.last - log.first).colwise().squaredNorm().transpose();
-  });
-  VectorXd sum;
-  for (const VectorXd& square : squares) {
-    if (square.size() > 0) sum = sum.size() > 0 ? VectorXd(sum + square) : square;
-  }
-  return sum;
-}
-
-}  // namespace
-
-VectorXd plain_error(const IdentifiedModel& model, const std::vector<SessionLog>& logs) {
-  return squares_of(model, logs, false);
-}
-
-std::vector<bool> harmed_joints(const GateOptions& options, const IdentifiedModel& before, const IdentifiedModel& after,
-                                const std::vector<SessionLog>& logs) {
-  const bool validated = std::any_of(logs.begin(), logs.end(), [](const SessionLog& log) { return !log.fits; });
-  const VectorXd of_before = squares_of(before, logs, !validated), of_after = squares_of(after, logs, !validated);
-  const double most = validated ? options.worse : options.worse_fitted;
-  std::vector<bool> out;
-  for (Index j = 0; j < of_after.size(); ++j) out.push_back(of_after[j] > most * most * of_before[j]);
-  return out;
-}
-
-bool is_worse(const GateOptions& options, const VectorXd& before, const VectorXd& after, Index joint) {
-  return before.size() > 0 && after[joint] > options.worse * options.worse * before[joint];
-}
 
 std::size_t Gate::place(const Linearised& problem, const EffectId& id) const {
   for (std::size_t i = 0; i < groups.size(); ++i) {
@@ -390,26 +373,17 @@ Gate judge_again(const Outcome& outcome, const std::vector<SessionLog>& logs, co
 
 namespace {
 
-std::size_t joints_that_rise(const GateOptions& options, const VectorXd& before, const VectorXd& after) {
-  std::size_t count = 0;
-  for (Index j = 0; j < after.size(); ++j) count += static_cast<std::size_t>(is_worse(options, before, after, j));
-  return count;
-}
-
 /// The nominal model was fitted in the whole band. One that was fitted to whitened rows may err more in it wherever the
 /// friction is of another form, whatever was found. So it is fitted in that band before a finding answers for it.
-/// @param before, after plain_error() of the nominal model, of the outcome's
-bool fit_in_band(Outcome& outcome, const std::vector<SessionLog>& logs, const VectorXd& before, VectorXd& after) {
+bool fit_in_band(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs) {
   const GateOptions& options = outcome.models.options.gate;
-  const std::size_t rise = joints_that_rise(options, before, after);
-  if (rise == 0) return false;
+  const std::size_t harmed = count_harmed(options, nominal, outcome.models.current, logs);
+  if (harmed == 0) return false;
   Models in_band = outcome.models;
   refit(in_band, logs, std::vector<VectorXd>(outcome.lack.size(), VectorXd::Zero(1)), 4);
-  const VectorXd error = plain_error(in_band.current, logs);
-  if (joints_that_rise(options, before, error) >= rise) return false;
+  if (count_harmed(options, nominal, in_band.current, logs) >= harmed) return false;
   outcome.models = std::move(in_band);
   outcome.look_again(logs);
-  after = error;
   return true;
 }
 
@@ -424,14 +398,14 @@ Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<Se
     gate = judge_again(outcome, logs, still);
     PlainErrors errors{validated, validated};
     if (!gate.groups.empty()) {
+      if (fit_in_band(outcome, nominal, logs)) gate = judge_again(outcome, logs, still);
       if (validated.size() > 0) {
         errors.after = plain_error(outcome.models.current, logs);
-        if (fit_in_band(outcome, logs, errors.before, errors.after)) gate = judge_again(outcome, logs, still);
       } else {
         errors = judged_plainly(outcome, logs, gate);
       }
     }
-    const std::size_t worst = weakest(gate, outcome, errors.before, errors.after);
+    const std::size_t worst = weakest(gate, outcome, errors.before, errors.after, nominal, logs);
     if (worst == gate.groups.size()) break;
     take_out(outcome, outcome.problem->groups()[gate.groups[worst]].id, logs);
   }

@@ -5,6 +5,7 @@
 
 #include "host_tools/diagnose/finding.hpp"
 #include "host_tools/diagnose/own_evidence.hpp"
+#include "host_tools/diagnose/plain_error.hpp"
 #include "host_tools/effects/forward.hpp"
 
 namespace fxdyn::diagnosis {
@@ -55,21 +56,9 @@ Share left_of(const HeldOut& held, double gap, Eigen::Index joint);
 /// Judges the outcome as it is, each fold by a fit of the others.
 Gate judge_again(const Outcome& outcome, const std::vector<SessionLog>& logs, const std::vector<bool>& still);
 
-/// Mean squares of the filtered error on the logs that judge, by joint; empty: there are none.
-Eigen::VectorXd plain_error(const IdentifiedModel& model, const std::vector<SessionLog>& logs);
 /// Mean squares of the filtered error, or sums of them, on what judged: plain_error(), and where there are no such logs
 /// that of train logs that judge one another.
 Eigen::VectorXd judged_error(const Outcome& outcome, const std::vector<SessionLog>& logs, const Gate& gate);
-/// Whether a joint's error is larger than before by more than a name may raise it. @param before, after plain_error()
-bool is_worse(const GateOptions& options, const Eigen::VectorXd& before, const Eigen::VectorXd& after,
-              Eigen::Index joint);
-
-/// By joint: whether a model errs more there than the one before. On the validate logs by more than a name may raise
-/// the error; where there are none, on the train logs by more than a fit of them can: blocks judge fits that are
-/// linear, and so none that lost its way (a shape without a hold, two columns that are nearly one).
-std::vector<bool> harmed_joints(const GateOptions& options, const IdentifiedModel& before, const IdentifiedModel& after,
-                                const std::vector<SessionLog>& logs);
-
 /// Judges each fold by a fit of the others; time constants of drift are chosen by that, and names that do not hold are
 /// taken out of the outcome one by one: those that bring nothing; those at joints whose plain error on the validate
 /// logs is larger than that of `nominal` (rows near standstill, of which the search believes little, count there too),

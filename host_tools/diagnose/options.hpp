@@ -38,6 +38,11 @@ struct PriorOptions {
   /// share of itself; the same once the load is that of the model that knows the rest. It is the deflection's: with
   /// 0.1 the torque took those of demo/vibration's first two joints from 9 and 3 % off to 59 and 79 %; hand
   double refitted_rotor = 0.005;
+  /// m; a load's centre off the last link's frame; hand: tools are not longer. What these motions don't show of it, as
+  /// along an axis that all joints have in common, would else go far off, and its second moment with it
+  double load_centre = 0.5;
+  /// kg; a load that is as good as none has that prior of its centre; hand
+  double smallest_load = 1e-3;
   /// -; a share that is 1 by definition; theory: any value far below the data's own deviation holds it at 1
   double share = 1e-3;
   /// standard deviations; a coefficient that moved further has changed; theory: 2 Phi(-2) = 4.6 % of healthy ones

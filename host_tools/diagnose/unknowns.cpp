@@ -187,6 +187,10 @@ class Builder {
         u.prior = 1;
         u.prior_std = models_.options.prior.share;
       }
+      if (is_moment(fit, u)) {
+        const PriorOptions& prior = models_.options.prior;
+        u.prior_std = prior.load_centre * std::max(fit.linear[0], prior.smallest_load);
+      }
       // Equal heights are an offset, or friction without a curve: those have no prior, and take it.
       if (info.curve) u.prior_std = models_.curve_size.at(id.joint);
       out_.all.push_back(u);

@@ -3,6 +3,7 @@
 #include "host_tools/diagnose/gate.hpp"
 #include "host_tools/diagnose/certainty.hpp"
 #include "host_tools/diagnose/explore.hpp"
+#include "host_tools/diagnose/refit.hpp"
 
 #include <gtest/gtest.h>
 
@@ -158,16 +159,33 @@ TEST_F(NamesAtTheGate, WhatRaisesAJointsErrorGoesEvenIfItPassedBefore) {
 }
 
 TEST_F(NamesAtTheGate, StayWhereAFitInTheWholeBandCuresAJoint) {
-  auto& effects = outcome_.models.current.joints[1].effects;
-  for (EffectFit& fit : effects) {
+  Models nominal = test::around(nominal_);
+  refit(nominal, logs_, test::no_whitening(), 8);
+  for (EffectFit& fit : outcome_.models.current.joints[1].effects) {
     if (fit.effect == "viscous") fit.linear[0] += 2;  // as whitened rows may have it
   }
   outcome_.look_again(logs_);
-  const Eigen::VectorXd before = plain_error(nominal_, logs_);
-  ASSERT_TRUE(is_worse(outcome_.models.options.gate, before, plain_error(outcome_.models.current, logs_), 1));
-  pass(outcome_, nominal_, logs_, still_);
+  const auto harmed = [&] {
+    return harmed_joints(outcome_.models.options.gate, nominal.current, outcome_.models.current, logs_);
+  };
+  ASSERT_TRUE(harmed()[1]);
+  pass(outcome_, nominal.current, logs_, still_);
   ASSERT_EQ(outcome_.found.size(), 1U);
   EXPECT_NE(outcome_.models.current.joints[1].find("ripple"), nullptr);
+  EXPECT_FALSE(harmed()[1]);
+}
+
+/// A ripple that joint 2 has, and a load that no link has.
+TEST_F(NamesAtTheGate, OfSeveralThatMayHarmAJointTheOneGoesWithoutWhichLeastIsHarmed) {
+  IdentifiedModel& model = outcome_.models.current;
+  model.joints[2].effects.pop_back();
+  model.body.push_back(test::named_effect("payload", {}, {3, 0.1, 0.1, 0.1}));
+  outcome_.found = {{{false, 1, model.joints[1].effects.size() - 1}, 100, {}}, {{true, 0, 0}, 1000, {}}};
+  outcome_.look_again(logs_);
+  pass(outcome_, nominal_, logs_, still_);
+  ASSERT_EQ(outcome_.found.size(), 1U);
+  EXPECT_TRUE(model.body.empty());
+  EXPECT_NE(model.joints[1].find("ripple"), nullptr);
 }
 
 /// A finding at joint 2 that its rival comes near to.
@@ -183,7 +201,7 @@ class Rivals : public NamesAtTheGate {
     outcome_.found[0].rival = Rival{group, Eigen::Map<const Eigen::VectorXd>(rival.linear.data(), 2), 5};
     outcome_.look_again(logs_);
     Gate gate = judge_again(outcome_, logs_, still_);
-    outcome_.found[0].evidence.undecided = true;
+    outcome_.found[0].evidence.there = true;  // .. under a name that is not sure
     Progress progress;
     settle_rivals(outcome_, gate, {nominal_, logs_, still_, SearchTask{}}, progress);
   }
