@@ -141,13 +141,15 @@ class AtJoint {
   std::vector<OwnEvidence> evidence_;
 };
 
-/// Sum over the joints of weighed squares on what judges.
+/// -2 ln likelihood of what judges, but for a constant: sum over the joints of rows times ln of the squares.
 double judged_robot(const Linearised& problem, const std::vector<std::size_t>& groups) {
   const BlockSolver& solver = problem.solver();
-  double sum = 0;
-  for (const Fold& fold : problem.blocks().folds)
-    sum += solver.square(solver.solve(problem.columns_of(groups), fold.fit), fold.judge).dot(solver.weights());
-  return sum;
+  VectorXd squares = VectorXd::Zero(static_cast<Index>(problem.joints())), rows = squares;
+  for (const Fold& fold : problem.blocks().folds) {
+    squares += solver.square(solver.solve(problem.columns_of(groups), fold.fit), fold.judge);
+    rows += solver.row_count(fold.judge);
+  }
+  return rows.dot(squares.array().max(1e-300).log().matrix());
 }
 
 }  // namespace
@@ -172,7 +174,8 @@ double form_on_robot(Linearised& problem, const std::vector<std::size_t>& groups
   }
   const double nothing = judged_robot(problem, others), common = judged_robot(problem, groups),
                own = judged_robot(problem, freed);
-  return nothing > own ? std::max(0.0, nothing - common) / (nothing - own) : 1.0;
+  if (common >= nothing) return 0;
+  return nothing > own ? (nothing - common) / (nothing - own) : 1.0;
 }
 
 std::vector<OwnEvidence> own_evidence(const Linearised& problem, const std::vector<std::size_t>& groups,

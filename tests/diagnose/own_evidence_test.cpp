@@ -84,5 +84,34 @@ TEST(EvidenceOfItsOwn, SeveralNamesForOneBumpAreWorseThanACurve) {
   }
 }
 
+/// How well the form of a tilt holds on a PUMA 560 that has one, and an effect at joint 2 beside it.
+/// @param share of the tilt's torque that joint 3 has
+double form_of_tilt(double share, const std::vector<EffectFit>& at_joint) {
+  const IdentifiedModel nominal = test::fitted_puma();
+  IdentifiedModel upright = nominal;
+  for (const EffectFit& fit : at_joint) upright.joints[1].effects.push_back(fit);
+  IdentifiedModel tilted = upright;
+  tilted.body.push_back(test::named_effect("gravity_tilt", {}, {0.02, 0.03}));
+  std::vector<SessionLog> logs;
+  for (const auto& [role, seed] : {std::pair{Role::train, 1}, std::pair{Role::validate, 2}}) {
+    const SessionLog without = test::small_session_log(upright, role, static_cast<std::uint64_t>(seed));
+    logs.push_back(test::small_session_log(tilted, role, static_cast<std::uint64_t>(seed)));
+    MatrixXd& tau = logs.back().log.tau;
+    tau.col(2) = without.log.tau.col(2) + share * (tau.col(2) - without.log.tau.col(2));
+  }
+  Models models = test::around(nominal);
+  models.current.body.push_back(test::named_effect("gravity_tilt", {}, {0.01, 0.01}));
+  Linearised problem(models, logs, test::no_whitening());
+  const std::vector<std::size_t> groups = in_model(problem);
+  return form_on_robot(problem, groups, groups.at(0));
+}
+
+TEST(FormOnTheRobot, HoldsForWhatAllJointsHaveInCommonWhateverElseOneLacks) {
+  EXPECT_GT(form_of_tilt(1, {}), 0.95);
+  EXPECT_GT(form_of_tilt(1, {test::named_effect("ripple", {14}, {3, 0})}), 0.8);
+}
+
+TEST(FormOnTheRobot, DoesNotHoldWhereAJointFeelsItOtherwise) { EXPECT_LT(form_of_tilt(-1, {}), 0.8); }
+
 }  // namespace
 }  // namespace fxdyn::diagnosis

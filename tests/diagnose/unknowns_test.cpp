@@ -37,6 +37,18 @@ class UnknownsOfAModel : public testing::Test {
   Models models_;
 };
 
+TEST_F(UnknownsOfAModel, ALoadsCentreHasAPriorAndItsMassNone) {
+  models_.current.body.push_back(test::named_effect("payload", {}, {2, 0.1, 0, 0.2}));
+  const Unknowns unknowns = make_unknowns(models_);
+  ASSERT_EQ(unknowns.named.size(), 1U);
+  const auto first = static_cast<std::size_t>(unknowns.named[0].first);
+  EXPECT_EQ(unknowns.all[first].prior_std, 0);
+  for (std::size_t i = 1; i < 4; ++i) {  // first moments, whose mean is none
+    EXPECT_DOUBLE_EQ(unknowns.all[first + i].prior_std, 2 * models_.options.prior.load_centre);
+    EXPECT_EQ(unknowns.all[first + i].prior, 0);
+  }
+}
+
 TEST_F(UnknownsOfAModel, AreBaseParametersThenFrictionThenNames) {
   models_.current.joints[1].effects.push_back(test::named_effect("ripple", {12}, {0.3, 0.4}));
   const Unknowns unknowns = make_unknowns(models_);
