@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "host_tools/diagnose/features.hpp"
 #include "host_tools/effects/effect_roles.hpp"
@@ -125,11 +126,15 @@ class FaultFits {
     return gain_of(problem_.solver().solve(problem_.columns_of(groups))) - free;
   }
 
+  double score_of(const LinearFit& fit, Index parameters) const {
+    return likelihood(problem_, fit) - sound_likelihood_ - static_cast<double>(parameters) * price_;
+  }
+
   /// @param already a fit that the fault has to be better than, with so many parameters of its own
   void weigh(const LinearFit& fit, Index parameters, std::string complaint, const LinearFit* already = nullptr) {
     RecordingFault fault;
     fault.complaint = std::move(complaint);
-    fault.score = likelihood(problem_, fit) - sound_likelihood_ - static_cast<double>(parameters) * price_;
+    fault.score = score_of(fit, parameters);
     const double before = already == nullptr ? 0 : gain_of(*already);
     const double left = std::max(explainable_, gain_of(fit)) - before;
     fault.closure = left > 0 ? (gain_of(fit) - before - static_cast<double>(parameters)) / left : 0;
@@ -206,37 +211,64 @@ class FaultFits {
     if (!complaint.empty()) weigh(growing, 2 * count, complaint, &constant);
   }
 
-  void fit_load(std::size_t i) {
+  /// Columns of a load in some of today's logs.
+  std::vector<MatrixXd> load_rows(const std::vector<std::size_t>& logs) const {
     Group load;
     load.candidate = {std::string(load_effect().name), 0, {}};
     load.on_body = true;
-    const EffectColumns columns = problem_.log_columns().of(today_[i], load);
-    const auto parameters = static_cast<Index>(load_effect().linear.size());
-    std::vector<MatrixXd> rows = no_rows(parameters);
-    for (std::size_t j = 0; j < rows.size(); ++j) {
-      for (Index c = 0; c < columns.joints[j].cols(); ++c) put(today_[i], j, columns.joints[j].col(c), c, rows);
+    std::vector<MatrixXd> rows = no_rows(static_cast<Index>(load_effect().linear.size()));
+    for (const std::size_t log : logs) {
+      const EffectColumns columns = problem_.log_columns().of(log, load);
+      for (std::size_t j = 0; j < rows.size(); ++j) {
+        for (Index c = 0; c < columns.joints[j].cols(); ++c) put(log, j, columns.joints[j].col(c), c, rows);
+      }
     }
-    const LinearFit fit = fit_with(std::move(rows));
+    return rows;
+  }
+
+  void fit_load(std::size_t i) {
+    const auto parameters = static_cast<Index>(load_effect().linear.size());
+    const LinearFit fit = fit_with(load_rows({today_[i]}));
     const Index at = fit.x.size() - parameters;
     if (std::fabs(fit.x[at]) < options_.deviations * deviation(fit, at)) return;
     weigh(fit, parameters,
           fmt::format("{}: recorded with another load than the other logs ({:+.3g} kg): say so by `payload` of its "
                       "[[log]], or leave it out",
                       name(today_[i]), fit.x[at]));
+    faults_.back().sound_score = score_of(fit_with(load_rows(today_)), parameters);
+  }
+
+  /// Columns of a joint's torque in some of today's logs.
+  std::vector<MatrixXd> gain_rows(const std::vector<std::size_t>& places, std::size_t joint) const {
+    std::vector<MatrixXd> rows = no_rows(1);
+    for (const std::size_t i : places) put(today_[i], joint, torque_[i].col(static_cast<Index>(joint)), 0, rows);
+    return rows;
+  }
+  /// .. of its friction in one: all that the joint's effects do, what is viscous of it, and an offset.
+  std::vector<MatrixXd> friction_rows(std::size_t i, std::size_t joint) const {
+    const auto j = static_cast<Index>(joint);
+    const VectorXd dq = problem_.motion(today_[i]).dq.col(j);
+    std::vector<MatrixXd> rows = no_rows(3);
+    put(today_[i], joint, torque_[i].col(j) - problem_.robot_columns(today_[i]).structural().col(j), 0, rows);
+    put(today_[i], joint, dq, 1, rows);
+    put(today_[i], joint, VectorXd::Ones(dq.size()), 2, rows);
+    return rows;
   }
 
   /// What one joint's torque has in one log alone may look like a load.
   void fit_gain(std::size_t i, std::size_t joint) {
-    std::vector<MatrixXd> rows = no_rows(1);
-    put(today_[i], joint, torque_[i].col(static_cast<Index>(joint)), 0, rows);
-    const LinearFit fit = fit_with(std::move(rows));
+    const LinearFit fit = fit_with(gain_rows({i}, joint));
     const Index at = fit.x.size() - 1;
     if (std::fabs(fit.x[at]) < options_.deviations * deviation(fit, at)) return;
+    std::vector<std::size_t> all(today_.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
     weigh(
         fit, 1,
         fmt::format("{}: its torque of {} is {:.3g} times that of the other logs: another unit or gain? Correct it or "
                     "leave the log out",
                     name(today_[i]), model().robot.joints[joint].name, 1 + fit.x[at]));
+    faults_.back().sound_score =
+        std::max(score_of(fit_with(gain_rows(all, joint)), 1), score_of(fit_with(friction_rows(i, joint)), 3));
   }
 
   const Models& nominal_;
@@ -268,8 +300,8 @@ std::optional<RecordingFault> likely_recording_fault(const Models& nominal, cons
     const Group& group = found.groups()[g];
     score -= static_cast<double>(group.count - find_effect(group.candidate.effect)->share) * fits.price();
   }
-  const double needed = std::max(score, 0.0) + options.least_score;
   for (RecordingFault& fault : fits.all()) {
+    const double needed = std::max({score, fault.sound_score, 0.0}) + options.least_score;
     if (fault.score >= needed && fault.closure >= options.least_closure) return std::move(fault);
   }
   return std::nullopt;

@@ -12,11 +12,14 @@ namespace fxdyn::diagnosis {
 /// with the effects that the search found:
 /// - a joint's encoder slipped since the baseline: its zero is elsewhere in today's logs;
 /// - position and torque of a log have two clocks: the lag between them grows;
-/// - one log of several was recorded with another load.
+/// - one log of several was recorded with another load, or another gain of a joint's torque.
 struct RecordingFault {
   std::string complaint;  ///< what it is, and what to do
   double score = 0;       ///< 2 ln likelihood - k ln N, more than the nominal model's
   double closure = 0;     ///< share of what any function of the state explains of today's logs
+  /// score; the same of what a sound recording may show in its place: that load or gain in all of today's logs, or a
+  /// joint whose friction is another in that log, as it is where the model's friction does not fit that motion
+  double sound_score = 0;
 };
 
 /// All of them, the best first.
