@@ -105,12 +105,13 @@ const Finding* without_a_sure_name(const Outcome& outcome, const Tried& tried) {
 
 }  // namespace
 
-void settle_rivals(Outcome& outcome, Gate& gate, const Retrial& retrial, Progress& progress) {
+bool settle_rivals(Outcome& outcome, Gate& gate, const Retrial& retrial, Progress& progress) {
   constexpr std::size_t most = 4;  // a pass of the search each
   Tried tried;
+  bool settled = false;
   while (tried.size() < most) {
     const Finding* finding = without_a_sure_name(outcome, tried);
-    if (finding == nullptr) return;
+    if (finding == nullptr) break;
     tried.push_back(candidate_of(outcome, *finding));
     Outcome other = explore_rival(outcome, *finding, retrial.logs, retrial.task, progress);
     Gate of_other = pass(other, retrial.nominal, retrial.logs, retrial.still);
@@ -119,7 +120,9 @@ void settle_rivals(Outcome& outcome, Gate& gate, const Retrial& retrial, Progres
     weigh_evidence(other, of_other);
     outcome = std::move(other);
     gate = std::move(of_other);
+    settled = true;
   }
+  return settled;
 }
 
 std::vector<Likely> set_aside(Outcome& outcome, Gate& gate, const std::vector<SessionLog>& logs,

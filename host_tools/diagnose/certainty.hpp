@@ -28,7 +28,8 @@ struct Retrial {
 /// fitted and searched around it: odds are of fits that are linear around the finding, whose other parameters suit it.
 /// The one whose model errs less on what judges stays.
 /// @param outcome, gate with evidence; what they become has it too
-void settle_rivals(Outcome& outcome, Gate& gate, const Retrial& retrial, Progress& progress);
+/// @returns whether a rival took a place
+bool settle_rivals(Outcome& outcome, Gate& gate, const Retrial& retrial, Progress& progress);
 
 /// An effect that is not sure enough for the model.
 struct Likely {

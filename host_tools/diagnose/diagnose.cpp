@@ -146,7 +146,10 @@ class Diagnoser {
     Gate gate = pass(outcome, models_.current, logs_, still_);
     if (refit_links(outcome)) gate = pass(outcome, models_.current, logs_, still_);
     weigh_evidence(outcome, gate);
-    settle_rivals(outcome, gate, {models_.current, logs_, still_, task_}, progress_);
+    if (settle_rivals(outcome, gate, {models_.current, logs_, still_, task_}, progress_) && refit_links(outcome)) {
+      gate = pass(outcome, models_.current, logs_, still_);
+      weigh_evidence(outcome, gate);
+    }
     const std::vector<Likely> likely = set_aside(outcome, gate, logs_, still_);
     result.nominal = finished(result.nominal);
     const IdentifiedModel judged_against = deflections_.found.empty() ? result.nominal : finished(models_.current);
