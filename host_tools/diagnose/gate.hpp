@@ -60,11 +60,12 @@ Gate judge_again(const Outcome& outcome, const std::vector<SessionLog>& logs, co
 /// that of train logs that judge one another.
 Eigen::VectorXd judged_error(const Outcome& outcome, const std::vector<SessionLog>& logs, const Gate& gate);
 /// Judges each fold by a fit of the others; time constants of drift are chosen by that, and names that do not hold are
-/// taken out of the outcome one by one: those that bring nothing; those at joints whose plain error on the validate
-/// logs is larger than that of `nominal` (rows near standstill, of which the search believes little, count there too),
-/// or, where there are none, on train logs that judge one another, than without what was found; those that
-/// spoil a joint at which nothing was found; and those not believed at joints that show no more structure than their
-/// background.
+/// taken out of the outcome one by one: those that may be why a joint's plain error on the validate logs is larger than
+/// that of `nominal` (rows near standstill, of which the search believes little, count there too), or, where there are
+/// no such logs, that on train logs that judge one another larger than without what was found; of several the one
+/// without which least is harmed. Then those that bring nothing; those that spoil a joint at which nothing was found;
+/// and those not believed at joints that show no more structure than their background. Where a joint is harmed, the
+/// model is fitted in the whole band first.
 Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs,
           const std::vector<bool>& still);
 
