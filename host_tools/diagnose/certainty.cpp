@@ -64,40 +64,51 @@ void weigh_evidence(Outcome& outcome, const Gate& gate) {
     const auto j = static_cast<Index>(group.candidate.joint);
     const double share = gate.gap[j] > 0 ? gate.held.alone[i][j] / gate.gap[j] : 0;
     evidence.closure = group.on_body ? gate.robot_closure[i] : share;
-    const double form = group.on_body ? gate.robot_closure[i] : gate.own[i].form;
+    const double form = group.on_body ? std::max(gate.robot_closure[i], gate.robot_form[i]) : gate.own[i].form;
     judge(evidence, gate.believed[i], form, options);
   }
 }
 
 namespace {
 
-/// Whether the second of two outcomes errs less on what judges, in the geometric mean of the joints. pass() has seen to
-/// it that neither harms one.
-bool errs_less(const VectorXd& before, const VectorXd& after) {
+/// Whether the second of two outcomes errs less on what judges: at no joint by more than a name may raise the error,
+/// and in the geometric mean of the joints by more than one further pass of the search brings by itself.
+bool errs_less(const VectorXd& before, const VectorXd& after, const GateOptions& options) {
+  constexpr double worth_it = 0.99;  // of the squares
   double sum = 0;
   for (Index j = 0; j < before.size(); ++j) {
+    if (is_worse(options, before, after, j)) return false;
     if (before[j] > 0 && after[j] > 0) sum += std::log(after[j] / before[j]);
   }
-  return sum < 0;
+  return sum < static_cast<double>(before.size()) * std::log(worth_it);
 }
 
 using Tried = std::vector<EffectCandidate>;
 
 EffectCandidate candidate_of(const Outcome& outcome, const Finding& finding) {
-  return {fit_of(outcome.models.current, finding.id).effect, finding.id.joint, {}};
+  const EffectFit& fit = fit_of(outcome.models.current, finding.id);
+  return {fit.effect, finding.id.joint, fit.shape};
 }
 
-/// The finding that is there for sure under a name that is not, and whose rival is nearest, but for those that were
-/// tried; null: there is none.
+/// Whether two are one effect, whose shape a fit may have moved a little.
+bool is_same(const EffectCandidate& a, const EffectCandidate& b) {
+  constexpr double moved = 0.1;
+  return a.effect == b.effect && a.joint == b.joint &&
+         std::equal(a.shape.begin(), a.shape.end(), b.shape.begin(), b.shape.end(),
+                    [](double x, double y) { return std::fabs(x - y) <= moved * std::fabs(x); });
+}
+
+/// The finding that is there for sure under a name that is not, since its rival is near; the nearest, but for those
+/// that were tried. Null: there is none.
 const Finding* without_a_sure_name(const Outcome& outcome, const Tried& tried) {
+  const double established = outcome.models.options.gate.established;
   const Finding* out = nullptr;
   for (const Finding& finding : outcome.found) {
     const Evidence& evidence = finding.evidence;
-    if (!evidence.there || evidence.certainty == Certainty::established || !finding.rival) continue;
+    if (!evidence.there || !finding.rival || evidence.against_rival.value_or(established) >= established) continue;
     const EffectCandidate candidate = candidate_of(outcome, finding);
-    const bool known = std::any_of(tried.begin(), tried.end(), [&](const EffectCandidate& other) {
-      return other.effect == candidate.effect && other.joint == candidate.joint;
-    });
+    const bool known = std::any_of(tried.begin(), tried.end(),
+                                   [&](const EffectCandidate& other) { return is_same(other, candidate); });
     if (!known && (out == nullptr || finding.rival->gain < out->rival->gain)) out = &finding;
   }
   return out;
@@ -115,8 +126,9 @@ bool settle_rivals(Outcome& outcome, Gate& gate, const Retrial& retrial, Progres
     tried.push_back(candidate_of(outcome, *finding));
     Outcome other = explore_rival(outcome, *finding, retrial.logs, retrial.task, progress);
     Gate of_other = pass(other, retrial.nominal, retrial.logs, retrial.still);
-    const VectorXd before = judged_error(outcome, retrial.logs, gate);
-    if (!errs_less(before, judged_error(other, retrial.logs, of_other))) continue;
+    const VectorXd before = judged_error(outcome.models, retrial.logs);
+    const VectorXd after = judged_error(other.models, retrial.logs);
+    if (!errs_less(before, after, outcome.models.options.gate)) continue;
     weigh_evidence(other, of_other);
     outcome = std::move(other);
     gate = std::move(of_other);
@@ -125,8 +137,8 @@ bool settle_rivals(Outcome& outcome, Gate& gate, const Retrial& retrial, Progres
   return settled;
 }
 
-std::vector<Likely> set_aside(Outcome& outcome, Gate& gate, const std::vector<SessionLog>& logs,
-                              const std::vector<bool>& still) {
+std::vector<Likely> set_aside(Outcome& outcome, Gate& gate, const IdentifiedModel& nominal,
+                              const std::vector<SessionLog>& logs, const std::vector<bool>& still) {
   const auto goes = [](const Finding& f) { return !f.evidence.there; };
   std::vector<Likely> out;
   if (std::none_of(outcome.found.begin(), outcome.found.end(), goes)) return out;
@@ -153,6 +165,7 @@ std::vector<Likely> set_aside(Outcome& outcome, Gate& gate, const std::vector<Se
   }
   refit(outcome.models, logs, outcome.whitening, 4);
   outcome.look_again(logs);
+  fit_in_band(outcome, nominal, logs);
   gate = judge_again(outcome, logs, still);
   return out;
 }

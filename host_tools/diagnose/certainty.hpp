@@ -24,9 +24,9 @@ struct Retrial {
   const SearchTask& task;
 };
 
-/// Of a finding that is there for sure, under a name that is not, the rival is tried in its place, with all that is
-/// fitted and searched around it: odds are of fits that are linear around the finding, whose other parameters suit it.
-/// The one whose model errs less on what judges stays.
+/// Of a finding that is there for sure, and whose rival is within the odds of a sure name, that rival is tried in its
+/// place, with all that is fitted and searched around it: odds are of fits that are linear around the finding, whose
+/// other parameters suit it. The one whose model errs less on what judges stays.
 /// @param outcome, gate with evidence; what they become has it too
 /// @returns whether a rival took a place
 bool settle_rivals(Outcome& outcome, Gate& gate, const Retrial& retrial, Progress& progress);
@@ -40,7 +40,8 @@ struct Likely {
 
 /// Takes all that is not there for sure out of the model, fits the rest again and judges it.
 /// @returns what of it is likely
-std::vector<Likely> set_aside(Outcome& outcome, Gate& gate, const std::vector<SessionLog>& logs,
-                              const std::vector<bool>& still);
+/// @param nominal the model before the search
+std::vector<Likely> set_aside(Outcome& outcome, Gate& gate, const IdentifiedModel& nominal,
+                              const std::vector<SessionLog>& logs, const std::vector<bool>& still);
 
 }  // namespace fxdyn::diagnosis

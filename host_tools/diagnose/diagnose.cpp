@@ -150,13 +150,13 @@ class Diagnoser {
       gate = pass(outcome, models_.current, logs_, still_);
       weigh_evidence(outcome, gate);
     }
-    const std::vector<Likely> likely = set_aside(outcome, gate, logs_, still_);
+    const std::vector<Likely> likely = set_aside(outcome, gate, models_.current, logs_, still_);
     result.nominal = finished(result.nominal);
     const IdentifiedModel judged_against = deflections_.found.empty() ? result.nominal : finished(models_.current);
     result.model = concluded(outcome, gate);
     // What came after the gate (likely names set aside, possible bodies) may have made a finding harm.
     while (const std::optional<EffectId> harmful = harmful_finding(outcome, judged_against, result.model, logs_)) {
-      take_out(outcome, *harmful, logs_);
+      if (!fit_in_band(outcome, judged_against, logs_)) take_out(outcome, *harmful, logs_);
       gate = judge_again(outcome, logs_, still_);
       result.model = concluded(outcome, gate);
     }

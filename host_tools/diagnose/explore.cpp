@@ -157,8 +157,9 @@ Outcome explore_rival(const Outcome& outcome, const Finding& finding, const std:
   for (const Finding& found : outcome.found) {
     if (!(found.id == finding.id)) others.push_back(found.id);
   }
-  take_back(models, others, finding.id);
+  // What is appended first leaves ids as they are, and a rotor that both have.
   name(models, finding.rival->group, finding.rival->coefficients);
+  take_back(models, others, finding.id);
   refit(models, logs, outcome.whitening, 8);
   Outcome out = explore_passes(std::move(models), outcome.whitening, logs, task, {1, 2}, progress);
   out.not_identifiable = outcome.not_identifiable;

@@ -130,8 +130,9 @@ HeldOut judge(const Outcome& outcome, const std::vector<SessionLog>& logs, const
   std::vector<MatrixXd> in_band(n);
   parallel_for(n, [&](std::size_t j) { in_band[j] = features(problem, j, problem.models().has_baseline); });
   const HeldOut band = hold_out(outcome, logs, problem, in_band, groups);
-  held.plain_before = band.before;
-  held.plain_after = band.after;
+  // As torques: weights are of this outcome's own residual.
+  held.plain_before = band.before.cwiseQuotient(problem.solver().weights());
+  held.plain_after = band.after.cwiseQuotient(problem.solver().weights());
   for (std::size_t j = 0; j < n; ++j) {
     if (!outcome.structured(j)) continue;
     const auto k = static_cast<Index>(j);
@@ -242,20 +243,26 @@ void believe(Gate& gate, const Outcome& outcome) {
   }
 }
 
-/// Of several findings the one without which the model harms fewest joints, and of such errs least.
+/// Whitening that changes nothing.
+std::vector<VectorXd> whole_band(std::size_t joints) { return std::vector<VectorXd>(joints, VectorXd::Zero(1)); }
+
+/// Of several findings the one without which fewest joints err more than before, and of such the whole least.
+/// @param before squares of the plain error on what judges
 std::size_t culprit(const std::vector<std::size_t>& suspects, const Gate& gate, const Outcome& outcome,
-                    const IdentifiedModel& nominal, const std::vector<SessionLog>& logs) {
-  const GateOptions& options = outcome.models.options.gate;
+                    const VectorXd& before, const std::vector<SessionLog>& logs) {
   std::size_t out = suspects.front();
   if (suspects.size() == 1) return out;
-  std::pair<std::size_t, double> least{outcome.lack.size() + 1, 0};
+  std::pair<Index, double> least{before.size() + 1, 0};
   for (const std::size_t i : suspects) {
     Models without = outcome.models;
     std::vector<EffectId> none;
     take_back(without, none, outcome.problem->groups()[gate.groups[i]].id);
-    refit(without, logs, outcome.whitening, 3);
-    const std::pair left{count_harmed(options, nominal, without.current, logs), log_error(without.current, logs)};
-    if (left >= least) continue;
+    refit(without, logs, whole_band(outcome.lack.size()), 3);
+    const VectorXd error = judged_error(without, logs);
+    Index worse = 0;
+    for (Index j = 0; j < error.size(); ++j) worse += is_worse(without.options.gate, before, error, j) ? 1 : 0;
+    const std::pair left{worse, error.array().max(1e-300).log().sum()};
+    if (!(left < least)) continue;
     least = left;
     out = i;
   }
@@ -265,7 +272,7 @@ std::size_t culprit(const std::vector<std::size_t>& suspects, const Gate& gate, 
 /// The named effect that goes first, as a place in the gate's groups; their number: all hold.
 /// @param before, after squares of the plain error on what judges
 std::size_t weakest(const Gate& gate, const Outcome& outcome, const VectorXd& before, const VectorXd& after,
-                    const IdentifiedModel& nominal, const std::vector<SessionLog>& logs) {
+                    const std::vector<SessionLog>& logs) {
   const auto rises = [&](Index j) { return is_worse(outcome.models.options.gate, before, after, j); };
   const std::size_t none = gate.groups.size();
   std::vector<std::size_t> spoilers;
@@ -278,7 +285,7 @@ std::size_t weakest(const Gate& gate, const Outcome& outcome, const VectorXd& be
     if (spoils) spoilers.push_back(i);
   }
   // An effect on the robot may have bent those of the joints, or one of them that joint.
-  if (!spoilers.empty()) return culprit(spoilers, gate, outcome, nominal, logs);
+  if (!spoilers.empty()) return culprit(spoilers, gate, outcome, before, logs);
   const std::vector<double> off_nothing = deviations_off_nothing(*outcome.problem, gate.groups);
   std::size_t worst = none;
   for (std::size_t i = 0; i < none; ++i) {
@@ -327,6 +334,7 @@ void judge_robot(Gate& gate, const Outcome& outcome) {
   const GateOptions& options = outcome.models.options.gate;
   const HeldOut& held = gate.held;
   gate.robot_closure.assign(gate.groups.size(), 0.0);
+  gate.robot_form.assign(gate.groups.size(), 0.0);
   for (std::size_t i = 0; i < gate.groups.size(); ++i) {
     if (!outcome.problem->groups()[gate.groups[i]].on_body) continue;
     double left = 0;
@@ -335,9 +343,9 @@ void judge_robot(Gate& gate, const Outcome& outcome) {
     }
     const double back = held.alone[i].sum();
     gate.robot_closure[i] = back / std::max(back + left, 1e-300);
+    gate.robot_form[i] = form_on_robot(*outcome.problem, gate.groups, gate.groups[i]);
     gate.believed[i] = gate.robot_closure[i] >= options.least_closure ||
-                       (back >= options.sure_gain &&
-                        form_on_robot(*outcome.problem, gate.groups, gate.groups[i]) >= options.sure_closure);
+                       (back >= options.sure_gain && gate.robot_form[i] >= options.sure_closure);
   }
 }
 
@@ -371,23 +379,17 @@ Gate judge_again(const Outcome& outcome, const std::vector<SessionLog>& logs, co
   return gate;
 }
 
-namespace {
-
-/// The nominal model was fitted in the whole band. One that was fitted to whitened rows may err more in it wherever the
-/// friction is of another form, whatever was found. So it is fitted in that band before a finding answers for it.
 bool fit_in_band(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs) {
   const GateOptions& options = outcome.models.options.gate;
   const std::size_t harmed = count_harmed(options, nominal, outcome.models.current, logs);
   if (harmed == 0) return false;
   Models in_band = outcome.models;
-  refit(in_band, logs, std::vector<VectorXd>(outcome.lack.size(), VectorXd::Zero(1)), 4);
+  refit(in_band, logs, whole_band(outcome.lack.size()), 4);
   if (count_harmed(options, nominal, in_band.current, logs) >= harmed) return false;
   outcome.models = std::move(in_band);
   outcome.look_again(logs);
   return true;
 }
-
-}  // namespace
 
 Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs,
           const std::vector<bool>& still) {
@@ -405,7 +407,7 @@ Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<Se
         errors = judged_plainly(outcome, logs, gate);
       }
     }
-    const std::size_t worst = weakest(gate, outcome, errors.before, errors.after, nominal, logs);
+    const std::size_t worst = weakest(gate, outcome, errors.before, errors.after, logs);
     if (worst == gate.groups.size()) break;
     take_out(outcome, outcome.problem->groups()[gate.groups[worst]].id, logs);
   }
@@ -428,9 +430,13 @@ std::optional<EffectId> harmful_finding(const Outcome& outcome, const Identified
   return {};
 }
 
-VectorXd judged_error(const Outcome& outcome, const std::vector<SessionLog>& logs, const Gate& gate) {
-  const VectorXd validated = plain_error(outcome.models.current, logs);
-  return validated.size() > 0 ? validated : judged_plainly(outcome, logs, gate).after;
+VectorXd judged_error(const Models& models, const std::vector<SessionLog>& logs) {
+  VectorXd out = plain_error(models.current, logs);
+  if (out.size() > 0) return out;
+  const Linearised problem(models, logs, whole_band(models.current.joints.size()));
+  out = VectorXd::Zero(static_cast<Index>(models.current.joints.size()));
+  for (const Fold& fold : problem.blocks().folds) out += judged(problem, fold);
+  return out;
 }
 
 void take_out(Outcome& outcome, const EffectId& gone, const std::vector<SessionLog>& logs) {

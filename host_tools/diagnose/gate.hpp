@@ -39,6 +39,7 @@ struct Gate {
   Eigen::VectorXd gap;              ///< what there was to close: closed, and left over in excess
   Eigen::VectorXd closure;
   std::vector<double> robot_closure;  ///< by group; effects on the body only
+  std::vector<double> robot_form;     ///< likewise, form_on_robot()
   std::vector<bool> remains;          ///< structure that counts is left
   std::vector<bool> accepted;         ///< the joint's gap is closed by its names
   std::vector<OwnEvidence> own;       ///< by group; effects at a joint only
@@ -56,9 +57,14 @@ Share left_of(const HeldOut& held, double gap, Eigen::Index joint);
 /// Judges the outcome as it is, each fold by a fit of the others.
 Gate judge_again(const Outcome& outcome, const std::vector<SessionLog>& logs, const std::vector<bool>& still);
 
-/// Mean squares of the filtered error, or sums of them, on what judged: plain_error(), and where there are no such logs
-/// that of train logs that judge one another.
-Eigen::VectorXd judged_error(const Outcome& outcome, const std::vector<SessionLog>& logs, const Gate& gate);
+/// Squares of the error on what judges, which two outcomes of the same logs are compared by: plain_error(), and where
+/// there are no such logs that of train logs that judge one another.
+Eigen::VectorXd judged_error(const Models& models, const std::vector<SessionLog>& logs);
+
+/// Where a model harms a joint (harmed_joints()): fits it in the whole band, as the nominal one was. One that was
+/// fitted to whitened rows may err more in it wherever the friction is of another form, whatever was found.
+/// @returns whether it harms fewer for that; else the outcome stays as it was
+bool fit_in_band(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs);
 /// Judges each fold by a fit of the others; time constants of drift are chosen by that, and names that do not hold are
 /// taken out of the outcome one by one: those that may be why a joint's plain error on the validate logs is larger than
 /// that of `nominal` (rows near standstill, of which the search believes little, count there too), or, where there are

@@ -46,7 +46,7 @@ std::vector<bool> harmed_joints(const GateOptions& options, const IdentifiedMode
   const VectorXd of_before = squares_of(before, logs, !validated), of_after = squares_of(after, logs, !validated);
   const double most = validated ? options.worse : options.worse_fitted;
   std::vector<bool> out;
-  for (Index j = 0; j < of_after.size(); ++j) out.push_back(of_after[j] > most * most * of_before[j]);
+  for (Index j = 0; j < of_after.size(); ++j) out.push_back(!(of_after[j] <= most * most * of_before[j]));
   return out;
 }
 
@@ -58,10 +58,6 @@ std::size_t count_harmed(const GateOptions& options, const IdentifiedModel& befo
                          const std::vector<SessionLog>& logs) {
   const std::vector<bool> harmed = harmed_joints(options, before, after, logs);
   return static_cast<std::size_t>(std::count(harmed.begin(), harmed.end(), true));
-}
-
-double log_error(const IdentifiedModel& model, const std::vector<SessionLog>& logs) {
-  return squares_of(model, logs, !are_validated(logs)).array().max(1e-300).log().sum();
 }
 
 }  // namespace fxdyn::diagnosis

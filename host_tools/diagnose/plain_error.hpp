@@ -21,9 +21,8 @@ bool is_worse(const GateOptions& options, const Eigen::VectorXd& before, const E
 std::vector<bool> harmed_joints(const GateOptions& options, const IdentifiedModel& before, const IdentifiedModel& after,
                                 const std::vector<SessionLog>& logs);
 
-/// How many of them are; the sum over all joints of ln of the squared error on the same logs.
+/// How many of them are.
 std::size_t count_harmed(const GateOptions& options, const IdentifiedModel& before, const IdentifiedModel& after,
                          const std::vector<SessionLog>& logs);
-double log_error(const IdentifiedModel& model, const std::vector<SessionLog>& logs);
 
 }  // namespace fxdyn::diagnosis

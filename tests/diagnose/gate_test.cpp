@@ -198,10 +198,12 @@ class Rivals : public NamesAtTheGate {
     outcome_.found.resize(1);
     Group group;
     group.candidate = {rival.effect, 1, rival.shape};
+    refit(outcome_.models, logs_, test::no_whitening(), 4);
     outcome_.found[0].rival = Rival{group, Eigen::Map<const Eigen::VectorXd>(rival.linear.data(), 2), 5};
     outcome_.look_again(logs_);
     Gate gate = judge_again(outcome_, logs_, still_);
-    outcome_.found[0].evidence.there = true;  // .. under a name that is not sure
+    outcome_.found[0].evidence.there = true;
+    outcome_.found[0].evidence.against_rival = 1;  // 10 to 1
     Progress progress;
     settle_rivals(outcome_, gate, {nominal_, logs_, still_, SearchTask{}}, progress);
   }
@@ -236,6 +238,14 @@ class NamesWithoutValidation : public NamesAtTheGate {
 TEST_F(NamesWithoutValidation, StayWhereTheyLowerTheError) {
   EXPECT_TRUE(plain_error(nominal_, logs_).size() == 0);
   EXPECT_EQ(pass(outcome_, nominal_, logs_, still_).groups.size(), 1U);
+}
+
+TEST_F(NamesWithoutValidation, AnOutcomeThatLacksWhatIsThereErrsMore) {
+  const Eigen::VectorXd with = judged_error(outcome_.models, logs_);
+  take_out(outcome_, outcome_.found[0].id, logs_);  // the ripple
+  const Eigen::VectorXd without = judged_error(outcome_.models, logs_);
+  EXPECT_GT(without[1], 1.5 * with[1]);
+  EXPECT_NEAR(without[0], with[0], 0.1 * with[0]);
 }
 
 TEST_F(NamesWithoutValidation, GoWhereTheyRaiseItMoreThanTheyMay) {
