@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "host_tools/diagnose/deviations.hpp"
 #include "host_tools/diagnose/refit.hpp"
@@ -14,7 +13,6 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 /// Of chi^2, a factor of ten in likelihood.
-constexpr double variances_per_decade = 2 * std::numbers::ln10;
 
 /// chi^2 of an effect on the data that judge. What else is missing at its joint may not speak for it, so its gain is
 /// beside free curves of all other variables; where names close the joint's gap, nothing else is missing.

@@ -161,7 +161,7 @@ class Diagnoser {
       result.model = concluded(outcome, gate);
     }
     if (models_.has_baseline) add_notes(changed_parameters(*outcome.problem));
-    const auto curves = curves_of_the_rest(outcome);
+    const auto curves = curves_of_the_rest(outcome, gate);
     const auto impacts = find_impacts(result.model, data_.logs, outcome.models.healthy, baseline_, options().impact);
     result.report = verdicts({result.nominal, result.model, outcome, gate, likely, deflections_, impacts, curves,
                               still_, data_.logs, test_});
@@ -209,10 +209,12 @@ class Diagnoser {
     return finished(found.current);
   }
   /// What is left without a name gets a curve, by joint. It says which variable, and where.
-  std::vector<std::optional<CurveResult>> curves_of_the_rest(const Outcome& outcome) const {
+  std::vector<std::optional<CurveResult>> curves_of_the_rest(const Outcome& outcome, const Gate& gate) const {
     std::vector<std::optional<CurveResult>> out(joints());
     Models models = with_findings(outcome);
-    for (const FreeCurve& curve : add_free_curves(models, outcome, logs_, still_))
+    std::vector<bool> without = still_;
+    for (std::size_t j = 0; j < joints(); ++j) without[j] = without[j] || (!outcome.structured(j) && !gate.remains[j]);
+    for (const FreeCurve& curve : add_free_curves(models, logs_, without))
       out[curve.effect.joint] = drawn(models, curve, logs_);
     return out;
   }
@@ -224,9 +226,9 @@ class Diagnoser {
     std::vector<bool> without = still_;
     for (std::size_t j = 0; j < joints(); ++j) without[j] = without[j] || !told[j].curve;
     const VectorXd before = plain_error(result.model, logs_);
-    if (std::find(without.begin(), without.end(), false) == without.end() || before.sum() == 0) return;
+    if (before.sum() == 0) return;
     Models models = with_findings(outcome);
-    const std::vector<FreeCurve> curves = add_free_curves(models, outcome, logs_, without);
+    const std::vector<FreeCurve> curves = add_free_curves(models, logs_, without);
     if (curves.empty()) return;
     Linearised problem(models, logs_, plain());
     problem.solver().set_weights(diluted_weights(problem));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <numbers>
 #include <optional>
 #include <vector>
 
@@ -15,6 +16,9 @@ enum class Certainty {
   likely,      ///< it may stand in for something else, or be nothing
   established  ///< it is there, and no other effect of the catalogue explains what it does
 };
+
+/// Noise variances, or differences of -2 ln p, that one decade of odds is.
+inline constexpr double variances_per_decade = 2 * std::numbers::ln10;
 
 /// What speaks for an effect. Odds are log10 of likelihood ratios on the logs that judge.
 struct Evidence {

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "host_tools/diagnose/curve_squares.hpp"
 #include "host_tools/diagnose/deviations.hpp"
@@ -26,7 +25,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double variances_per_decade = 2 * std::numbers::ln10;
 /// Parts of the motion over which the knots may be: the whole and halves for every variable, down to eighths.
 constexpr int coarsest_parts = 2, finest_parts = 8;
 /// Where a curve is drawn: four points a piece.
@@ -338,17 +336,17 @@ std::string sentence_of(const CurveResult& curve, const Bump& bump, const Robot&
 
 }  // namespace
 
-std::vector<FreeCurve> add_free_curves(Models& models, const Outcome& outcome, const std::vector<SessionLog>& logs,
-                                       const std::vector<bool>& still) {
+std::vector<FreeCurve> add_free_curves(Models& models, const std::vector<SessionLog>& logs,
+                                       const std::vector<bool>& without) {
   const std::size_t n = models.current.joints.size();
   std::vector<FreeCurve> found;
   const Models before = models;
-  if (!outcome.structured()) return found;
+  if (std::find(without.begin(), without.end(), false) == without.end()) return found;
   {
     const Linearised problem(models, logs, white(n));
     models.curve_size.assign(n, 0);
     for (std::size_t j = 0; j < n; ++j) {
-      if (still[j] || !outcome.structured(j)) continue;
+      if (without[j]) continue;
       models.curve_size[j] = models.options.curve.height / std::sqrt(problem.solver().weights()[static_cast<Index>(j)]);
       if (auto curve = best_at(problem, j, models.curve_size[j])) found.push_back(*curve);
     }

@@ -221,8 +221,11 @@ void conclude(Gate& gate, const Outcome& outcome, const std::vector<bool>& still
     const auto k = static_cast<std::size_t>(j);
     const double closed = held.before[j] - held.after[j];
     if (gate.gap[j] > 0) gate.closure[j] = closed / gate.gap[j];
+    // Of a large gap a small share may still be plain beside the noise.
+    const double noise = std::max(held.after[j] - held.leftover[j], 0.0);
     gate.remains.push_back(!still[k] && outcome.structured(k) &&
-                           held.excess[j] > (1 - options.sure_closure) * gate.gap[j]);
+                           held.excess[j] >
+                               std::min((1 - options.sure_closure) * gate.gap[j], options.beyond_noise * noise));
     gate.accepted.push_back(gate.closure[j] >= (gate.remains.back() ? options.sure_closure : options.least_closure));
   }
 }
@@ -237,7 +240,11 @@ void believe(Gate& gate, const Outcome& outcome) {
     const Group& group = outcome.problem->groups()[gate.groups[i]];
     if (group.on_body) continue;
     const OwnEvidence& own = gate.own[i];
-    const bool holds = own.form >= (own.alike > 1 ? options.sure_closure : options.least_closure);
+    const bool beaten = own.of_position && own.curve_gain >= options.established * variances_per_decade;
+    const bool holds = own.form >= (own.alike > 1 || beaten ? options.sure_closure : options.least_closure) &&
+                       !(own.alike > 1 && beaten);
+    // What is there has a place, and another form than these names.
+    if (beaten && !holds) gate.remains[group.candidate.joint] = true;
     const bool by_itself = !own.of_time && own.gain >= options.sure_gain && own.form >= options.sure_closure;
     gate.believed[i] = holds && (gate.accepted[group.candidate.joint] || by_itself);
   }
@@ -439,7 +446,7 @@ VectorXd judged_error(const Models& models, const std::vector<SessionLog>& logs)
   return out;
 }
 
-void take_out(Outcome& outcome, const EffectId& gone, const std::vector<SessionLog>& logs) {
+void take_out(Outcome& outcome, EffectId gone, const std::vector<SessionLog>& logs) {
   std::erase_if(outcome.found, [&](const Finding& f) { return f.id == gone; });
   std::vector<EffectId> ids;
   for (const Finding& f : outcome.found) ids.push_back(f.id);

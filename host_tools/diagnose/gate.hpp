@@ -80,6 +80,7 @@ Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<Se
 std::optional<EffectId> harmful_finding(const Outcome& outcome, const IdentifiedModel& before,
                                         const IdentifiedModel& after, const std::vector<SessionLog>& logs);
 /// Takes a finding out of the outcome and fits what is left again.
-void take_out(Outcome& outcome, const EffectId& gone, const std::vector<SessionLog>& logs);
+/// @param gone a copy, since findings move up as one goes
+void take_out(Outcome& outcome, EffectId gone, const std::vector<SessionLog>& logs);
 
 }  // namespace fxdyn::diagnosis

@@ -143,6 +143,9 @@ struct GateOptions {
   /// share of the gap above the noise; .. where structure remains; hand: another effect may only resemble it. Likewise
   /// of what a free curve closes: several names in one variable, and those that are believed whatever else is missing
   double sure_closure = 0.8;
+  /// share of the noise's power; structure that is more remains, however small a part of the gap it is; hand: 12 % more
+  /// error than noise
+  double beyond_noise = 0.25;
   /// standard deviations; coefficients of a name are off nothing by; theory: 2 Phi(-2) = 4.6 % of noise is further off
   double sure_deviations = 2;
   /// log10 odds against nothing and against the closest rival; an effect is established; theory: 1000 to 1

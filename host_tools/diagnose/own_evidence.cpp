@@ -40,6 +40,7 @@ class Curves {
   }
 
   std::size_t count() const { return families_.size(); }
+  std::size_t own_position() const { return place_of_own_position(joints_); }
   /// Columns of some families side by side: rows, below them those that the joint's background adds.
   MatrixXd of(const std::vector<std::size_t>& chosen) const {
     Index cols = 0;
@@ -84,11 +85,17 @@ class AtJoint {
  public:
   AtJoint(const Linearised& problem, std::size_t joint, const std::vector<std::size_t>& groups,
           const std::vector<std::size_t>& own, const MatrixXd& features)
-      : problem_(problem), joint_(joint), groups_(groups), curves_(problem, joint, features) {
-    // The curves' size: that of what is there without the joint's effects.
-    prior_ = 1 / std::max(1.0, judged(without(own), {}) / rows());
+      : problem_(problem),
+        joint_(joint),
+        weight_(problem.solver().weights()[static_cast<Index>(joint)]),
+        groups_(groups),
+        curves_(problem, joint, features) {
+    for (const Fold& fold : problem.blocks().folds)
+      rows_ += problem.solver().row_count(fold.judge)[static_cast<Index>(joint)];
     for (const std::size_t g : own) variable_.push_back(curves_.of_variable(problem.groups()[g].candidate));
-    for (std::size_t i = 0; i < own.size(); ++i) evidence_.push_back(of(own, i));
+    rows_ = std::max(rows_, 1.0);
+    const Deviance size = judged(without(own));
+    for (std::size_t i = 0; i < own.size(); ++i) evidence_.push_back(of(own, i, size));
   }
   const std::vector<OwnEvidence>& evidence() const { return evidence_; }
 
@@ -100,20 +107,35 @@ class AtJoint {
     }
     return left;
   }
-  double rows() const {
-    double sum = 0;
-    for (const Fold& fold : problem_.blocks().folds)
-      sum += problem_.solver().row_count(fold.judge)[static_cast<Index>(joint_)];
-    return std::max(sum, 1.0);
-  }
-  double judged(const std::vector<std::size_t>& groups, const std::vector<std::size_t>& families) const {
+  Deviance judged(const std::vector<std::size_t>& groups) const { return judged(groups, {}, {}); }
+  /// The deviance of all folds, with curves of the size that suits them best.
+  /// @param nothing the deviance without them: they are at most as large as what is there
+  Deviance judged(const std::vector<std::size_t>& groups, const std::vector<std::size_t>& families,
+                  const Deviance& nothing) const {
+    constexpr double finer = 10;  // times the precision, from one size to the next
+    constexpr int sizes = 5;
     const MatrixXd curves = curves_.of(families);
-    double sum = 0;
+    std::vector<PredictiveDeviance> folds;
     for (const Fold& fold : problem_.blocks().folds)
-      sum += judged_with_curves(problem_, joint_, problem_.columns_of(groups), curves, prior_, fold);
-    return sum;
+      folds.emplace_back(problem_, joint_, problem_.columns_of(groups), curves, fold);
+    double precision = weight_ / std::max(1.0, nothing.square / rows_);
+    Deviance best;
+    for (int i = 0; i < (families.empty() ? 1 : sizes); ++i, precision *= finer) {
+      Deviance sum;
+      for (const PredictiveDeviance& fold : folds) {
+        const Deviance of = fold(precision);
+        sum.square += of.square;
+        sum.log_determinant += of.log_determinant;
+      }
+      if (i == 0 || less(sum, best)) best = sum;
+    }
+    return best;
   }
-  OwnEvidence of(const std::vector<std::size_t>& own, std::size_t i) const {
+  bool less(const Deviance& a, const Deviance& b) const { return gain(a, b) < 0; }
+  double gain(const Deviance& without, const Deviance& with) const {
+    return without.of_any_noise(rows_) - with.of_any_noise(rows_);
+  }
+  OwnEvidence of(const std::vector<std::size_t>& own, std::size_t i, const Deviance& size) const {
     OwnEvidence out;
     std::vector<std::size_t> others, alike;
     // Those of time, the last, say nothing of other times.
@@ -123,20 +145,26 @@ class AtJoint {
     for (std::size_t k = 0; k < own.size(); ++k) {
       if (variable_[k] == variable_[i]) alike.push_back(own[k]);
     }
-    out.gain = rows() * std::log(judged(without({own[i]}), others) / std::max(judged(groups_, others), 1e-300));
+    out.gain = gain(judged(without({own[i]}), others, size), judged(groups_, others, size));
     const std::vector<std::size_t> rest = without(alike);
-    const double nothing = judged(rest, {}), named = judged(groups_, {}), curve = judged(rest, {variable_[i]});
+    const Deviance nothing = judged(rest), named = judged(groups_);
+    const Deviance curve = std::min(judged(rest, {variable_[i]}, nothing), judged(groups_, {variable_[i]}, nothing),
+                                    [&](const Deviance& a, const Deviance& b) { return less(a, b); });
     out.alike = alike.size();
     out.of_time = variable_[i] + 1 == curves_.count();
-    out.form = nothing > curve ? std::max(0.0, nothing - named) / (nothing - curve) : 1.0;
+    out.of_position = variable_[i] == curves_.own_position();
+    const double by_names = nothing.sum() - named.sum(), by_curve = nothing.sum() - curve.sum();
+    out.form = by_curve > 0 ? std::max(0.0, by_names) / by_curve : 1.0;
+    out.curve_gain = gain(named, curve);
     return out;
   }
 
   const Linearised& problem_;
   std::size_t joint_;
+  double weight_;
   const std::vector<std::size_t>& groups_;
   Curves curves_;
-  double prior_ = 1;
+  double rows_ = 0;
   std::vector<std::size_t> variable_;  ///< by own group: a family
   std::vector<OwnEvidence> evidence_;
 };

@@ -12,11 +12,14 @@ struct OwnEvidence {
   /// What it brings beside free curves of all variables but its own: rows times ln of the ratio of squares without and
   /// with it, which is chi^2 where it is small. What is missing in another variable does not speak for it.
   double gain = 0;
-  /// Of what a free curve of its own variable closes in its place, the share that it closes, together with the others
-  /// of that variable: the form holds.
+  /// Of what a free curve of its own variable closes in its place or beside it, the share that it closes, together with
+  /// the others of that variable: the form holds.
   double form = 1;
-  std::size_t alike = 1;  ///< effects of that variable at the joint
-  bool of_time = false;   ///< its variable is time, whose curve says nothing of other times
+  /// What that curve is more likely by than those names, as a difference of -2 ln p: less than 0 where they suffice.
+  double curve_gain = 0;
+  bool of_position = false;  ///< its variable is the own position
+  std::size_t alike = 1;     ///< effects of that variable at the joint
+  bool of_time = false;      ///< its variable is time, whose curve says nothing of other times
 };
 
 /// An effect's own variable is another joint's velocity, time, the own position, or else the own motion and load; its

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/braking.hpp"
@@ -20,62 +21,118 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// -2 ln likelihood of the models as they are, but for a constant.
-double misfit(const Linearised& problem) {
+/// -2 ln likelihood of the models as they are, but for a constant: by joint, and of what was known beforehand.
+struct Misfit {
+  VectorXd of_joint;
+  double of_priors = 0;
+  double sum() const { return of_joint.sum() + of_priors; }
+};
+
+Misfit misfit(const Linearised& problem) {
   LinearFit now;
   now.columns = problem.unknown_columns();
   now.x.resize(static_cast<Index>(now.columns.size()));
-  double sum = 0;
+  Misfit out;
   for (std::size_t c = 0; c < problem.unknowns().size(); ++c) {
     const Unknown& u = problem.unknowns()[c];
     now.x[static_cast<Index>(c)] = u.value;
-    if (u.prior_std > 0) sum += std::pow((u.value - u.prior) / u.prior_std, 2);
+    if (u.prior_std > 0) out.of_priors += std::pow((u.value - u.prior) / u.prior_std, 2);
   }
   const VectorXd square = problem.solver().square(now, problem.blocks().fit);
   const VectorXd rows = problem.solver().row_count(problem.blocks().fit);
+  out.of_joint.resize(square.size());
   for (Index j = 0; j < square.size(); ++j) {
-    sum += rows[j] * std::log(std::max(square[j], 1e-300));
-    sum -= 2 * problem.noise().log_scale(static_cast<std::size_t>(j));
+    out.of_joint[j] =
+        rows[j] * std::log(std::max(square[j], 1e-300)) - 2 * problem.noise().log_scale(static_cast<std::size_t>(j));
   }
-  return sum;
+  return out;
 }
+
+/// Gauss-Newton over all unknowns. A joint at which no step does any good has its widths and shapes held: its friction
+/// may be of a form that none of them suits, and what else there is to fit, at all joints, is linear.
+class Refit {
+ public:
+  Refit(std::vector<SessionLog> logs, std::vector<VectorXd> whitening, std::size_t joints)
+      : logs_(std::move(logs)), whitening_(std::move(whitening)), held_(joints, false) {}
+
+  Models run(Models models, int rounds) {
+    if (judge(models) == Trial::rejected) return models;  // no figures at all
+    const GaussNewton rules{.most_rounds = rounds, .shrink = 0.3};
+    do {
+      risen_.assign(held_.size(), false);
+      models = gauss_newton(
+          models, rules,
+          [&](const Models&, int) {
+            return tried_ < rounds ? std::optional(around_->solver().solve(free())) : std::nullopt;
+          },
+          [&](const Models& from, const LinearFit& fit, double share) {
+            Models there = from;
+            update(there, around_->unknowns(), fit, share);
+            return there;
+          },
+          [&](const Models&, const Models& there, int) { return judge(there); });
+    } while (hold_risen());
+    return models;
+  }
+
+ private:
+  static constexpr double counts = 1;  ///< one variance of one parameter
+
+  Trial judge(const Models& there) {
+    auto problem = std::make_unique<Linearised>(there, logs_, whitening_);
+    whitening_ = problem->noise().whitening();  // one for all rounds, else their misfits can't be compared
+    const Misfit now = misfit(*problem);
+    if (around_ && !(now.sum() < least_.sum())) {
+      for (std::size_t j = 0; j < held_.size(); ++j) {
+        const auto k = static_cast<Index>(j);
+        if (!(now.of_joint[k] < least_.of_joint[k] + counts)) risen_[j] = true;
+      }
+      return Trial::rejected;
+    }
+    if (!std::isfinite(now.sum())) return Trial::rejected;
+    const bool converged = around_ && least_.sum() - now.sum() < counts;
+    if (around_) ++tried_;
+    least_ = now;
+    around_ = std::move(problem);
+    risen_.assign(held_.size(), false);
+    return converged ? Trial::converged : Trial::accepted;
+  }
+  /// Columns of the unknowns that are not held.
+  std::vector<Index> free() const {
+    std::vector<Index> out;
+    for (const Index c : around_->unknown_columns()) {
+      const Unknown& u = around_->unknowns()[static_cast<std::size_t>(c)];
+      if (!(u.is_logarithm() && !u.body && held_[u.joint])) out.push_back(c);
+    }
+    return out;
+  }
+  /// @returns whether a joint is held that was not, since the last step was rejected
+  bool hold_risen() {
+    bool more = false;
+    for (std::size_t j = 0; j < held_.size(); ++j) {
+      more |= risen_[j] && !held_[j];
+      held_[j] = held_[j] || risen_[j];
+    }
+    return more;
+  }
+
+  std::vector<SessionLog> logs_;
+  std::vector<VectorXd> whitening_;
+  std::vector<bool> held_;   ///< by joint: its widths and shapes stay
+  std::vector<bool> risen_;  ///< by joint: steps that were rejected since the last good one raised its misfit
+  std::unique_ptr<Linearised> around_;  ///< the best so far
+  Misfit least_;
+  int tried_ = 0;
+};
 
 }  // namespace
 
 void refit(Models& models, const std::vector<SessionLog>& all, const std::vector<VectorXd>& given, int rounds) {
-  constexpr double converged_below = 1;  // one variance of one parameter
-  std::vector<VectorXd> whitening = given;
   std::vector<SessionLog> logs;
   for (const SessionLog& log : all) {
     if (log.fits) logs.push_back(log);
   }
-  std::unique_ptr<Linearised> around;  // the best so far
-  double least = 1e300;
-  int tried = 0;
-  const auto judge = [&](const Models& there) {
-    auto problem = std::make_unique<Linearised>(there, logs, whitening);
-    whitening = problem->noise().whitening();  // one for all rounds, else their misfits can't be compared
-    const double now = misfit(*problem);
-    if (!(now < least)) return Trial::rejected;
-    const bool converged = least - now < converged_below;
-    least = now;
-    around = std::move(problem);
-    return converged ? Trial::converged : Trial::accepted;
-  };
-  if (judge(models) == Trial::rejected) return;  // no figures at all
-  const auto step = [&](const Models&, int) {
-    return tried < rounds ? std::optional(around->solver().solve(around->unknown_columns())) : std::nullopt;
-  };
-  const auto move = [&](const Models& from, const LinearFit& fit, double share) {
-    Models there = from;
-    update(there, around->unknowns(), fit, share);
-    return there;
-  };
-  const auto accept = [&](const Models&, const Models& there, int) {
-    ++tried;
-    return judge(there);
-  };
-  models = gauss_newton(models, {.most_rounds = rounds, .shrink = 0.3}, step, move, accept);
+  models = Refit(std::move(logs), given, models.current.joints.size()).run(models, rounds);
 }
 
 void bring_rotor(Models& models, const Rotor& rotor, double inertia) {

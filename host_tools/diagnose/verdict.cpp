@@ -324,7 +324,8 @@ class ReportWriter {
     if (out.carries_over == false) note_risen_error(j, of);
     const bool left = out.verdict == Verdict::unexplained || out.verdict == Verdict::partly_explained;
     // What only bends leaves no gap in the torque, and noise alone has nothing to close.
-    const bool of_torque = state.there || state.reached || (left && (state.structured || state.likely)) ||
+    const bool of_torque = state.there || state.reached ||
+                           (left && (state.structured || state.remains || state.likely)) ||
                            any([](const NamedEffect& e) { return e.signal.empty(); });
     const bool only_impacts = state.impacts && !changed && !state.structured;
     if (only_impacts) {

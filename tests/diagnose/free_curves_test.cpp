@@ -47,7 +47,9 @@ Answer answer(const Torque& torque) {
   refit(outcome.models, out.logs, outcome.whitening, 4);
   outcome.look_again(out.logs);
   out.before = out.after = outcome.models;
-  out.curves = add_free_curves(out.after, outcome, out.logs, std::vector<bool>(6, false));
+  std::vector<bool> without;
+  for (std::size_t j = 0; j < 6; ++j) without.push_back(!outcome.structured(j));
+  out.curves = add_free_curves(out.after, out.logs, without);
   if (!out.curves.empty()) out.drawn = drawn(out.after, out.curves.front(), out.logs);
   return out;
 }

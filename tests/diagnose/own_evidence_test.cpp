@@ -19,10 +19,12 @@ using Eigen::MatrixXd;
 using Torque = std::function<ArrayXd(const ArrayXd& own, const ArrayXd& other)>;
 
 /// A PUMA 560 with that torque at its second joint, and a model with effects there instead.
-std::vector<OwnEvidence> evidence(const Torque& torque, const std::vector<EffectFit>& effects) {
+/// @param second role of the log that judges; train: both do
+std::vector<OwnEvidence> evidence(const Torque& torque, const std::vector<EffectFit>& effects,
+                                  Role second = Role::validate) {
   const IdentifiedModel nominal = test::fitted_puma();
   std::vector<SessionLog> logs;
-  for (const auto& [role, seed] : {std::pair{Role::train, 1}, std::pair{Role::validate, 2}}) {
+  for (const auto& [role, seed] : {std::pair{Role::train, 1}, std::pair{second, 2}}) {
     logs.push_back(test::small_session_log(nominal, role, static_cast<std::uint64_t>(seed)));
     const MatrixXd& q = logs.back().log.q;
     logs.back().log.tau.col(1).array() += torque(q.col(1).array(), q.col(3).array());
@@ -81,6 +83,35 @@ TEST(EvidenceOfItsOwn, SeveralNamesForOneBumpAreWorseThanACurve) {
     EXPECT_EQ(one.alike, 3U);
     EXPECT_LT(one.form, 0.8);
     EXPECT_GT(one.gain, 16);  // each brings something: that alone is no proof of a name
+  }
+}
+
+// A stop pushes back beyond a position. A compensator and a spring close most of that, a curve of the position all of
+// it: also where two logs judge one another, of which neither shows all that the other has.
+TEST(EvidenceOfItsOwn, TwoNamesForAStopLoseAgainstACurve) {
+  const auto stop = [](const ArrayXd& q, const ArrayXd&) -> ArrayXd { return -6 * (q - 0.3).max(0.0); };
+  for (const Role second : {Role::validate, Role::train}) {
+    const auto own = evidence(
+        stop, {test::named_effect("gravity_compensator", {}, {0.5, 0.5}), test::named_effect("spring", {}, {-1, 0})},
+        second);
+    ASSERT_EQ(own.size(), 2U);
+    for (const OwnEvidence& one : own) {
+      EXPECT_TRUE(one.of_position);
+      EXPECT_GT(one.curve_gain, 14);
+    }
+  }
+}
+
+TEST(EvidenceOfItsOwn, TwoNamesForWhatTheyAreDoNot) {
+  const auto both = [](const ArrayXd& q, const ArrayXd&) -> ArrayXd { return 3 * q + 5 * (14 * q).cos(); };
+  for (const Role second : {Role::validate, Role::train}) {
+    const auto own =
+        evidence(both, {test::named_effect("spring", {}, {3, 0}), test::named_effect("ripple", {14}, {5, 0})}, second);
+    ASSERT_EQ(own.size(), 2U);
+    for (const OwnEvidence& one : own) {
+      EXPECT_LT(one.curve_gain, 0);
+      EXPECT_GT(one.form, 0.95);
+    }
   }
 }
 

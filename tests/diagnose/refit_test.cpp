@@ -1,0 +1,48 @@
+// The fit of all unknowns around a model, where one joint's friction is of no form that the model knows.
+
+#include "host_tools/diagnose/refit.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "host_tools/diagnose/plain_error.hpp"
+#include "tests/diagnose/small_problem.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::ArrayXd;
+
+/// Share of the squared error of PUMA's second joint, which has an offset more than the model, that a fit leaves.
+/// @param friction that the first joint has more than the model, of its velocity
+/// @param sign_width with which the model's own begins there [rad/s]
+double left_at_second_joint(const std::function<ArrayXd(const ArrayXd&)>& friction, double sign_width) {
+  IdentifiedModel nominal = test::fitted_puma();
+  std::vector<SessionLog> logs;
+  for (const auto& [role, seed] : {std::pair{Role::train, 1}, std::pair{Role::validate, 2}}) {
+    logs.push_back(test::small_session_log(nominal, role, static_cast<std::uint64_t>(seed)));
+    ProcessedLog& log = logs.back().log;
+    log.tau.col(0).array() += friction(log.motion(0, log.samples()).dq.col(0).array());
+    log.tau.col(1).array() += 3;
+  }
+  nominal.joints[0].sign_width = sign_width;
+  Models models = test::around(nominal);
+  const double before = plain_error(models.current, logs)[1];
+  refit(models, logs, test::no_whitening(), 8);
+  return plain_error(models.current, logs)[1] / before;
+}
+
+// No width of the first joint's sign function is any good there, and a step towards another one makes its error rise.
+TEST(Refit, FitsAJointWhateverAnotherOneLacks) {
+  for (const double width : {0.02, 0.3, 2.0}) {
+    EXPECT_LT(left_at_second_joint([](const ArrayXd& dq) -> ArrayXd { return 0 * dq; }, width), 0.01) << width;
+    EXPECT_LT(left_at_second_joint([](const ArrayXd& dq) -> ArrayXd { return 2 * dq.cube() - 3 * dq; }, width), 0.01)
+        << width;
+    EXPECT_LT(left_at_second_joint([](const ArrayXd& dq) -> ArrayXd { return 20 * (6 * dq).sin(); }, width), 0.01)
+        << width;
+  }
+}
+
+}  // namespace
+}  // namespace fxdyn::diagnosis
