@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # format.sh style | tidy BUILD_DIR [REF [SECONDS]]: clang-format over all sources; clang-tidy over those that differ from REF
-# (HEAD~1), no new file after SECONDS (120). Says what to do: clang-format-14 -i FILE.
+# (HEAD~1), no new file after SECONDS (60). Says what to do: clang-format-14 -i FILE.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
-longest_s=${4:-120}
+longest_s=${4:-60}
 
 sources() { find model hal firmware host_tools tests -name '*.[ch]pp' | grep -v '^tests/golden/.*\(tables\|vectors\)\.hpp$' | sort; }
 

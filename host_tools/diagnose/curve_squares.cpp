@@ -135,8 +135,8 @@ PredictiveDeviance::PredictiveDeviance(const Linearised& problem, std::size_t jo
     const MatrixXd j = rows_of(problem, joint, columns, curves, block);
     const VectorXd e = y.segment(block.first, block.count) - j * start_;
     square_ += w * e.squaredNorm();
-    products_.noalias() += w * j.transpose() * e;
-    judged_.noalias() += w * j.transpose() * j;
+    products_ += w * (j.transpose() * e);
+    judged_ += w * (j.transpose() * j);
   }
 }
 
