@@ -48,6 +48,9 @@ class FaultFits {
 
   std::vector<RecordingFault> all() {
     if (nominal_.has_baseline) {
+      for (const EffectInfo& effect : effect_infos()) {
+        if (effect.acts_on == ActsOn::body) on_robot_ = std::max(on_robot_, score_on_robot(effect));
+      }
       for (std::size_t j = 0; j < problem_.joints(); ++j) fit_zero(j);
     }
     fit_clocks();
@@ -164,6 +167,8 @@ class FaultFits {
             fmt::format("{}: its encoder slipped since the baseline: these logs fit best with {:+.4g} {} added to its "
                         "position; correct that, or record the baseline again",
                         j.name, shift, j.position_unit()));
+      // A first joint that lies shows a tilt as a slip of its own.
+      faults_.back().sound_score = on_robot_;
       return;
     }
   }
@@ -211,14 +216,14 @@ class FaultFits {
     if (!complaint.empty()) weigh(growing, 2 * count, complaint, &constant);
   }
 
-  /// Columns of a load in some of today's logs.
-  std::vector<MatrixXd> load_rows(const std::vector<std::size_t>& logs) const {
-    Group load;
-    load.candidate = {std::string(load_effect().name), 0, {}};
-    load.on_body = true;
-    std::vector<MatrixXd> rows = no_rows(static_cast<Index>(load_effect().linear.size()));
+  /// Columns of an effect on the robot in some of today's logs.
+  std::vector<MatrixXd> robot_rows(const EffectInfo& effect, const std::vector<std::size_t>& logs) const {
+    Group group;
+    group.candidate = {std::string(effect.name), 0, {}};
+    group.on_body = true;
+    std::vector<MatrixXd> rows = no_rows(static_cast<Index>(effect.linear.size()));
     for (const std::size_t log : logs) {
-      const EffectColumns columns = problem_.log_columns().of(log, load);
+      const EffectColumns columns = problem_.log_columns().of(log, group);
       for (std::size_t j = 0; j < rows.size(); ++j) {
         for (Index c = 0; c < columns.joints[j].cols(); ++c) put(log, j, columns.joints[j].col(c), c, rows);
       }
@@ -226,16 +231,20 @@ class FaultFits {
     return rows;
   }
 
+  double score_on_robot(const EffectInfo& effect) {
+    return score_of(fit_with(robot_rows(effect, today_)), static_cast<Index>(effect.linear.size()));
+  }
+
   void fit_load(std::size_t i) {
     const auto parameters = static_cast<Index>(load_effect().linear.size());
-    const LinearFit fit = fit_with(load_rows({today_[i]}));
+    const LinearFit fit = fit_with(robot_rows(load_effect(), {today_[i]}));
     const Index at = fit.x.size() - parameters;
     if (std::fabs(fit.x[at]) < options_.deviations * deviation(fit, at)) return;
     weigh(fit, parameters,
           fmt::format("{}: recorded with another load than the other logs ({:+.3g} kg): say so by `payload` of its "
                       "[[log]], or leave it out",
                       name(today_[i]), fit.x[at]));
-    faults_.back().sound_score = score_of(fit_with(load_rows(today_)), parameters);
+    faults_.back().sound_score = score_on_robot(load_effect());
   }
 
   /// Columns of a joint's torque in some of today's logs.
@@ -277,6 +286,7 @@ class FaultFits {
   LinearFit sound_;
   double sound_likelihood_, price_;
   double explainable_ = 0;
+  double on_robot_ = 0;             ///< the best score of an effect on the robot
   std::vector<std::size_t> today_;  ///< logs that fit
   std::vector<MatrixXd> torque_;    ///< of the nominal model, by log of today
   std::vector<RecordingFault> faults_;

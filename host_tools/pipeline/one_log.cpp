@@ -132,11 +132,12 @@ std::string prediction_table(const LogErrors& errors, const Robot& robot) {
   return out;
 }
 
-/// Of the prediction: CSV, whatever the log was packed in.
+/// Of the prediction: CSV, whatever the log was and was packed in.
 fs::path prediction_name(const fs::path& log_file) {
   if (log_file == "-") return "stdin.csv";
-  const fs::path name = log_file.filename();
-  return name.extension() == ".gz" ? name.stem() : name;
+  fs::path name = log_file.has_filename() ? log_file.filename() : log_file.parent_path().filename();  // a bag's folder
+  if (name.extension() == ".gz" || name.extension() == ".zst") name = name.stem();
+  return name.replace_extension(".csv");
 }
 
 }  // namespace

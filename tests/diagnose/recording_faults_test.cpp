@@ -43,6 +43,13 @@ TEST(RecordingFaults, AnEncoderThatSlippedFar) {
   EXPECT_NEAR(number_after(said, "best with "), -0.5, 0.05) << said;
 }
 
+// To an arm whose first joint lies, a base that tilts is an encoder that slipped.
+TEST(RecordingFaults, ATiltIsNoSlipOfTheFirstJoint) {
+  const std::string said = complaint("tilted", {.missing = effect("gravity_tilt", 0, "tilt_x = 0.0, tilt_y = 0.04")});
+  EXPECT_EQ(said.substr(0, 4), "none") << said;
+  EXPECT_NE(said.find("gravity_tilt"), std::string::npos) << said;
+}
+
 TEST(RecordingFaults, AnotherGainInOneLogIsNoLoad) {
   if (test::sanitized) GTEST_SKIP() << "other cases run the same code";
   const std::string said = complaint("one_gain", {.tamper = [](Log& log) {

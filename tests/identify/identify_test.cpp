@@ -149,6 +149,10 @@ TEST(Identify, ModelFileKeepsEverythingThatPredictionNeeds) {
   EXPECT_GT(apart, 1e-6);
   EXPECT_LT(apart, 0.05);
   EXPECT_THROW(predict_log(out / "model.json", log, {}, log.parent_path()), InputError);
+  // CSV by name, too, whatever the log is.
+  fs::copy_file(log, test::folder() / "c.run.txt", fs::copy_options::overwrite_existing);
+  predict_log(out / "model.json", test::folder() / "c.run.txt", {}, test::folder() / "prediction");
+  EXPECT_EQ(lines(test::folder() / "prediction" / "c.run.csv"), lines(log));
   // The same input gives the same bytes, by `run` as by the verbs one by one, each a process of its own.
   const fs::path again = test::folder() / "again", verbs = test::folder() / "verbs";
   Pipeline(out.parent_path() / "keep.toml", again).run();
