@@ -12,8 +12,6 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Of chi^2, a factor of ten in likelihood.
-
 /// chi^2 of an effect on the data that judge. What else is missing at its joint may not speak for it, so its gain is
 /// beside free curves of all other variables; where names close the joint's gap, nothing else is missing.
 double gain_of(const Gate& gate, const Group& group, std::size_t i) {

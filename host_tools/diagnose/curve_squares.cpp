@@ -13,7 +13,6 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// X^T W X and X^T W y of columns of the problem and curves of one joint, on blocks, with the priors.
 /// Adds products of curves on some rows: among themselves, with y and with the columns before them.
 /// @param column_of a column of the joint on the same rows
 template <typename Curves, typename Values, typename ColumnOf>
@@ -50,9 +49,9 @@ Normal normal_of(const Linearised& problem, std::size_t joint, const std::vector
   out.gram.topLeftCorner(p, p) = gram;
   out.projection.head(p) = projection;
   if (c == 0) return out;
+  // Of the healthy session too: where a background has been taken out, curves have rows there.
   for (const std::size_t b : blocks) {
     const Block& block = problem.blocks().all[b];
-    if (block.healthy) continue;
     add_products(
         rows, columns, w, curves.middleRows(block.first, block.count), rows.y.segment(block.first, block.count),
         [&](Index local) { return rows.x.col(local).segment(block.first, block.count); }, out.gram, out.projection);
@@ -79,12 +78,16 @@ MatrixXd rows_of(const Linearised& problem, std::size_t joint, const std::vector
   return out;
 }
 
+/// Squares of a fit that has no solution.
+constexpr double impossible = 1e30;
+
 /// ln det and solutions of a positive definite matrix, scaled to a unit diagonal.
 class Definite {
  public:
   explicit Definite(const MatrixXd& a) : scale_(a.diagonal().cwiseSqrt().cwiseInverse()) {
     llt_.compute(scale_.asDiagonal() * a * scale_.asDiagonal());
   }
+  bool is_definite() const { return llt_.info() == Eigen::Success; }
   VectorXd solve(const VectorXd& b) const { return scale_.cwiseProduct(llt_.solve(scale_.cwiseProduct(b))); }
   double log_determinant() const {
     return 2 * (llt_.matrixLLT().diagonal().array().log().sum() - scale_.array().log().sum());
@@ -141,18 +144,20 @@ PredictiveDeviance::PredictiveDeviance(const Linearised& problem, std::size_t jo
 }
 
 double Deviance::of_any_noise(double rows) const {
-  return rows * std::log(std::max(square / std::max(rows, 1.0), 1e-300)) + log_determinant;
+  constexpr double rounding = 1e-6;  // noise variances: with less, squares are differences of large numbers
+  return rows * std::log(std::max(square / std::max(rows, 1.0), rounding)) + log_determinant;
 }
 
 Deviance PredictiveDeviance::operator()(double prior) const {
   MatrixXd gram = fitted_;
   gram.bottomRightCorner(curves_, curves_).diagonal().array() += prior;
-  const Definite fitted(gram);
+  const Definite fitted(gram), all(gram + judged_);
+  if (!fitted.is_definite() || !all.is_definite()) return {impossible, 0};
   const VectorXd x = fitted.solve(right_);
   const VectorXd products = products_ - judged_ * x;
-  const double square = square_ - 2 * products_.dot(x) + x.dot(judged_ * x);
-  const Definite all(gram + judged_);
-  return {square - products.dot(all.solve(products)), all.log_determinant() - fitted.log_determinant()};
+  const double square = square_ - 2 * products_.dot(x) + x.dot(judged_ * x) - products.dot(all.solve(products));
+  if (!std::isfinite(square)) return {impossible, 0};
+  return {std::max(square, 0.0), all.log_determinant() - fitted.log_determinant()};
 }
 
 }  // namespace fxdyn::diagnosis

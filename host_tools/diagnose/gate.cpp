@@ -208,8 +208,31 @@ void choose_time_constants(Outcome& outcome, const std::vector<SessionLog>& logs
   outcome.look_again(logs);
 }
 
+/// Whether a name's form holds against a free curve of its variable.
+bool form_holds(const OwnEvidence& own, const GateOptions& options) {
+  const bool several = own.alike > 1;
+  if (own.of_position && own.curve_gain >= options.established * variances_per_decade)
+    return own.form >= (several ? options.several_closure : options.sure_closure);
+  return own.form >= (several ? options.sure_closure : options.least_closure);
+}
+
+/// By joint: what is there has a place, and another form than the names that it got.
+std::vector<bool> lacking_form(const Gate& gate, const Outcome& outcome) {
+  const GateOptions& options = outcome.models.options.gate;
+  std::vector<bool> out(outcome.lack.size(), false);
+  for (std::size_t i = 0; i < gate.groups.size(); ++i) {
+    const Group& group = outcome.problem->groups()[gate.groups[i]];
+    const OwnEvidence& own = gate.own[i];
+    if (group.on_body || !own.of_position || form_holds(own, options)) continue;
+    out[group.candidate.joint] =
+        out[group.candidate.joint] || own.curve_gain >= options.established * variances_per_decade;
+  }
+  return out;
+}
+
 /// Which names are believed at each joint.
 void conclude(Gate& gate, const Outcome& outcome, const std::vector<bool>& still) {
+  const std::vector<bool> misnamed = lacking_form(gate, outcome);
   const GateOptions& options = outcome.models.options.gate;
   const HeldOut& held = gate.held;
   const auto n = static_cast<Index>(outcome.lack.size());
@@ -223,9 +246,8 @@ void conclude(Gate& gate, const Outcome& outcome, const std::vector<bool>& still
     if (gate.gap[j] > 0) gate.closure[j] = closed / gate.gap[j];
     // Of a large gap a small share may still be plain beside the noise.
     const double noise = std::max(held.after[j] - held.leftover[j], 0.0);
-    gate.remains.push_back(!still[k] && outcome.structured(k) &&
-                           held.excess[j] >
-                               std::min((1 - options.sure_closure) * gate.gap[j], options.beyond_noise * noise));
+    const double counts = std::min((1 - options.sure_closure) * gate.gap[j], options.beyond_noise * noise);
+    gate.remains.push_back(!still[k] && (misnamed[k] || (outcome.structured(k) && held.excess[j] > counts)));
     gate.accepted.push_back(gate.closure[j] >= (gate.remains.back() ? options.sure_closure : options.least_closure));
   }
 }
@@ -234,19 +256,13 @@ void conclude(Gate& gate, const Outcome& outcome, const std::vector<bool>& still
 /// of their own. None that a free curve of its variable is better than.
 void believe(Gate& gate, const Outcome& outcome) {
   const GateOptions& options = outcome.models.options.gate;
-  gate.own = own_evidence(*outcome.problem, gate.groups, outcome.features);
   gate.believed.assign(gate.groups.size(), false);
   for (std::size_t i = 0; i < gate.groups.size(); ++i) {
     const Group& group = outcome.problem->groups()[gate.groups[i]];
     if (group.on_body) continue;
     const OwnEvidence& own = gate.own[i];
-    const bool beaten = own.of_position && own.curve_gain >= options.established * variances_per_decade;
-    const bool holds = own.form >= (own.alike > 1 || beaten ? options.sure_closure : options.least_closure) &&
-                       !(own.alike > 1 && beaten);
-    // What is there has a place, and another form than these names.
-    if (beaten && !holds) gate.remains[group.candidate.joint] = true;
     const bool by_itself = !own.of_time && own.gain >= options.sure_gain && own.form >= options.sure_closure;
-    gate.believed[i] = holds && (gate.accepted[group.candidate.joint] || by_itself);
+    gate.believed[i] = form_holds(own, options) && (gate.accepted[group.candidate.joint] || by_itself);
   }
 }
 
@@ -380,6 +396,7 @@ Gate judge_again(const Outcome& outcome, const std::vector<SessionLog>& logs, co
   Gate gate;
   gate.groups = in_model(*outcome.problem);
   gate.held = judge(outcome, logs, gate.groups);
+  gate.own = own_evidence(*outcome.problem, gate.groups, outcome.features);
   conclude(gate, outcome, still);
   believe(gate, outcome);
   judge_robot(gate, outcome);

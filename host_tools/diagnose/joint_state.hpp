@@ -8,8 +8,8 @@ namespace fxdyn::diagnosis {
 
 /// What was found at a joint, and what is left there.
 struct JointState {
-  bool structured = false;   ///< the model misses something, on the data that fit
-  bool remains = false;      ///< it does on the data that judge, so much that it counts
+  bool structured = false;  ///< the model misses something, on the data that fit
+  bool remains = false;  ///< it does on the data that judge, so much that it counts, or has another form than its names
   bool established = false;  ///< an effect of its own
   bool reached = false;      ///< an established effect on the robot is felt here
   bool there = false;        ///< an effect is there for sure, and its name is not established

@@ -100,6 +100,11 @@ class AtJoint {
   const std::vector<OwnEvidence>& evidence() const { return evidence_; }
 
  private:
+  // A curve's sizes that are tried, each with so many times the precision of the one before; hand: from what is there
+  // down to a hundredth of it.
+  static constexpr double finer = 10;
+  static constexpr int sizes = 5;
+
   std::vector<std::size_t> without(const std::vector<std::size_t>& gone) const {
     std::vector<std::size_t> left;
     for (const std::size_t g : groups_) {
@@ -112,8 +117,6 @@ class AtJoint {
   /// @param nothing the deviance without them: they are at most as large as what is there
   Deviance judged(const std::vector<std::size_t>& groups, const std::vector<std::size_t>& families,
                   const Deviance& nothing) const {
-    constexpr double finer = 10;  // times the precision, from one size to the next
-    constexpr int sizes = 5;
     const MatrixXd curves = curves_.of(families);
     std::vector<PredictiveDeviance> folds;
     for (const Fold& fold : problem_.blocks().folds)
@@ -155,7 +158,7 @@ class AtJoint {
     out.of_position = variable_[i] == curves_.own_position();
     const double by_names = nothing.sum() - named.sum(), by_curve = nothing.sum() - curve.sum();
     out.form = by_curve > 0 ? std::max(0.0, by_names) / by_curve : 1.0;
-    out.curve_gain = gain(named, curve);
+    out.curve_gain = gain(named, curve) - 2 * std::log(2 * sizes);
     return out;
   }
 

@@ -9,13 +9,14 @@ namespace fxdyn::diagnosis {
 
 /// What speaks for one effect at its joint on data that fitted none of it, whatever else is missing there.
 struct OwnEvidence {
-  /// What it brings beside free curves of all variables but its own: rows times ln of the ratio of squares without and
-  /// with it, which is chi^2 where it is small. What is missing in another variable does not speak for it.
+  /// What it brings beside free curves of all variables but its own: the difference of -2 ln p without and with it,
+  /// which is chi^2 where it is small. What is missing in another variable does not speak for it.
   double gain = 0;
   /// Of what a free curve of its own variable closes in its place or beside it, the share that it closes, together with
   /// the others of that variable: the form holds.
   double form = 1;
-  /// What that curve is more likely by than those names, as a difference of -2 ln p: less than 0 where they suffice.
+  /// What that curve is more likely by than those names, as a difference of -2 ln p less the price of the curves tried:
+  /// less than 0 where they suffice.
   double curve_gain = 0;
   bool of_position = false;  ///< its variable is the own position
   std::size_t alike = 1;     ///< effects of that variable at the joint
@@ -23,8 +24,8 @@ struct OwnEvidence {
 };
 
 /// An effect's own variable is another joint's velocity, time, the own position, or else the own motion and load; its
-/// curve is the family of features() of that name. Coefficients of the functions have a normal prior of the size of the
-/// residual.
+/// curve is the family of features() of that name. Coefficients of the functions have a normal prior of the size that
+/// suits what judges best.
 /// @param groups of the problem, named in its model; those on the body get no answer
 /// @param features by joint, of the same problem
 std::vector<OwnEvidence> own_evidence(const Linearised& problem, const std::vector<std::size_t>& groups,

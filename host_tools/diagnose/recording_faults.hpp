@@ -17,8 +17,9 @@ struct RecordingFault {
   std::string complaint;  ///< what it is, and what to do
   double score = 0;       ///< 2 ln likelihood - k ln N, more than the nominal model's
   double closure = 0;     ///< share of what any function of the state explains of today's logs
-  /// score; the same of what a sound recording may show in its place: that load or gain in all of today's logs, or a
-  /// joint whose friction is another in that log, as it is where the model's friction does not fit that motion
+  /// score; the same of what a sound recording may show in its place: that load or gain in all of today's logs; a joint
+  /// whose friction is another in that log, as it is where the model's friction does not fit that motion; for a slip a
+  /// tilt or load of the robot
   double sound_score = 0;
 };
 

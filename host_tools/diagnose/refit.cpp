@@ -48,8 +48,8 @@ Misfit misfit(const Linearised& problem) {
   return out;
 }
 
-/// Gauss-Newton over all unknowns. A joint at which no step does any good has its widths and shapes held: its friction
-/// may be of a form that none of them suits, and what else there is to fit, at all joints, is linear.
+/// Gauss-Newton over all unknowns. Where a step does no good, the joints whose error it raised have widths and shapes
+/// held: their friction may be of a form that none suits, and what else there is to fit, at all joints, is linear.
 class Refit {
  public:
   Refit(std::vector<SessionLog> logs, std::vector<VectorXd> whitening, std::size_t joints)
@@ -58,12 +58,14 @@ class Refit {
   Models run(Models models, int rounds) {
     if (judge(models) == Trial::rejected) return models;  // no figures at all
     const GaussNewton rules{.most_rounds = rounds, .shrink = 0.3};
+    int most = 0;
     do {
+      most += rounds;
       risen_.assign(held_.size(), false);
       models = gauss_newton(
           models, rules,
           [&](const Models&, int) {
-            return tried_ < rounds ? std::optional(around_->solver().solve(free())) : std::nullopt;
+            return tried_ < most ? std::optional(around_->solver().solve(free())) : std::nullopt;
           },
           [&](const Models& from, const LinearFit& fit, double share) {
             Models there = from;
@@ -71,17 +73,19 @@ class Refit {
             return there;
           },
           [&](const Models&, const Models& there, int) { return judge(there); });
-    } while (hold_risen());
+    } while (most < passes * rounds && hold_risen());
     return models;
   }
 
  private:
   static constexpr double counts = 1;  ///< one variance of one parameter
+  static constexpr int passes = 3;     ///< the first, and with joints held
 
   Trial judge(const Models& there) {
     auto problem = std::make_unique<Linearised>(there, logs_, whitening_);
     whitening_ = problem->noise().whitening();  // one for all rounds, else their misfits can't be compared
     const Misfit now = misfit(*problem);
+    if (around_) ++tried_;
     if (around_ && !(now.sum() < least_.sum())) {
       for (std::size_t j = 0; j < held_.size(); ++j) {
         const auto k = static_cast<Index>(j);
@@ -91,7 +95,6 @@ class Refit {
     }
     if (!std::isfinite(now.sum())) return Trial::rejected;
     const bool converged = around_ && least_.sum() - now.sum() < counts;
-    if (around_) ++tried_;
     least_ = now;
     around_ = std::move(problem);
     risen_.assign(held_.size(), false);
@@ -106,20 +109,17 @@ class Refit {
     }
     return out;
   }
-  /// @returns whether a joint is held that was not, since the last step was rejected
+  /// @returns whether a width or shape is held that was not, since the last step was rejected
   bool hold_risen() {
-    bool more = false;
-    for (std::size_t j = 0; j < held_.size(); ++j) {
-      more |= risen_[j] && !held_[j];
-      held_[j] = held_[j] || risen_[j];
-    }
-    return more;
+    const std::size_t before = free().size();
+    for (std::size_t j = 0; j < held_.size(); ++j) held_[j] = held_[j] || risen_[j];
+    return free().size() < before;
   }
 
   std::vector<SessionLog> logs_;
   std::vector<VectorXd> whitening_;
   std::vector<bool> held_;   ///< by joint: its widths and shapes stay
-  std::vector<bool> risen_;  ///< by joint: steps that were rejected since the last good one raised its misfit
+  std::vector<bool> risen_;  ///< by joint: a step that was rejected since the last good one raised its misfit
   std::unique_ptr<Linearised> around_;  ///< the best so far
   Misfit least_;
   int tried_ = 0;

@@ -6,8 +6,9 @@ namespace fxdyn::diagnosis {
 
 /// Least squares over everything that is not fixed (base parameters, friction, widths, named effects with their shapes)
 /// by gauss_newton(), the model linearised again at every step: large delays, gaps, tilts and loads come out right.
-/// Only logs that fit are looked at.
-/// @param rounds of step and judgement, shortened steps counted too
+/// Only logs that fit are looked at. A joint whose friction has no form that the model knows keeps no other from being
+/// fitted: where steps do no good, its widths and shapes are held.
+/// @param rounds of step and judgement, shortened steps counted too; as many again, twice, with joints held
 void refit(Models& models, const std::vector<SessionLog>& logs, const std::vector<Eigen::VectorXd>& whitening,
            int rounds);
 

@@ -132,14 +132,6 @@ std::string prediction_table(const LogErrors& errors, const Robot& robot) {
   return out;
 }
 
-/// Of the prediction: CSV, whatever the log was and was packed in.
-fs::path prediction_name(const fs::path& log_file) {
-  if (log_file == "-") return "stdin.csv";
-  fs::path name = log_file.has_filename() ? log_file.filename() : log_file.parent_path().filename();  // a bag's folder
-  if (name.extension() == ".gz" || name.extension() == ".zst") name = name.stem();
-  return name.replace_extension(".csv");
-}
-
 }  // namespace
 
 std::string identify_payload(const fs::path& model_file, const fs::path& log_file, const fs::path& directory) {
@@ -207,6 +199,16 @@ void write_trajectory(const fs::path& file, IdentifiedModel model, const Process
 
 }  // namespace
 
+fs::path prediction_name(const fs::path& log_file) {
+  if (log_file == "-") return "stdin.csv";
+  std::error_code ignored;
+  const fs::path whole = fs::weakly_canonical(log_file, ignored);  // "." has no name
+  if (fs::is_directory(whole)) return whole.filename() += ".csv";  // a bag, whose name may have a point
+  fs::path name = log_file.filename();
+  if (name.extension() == ".gz" || name.extension() == ".zst") name = name.stem();
+  return name.replace_extension(".csv");
+}
+
 std::string predict_log(const fs::path& model_file, const fs::path& log_file, const Prediction& how,
                         const fs::path& directory) {
   const IdentifiedModel model = read_model(model_file);
@@ -226,8 +228,10 @@ std::string predict_log(const fs::path& model_file, const fs::path& log_file, co
   require_log_of(model, log_file, processed, torque);
   const fs::path out = directory / prediction_name(log_file);
   std::error_code ignored;
-  if (fs::equivalent(out, log_file, ignored)) {
-    throw InputError(fmt::format("{}: would be overwritten by its prediction; choose another --out", out.string()));
+  // Beside the log, too, where a file of that name may be another log.
+  const bool beside = log_file != "-" && fs::equivalent(directory, fs::absolute(log_file).parent_path(), ignored);
+  if (beside && fs::exists(out)) {
+    throw InputError(fmt::format("{}: would be overwritten by a prediction; choose another --out", out.string()));
   }
   Log result;
   result.t = resampled ? stamps : processed.t;

@@ -27,8 +27,12 @@ struct Prediction {
   bool trajectory = false;  ///< and the motion with its feedforward for ros2_control (joint_trajectory.hpp)
 };
 
-/// `fxdyn predict`: torque of the model over one log, in DIR/<name of the log>.csv; the errors as a table for people. A
-/// trajectory is DIR/<name of the log>.yaml: the filtered motion, and the torque at its own times.
+/// Name of the file with the prediction of a log: CSV, whatever the log is and is packed in. Of a log that is a folder
+/// it is the folder's.
+std::filesystem::path prediction_name(const std::filesystem::path& log);
+
+/// `fxdyn predict`: torque of the model over one log, in DIR/prediction_name(); the errors as a table for people. A
+/// trajectory is DIR/<that name>.yaml: the filtered motion, and the torque at its own times.
 std::string predict_log(const std::filesystem::path& model, const std::filesystem::path& log, const Prediction& how,
                         const std::filesystem::path& directory);
 

@@ -90,8 +90,10 @@ void run_stage(const std::string& stage, const fs::path& project, const fs::path
   });
 }
 
-void run_predict(const fs::path& model, const fs::path& log, bool fixed, bool raw, const fs::path& directory) {
+/// @returns the file that it wrote
+fs::path run_predict(const fs::path& model, const fs::path& log, bool fixed, bool raw, const fs::path& directory) {
   work_apart(py::none(), [&] { predict_log(model, log, {.fixed = fixed, .raw = raw}, directory); });
+  return directory / prediction_name(log);
 }
 
 std::vector<fs::path> run_simulate(const fs::path& scenario, const fs::path& directory) {

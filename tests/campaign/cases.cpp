@@ -189,7 +189,7 @@ std::vector<Case> small_cases() {
   list.add(Group::single, scara, {{"joint_coupling", 0.006}}, "joint_coupling");
   list.add(Group::pair, scara, {{"stribeck", 0.02}, {"ripple", 0.02}}, "stribeck_ripple");
   list.add(Group::outside, scara, {{"square_wave", 0.02}}, "square_wave");
-  list.add(Group::outside, puma, {{"other_position", 0.02}}, "other_position");
+  list.add(Group::outside, scara, {{"other_position", 0.02}}, "other_position");
   list.add(Group::mujoco, scara, {{"presliding", 0.02}}, "presliding").mujoco = true;
   Case& spring = list.add(Group::mujoco, scara, {{"spring", 0.02}}, "spring");
   spring.mujoco = spring.closed_loop = true;

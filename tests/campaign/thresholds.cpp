@@ -68,6 +68,7 @@ std::vector<Threshold> of_the_judges() {
       {"gate.worse", "-", place<gate, &GateOptions::worse>},
       {"gate.worse_fitted", "-", place<gate, &GateOptions::worse_fitted>},
       {"gate.beyond_noise", "share", place<gate, &GateOptions::beyond_noise>},
+      {"gate.several_closure", "share", place<gate, &GateOptions::several_closure>},
       {"gate.least_closure", "share", place<gate, &GateOptions::least_closure>},
       {"gate.sure_closure", "share", place<gate, &GateOptions::sure_closure>},
       {"gate.sure_deviations", "deviations", place<gate, &GateOptions::sure_deviations>},

@@ -80,6 +80,10 @@ TEST(VerdictOfAJoint, IsWhatIsThereAndWhatIsLeft) {
   EXPECT_EQ(verdict_of(state), Verdict::explained);
   state.remains = true;
   EXPECT_EQ(verdict_of(state), Verdict::partly_explained);
+  state.structured = false;  // a free curve beats its names
+  EXPECT_EQ(verdict_of(state), Verdict::partly_explained);
+  state.established = false;
+  EXPECT_EQ(verdict_of(state), Verdict::unexplained);
 }
 
 TEST(VerdictOfAJoint, ALikelyEffectAloneExplainsNothing) {

@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "host_tools/diagnose/verdict.hpp"
@@ -264,6 +266,47 @@ TEST_F(NamesWithoutValidation, GoWhereTheWholeModelNoLongerFitsTheTrainLogs) {
   logs_[1].fits = false;
   EXPECT_EQ(harmed_joints(outcome_.models.options.gate, nominal_, outcome_.models.current, logs_),
             std::vector<bool>(6, false));
+}
+
+/// A PUMA 560 with a further torque of the second joint's position, and names that it gets.
+class NamesInThePosition : public NamesAtTheGate {
+ protected:
+  Gate judged(const std::function<double(double)>& torque, const std::vector<EffectFit>& names) {
+    for (std::size_t l = 0; l < logs_.size(); ++l) {
+      logs_[l] = test::small_session_log(nominal_, l == 0 ? Role::train : Role::validate, l + 1);
+      ProcessedLog& log = logs_[l].log;
+      for (Eigen::Index k = 0; k < log.samples(); ++k) log.tau(k, 1) += torque(log.q(k, 1));
+    }
+    auto& joints = outcome_.models.current.joints;
+    joints[2].effects.pop_back();
+    joints[1].effects.pop_back();
+    joints[1].effects.insert(joints[1].effects.end(), names.begin(), names.end());
+    outcome_.look_again(logs_);
+    return judge_again(outcome_, logs_, still_);
+  }
+};
+
+TEST_F(NamesInThePosition, LeaveWhatIsPlainBesideTheNoise) {
+  const auto torque = [](double q) { return 20 * std::cos(14 * q) + 0.15 * std::sin(9 * q); };
+  const std::vector<EffectFit> names{test::named_effect("ripple", {14}, {20, 0})};
+  const Gate gate = judged(torque, names);
+  EXPECT_GT(gate.closure[1], 0.99);
+  EXPECT_TRUE(gate.remains[1]);
+  EXPECT_TRUE(gate.accepted[1]);
+  EXPECT_TRUE(gate.believed[0]);
+  outcome_.models.options.gate.beyond_noise = 1e6;
+  EXPECT_FALSE(judge_again(outcome_, logs_, still_).remains[1]);
+}
+
+TEST_F(NamesInThePosition, AreNotBelievedForAStop) {
+  const Gate gate =
+      judged([](double q) { return -6 * std::max(q - 0.3, 0.0); },
+             {test::named_effect("gravity_compensator", {}, {0.5, 0.5}), test::named_effect("spring", {}, {-1, 0})});
+  ASSERT_EQ(gate.groups.size(), 2U);
+  EXPECT_FALSE(gate.believed[0]);
+  EXPECT_FALSE(gate.believed[1]);
+  EXPECT_TRUE(gate.remains[1]);
+  EXPECT_FALSE(gate.remains[2]);
 }
 
 /// A large ripple and, beside it at the same joint, one with half a percent of its power.

@@ -16,11 +16,11 @@ using Eigen::ArrayXd;
 using Eigen::MatrixXd;
 
 /// A torque of the second joint, of its own position and of the fourth's [rad].
-using Torque = std::function<ArrayXd(const ArrayXd& own, const ArrayXd& other)>;
+using TorqueOfPositions = std::function<ArrayXd(const ArrayXd& own, const ArrayXd& other)>;
 
 /// A PUMA 560 with that torque at its second joint, and a model with effects there instead.
 /// @param second role of the log that judges; train: both do
-std::vector<OwnEvidence> evidence(const Torque& torque, const std::vector<EffectFit>& effects,
+std::vector<OwnEvidence> evidence(const TorqueOfPositions& torque, const std::vector<EffectFit>& effects,
                                   Role second = Role::validate) {
   const IdentifiedModel nominal = test::fitted_puma();
   std::vector<SessionLog> logs;
@@ -112,6 +112,20 @@ TEST(EvidenceOfItsOwn, TwoNamesForWhatTheyAreDoNot) {
       EXPECT_LT(one.curve_gain, 0);
       EXPECT_GT(one.form, 0.95);
     }
+  }
+}
+
+// On a real robot something else is always missing.
+TEST(EvidenceOfItsOwn, TwoNamesForWhatTheyAreHoldBesideASmallBump) {
+  const auto both = [](const ArrayXd& q, const ArrayXd&) -> ArrayXd {
+    return 3 * q + 5 * (14 * q).cos() + 0.5 * (-((q - 0.2) / 0.08).square()).exp();
+  };
+  const auto own =
+      evidence(both, {test::named_effect("spring", {}, {3, 0}), test::named_effect("ripple", {14}, {5, 0})});
+  ASSERT_EQ(own.size(), 2U);
+  for (const OwnEvidence& one : own) {
+    EXPECT_GT(one.curve_gain, 14);
+    EXPECT_GT(one.form, GateOptions{}.several_closure);
   }
 }
 

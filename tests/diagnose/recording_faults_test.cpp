@@ -45,9 +45,9 @@ TEST(RecordingFaults, AnEncoderThatSlippedFar) {
 
 // To an arm whose first joint lies, a base that tilts is an encoder that slipped.
 TEST(RecordingFaults, ATiltIsNoSlipOfTheFirstJoint) {
-  const std::string said = complaint("tilted", {.missing = effect("gravity_tilt", 0, "tilt_x = 0.0, tilt_y = 0.04")});
-  EXPECT_EQ(said.substr(0, 4), "none") << said;
-  EXPECT_NE(said.find("gravity_tilt"), std::string::npos) << said;
+  const json report = diagnosed("tilted", {.missing = effect("gravity_tilt", 0, "tilt_x = 0.0, tilt_y = 0.04")});
+  ASSERT_EQ(report.at("robot_effects").size(), 1U) << report.dump();
+  EXPECT_EQ(report.at("robot_effects").at(0).at("effect"), "gravity_tilt");
 }
 
 TEST(RecordingFaults, AnotherGainInOneLogIsNoLoad) {

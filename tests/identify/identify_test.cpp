@@ -153,6 +153,12 @@ TEST(Identify, ModelFileKeepsEverythingThatPredictionNeeds) {
   fs::copy_file(log, test::folder() / "c.run.txt", fs::copy_options::overwrite_existing);
   predict_log(out / "model.json", test::folder() / "c.run.txt", {}, test::folder() / "prediction");
   EXPECT_EQ(lines(test::folder() / "prediction" / "c.run.csv"), lines(log));
+  // Beside the log it does not take another log's place.
+  fs::copy_file(log, test::folder() / "c.run.csv", fs::copy_options::overwrite_existing);
+  EXPECT_THROW(predict_log(out / "model.json", test::folder() / "c.run.txt", {}, test::folder()), InputError);
+  fs::create_directories(test::folder() / "run_0.3");
+  EXPECT_EQ(prediction_name(test::folder() / "run_0.3"), "run_0.3.csv");
+  EXPECT_EQ(prediction_name("logs/run.csv.zst"), "run.csv");
   // The same input gives the same bytes, by `run` as by the verbs one by one, each a process of its own.
   const fs::path again = test::folder() / "again", verbs = test::folder() / "verbs";
   Pipeline(out.parent_path() / "keep.toml", again).run();

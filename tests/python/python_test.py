@@ -82,6 +82,10 @@ class Module(unittest.TestCase):
                 self.same(name, folder, folder + "_too")
             rows = np.loadtxt(f"{folder}/test.csv", delimiter=",", skiprows=1)
             np.testing.assert_array_equal(np.column_stack([predicted["t"], predicted["tau"]]), rows)
+            # The prediction is CSV by name, the log is not.
+            shutil.copy("test.csv", "run.test.txt")
+            same = fxdyn.predict("cli/model.json", "run.test.txt", numbers=numbers, out=folder + "_text")
+            np.testing.assert_array_equal(same["tau"], predicted["tau"])
             # The file has its numbers in ten digits: as arrays they are the same.
             log = fxdyn.read_log("test.csv")
             again = fxdyn.predict("cli", log, numbers=numbers)

@@ -77,8 +77,8 @@ def predict(model, log, numbers="real", raw=False, out=None):
         if in_arrays:
             log = _arrays.write_log(folder / "log.csv", log)
         results.mkdir(parents=True, exist_ok=True)
-        _stages.predict(file, _os.fspath(log), numbers == "fixed", raw, results)
-        return _arrays.prediction(results, _pathlib.Path(log))
+        written = _stages.predict(file, _os.fspath(log), numbers == "fixed", raw, results)
+        return _arrays.prediction(_pathlib.Path(written))
 
 
 def simulate(scenario, out):

@@ -31,12 +31,11 @@ def write_log(file, log):
     return file
 
 
-def prediction(folder, log):
-    """What `fxdyn predict` wrote for a log."""
-    name = log.name.removesuffix(".gz")
-    rows = numpy.loadtxt(folder / name, delimiter=",", skiprows=1, ndmin=2)
+def prediction(file):
+    """What `fxdyn predict` wrote: torques, and errors beside them."""
+    rows = numpy.loadtxt(file, delimiter=",", skiprows=1, ndmin=2)
     out = {"t": rows[:, 0], "tau": rows[:, 1:]}
-    metrics = folder / "metrics.json"
+    metrics = file.parent / "metrics.json"
     if metrics.exists():
         out["metrics"] = json.loads(metrics.read_text(encoding="utf-8"))
     return out
