@@ -58,14 +58,12 @@ class Refit {
   Models run(Models models, int rounds) {
     if (judge(models) == Trial::rejected) return models;  // no figures at all
     const GaussNewton rules{.most_rounds = rounds, .shrink = 0.3};
-    int most = 0;
     do {
-      most += rounds;
       risen_.assign(held_.size(), false);
       models = gauss_newton(
           models, rules,
           [&](const Models&, int) {
-            return tried_ < most ? std::optional(around_->solver().solve(free())) : std::nullopt;
+            return steps_ < rounds ? std::optional(around_->solver().solve(free())) : std::nullopt;
           },
           [&](const Models& from, const LinearFit& fit, double share) {
             Models there = from;
@@ -73,19 +71,17 @@ class Refit {
             return there;
           },
           [&](const Models&, const Models& there, int) { return judge(there); });
-    } while (most < passes * rounds && hold_risen());
+    } while (hold_risen());
     return models;
   }
 
  private:
   static constexpr double counts = 1;  ///< one variance of one parameter
-  static constexpr int passes = 3;     ///< the first, and with joints held
 
   Trial judge(const Models& there) {
     auto problem = std::make_unique<Linearised>(there, logs_, whitening_);
     whitening_ = problem->noise().whitening();  // one for all rounds, else their misfits can't be compared
     const Misfit now = misfit(*problem);
-    if (around_) ++tried_;
     if (around_ && !(now.sum() < least_.sum())) {
       for (std::size_t j = 0; j < held_.size(); ++j) {
         const auto k = static_cast<Index>(j);
@@ -95,6 +91,7 @@ class Refit {
     }
     if (!std::isfinite(now.sum())) return Trial::rejected;
     const bool converged = around_ && least_.sum() - now.sum() < counts;
+    if (around_) ++steps_;
     least_ = now;
     around_ = std::move(problem);
     risen_.assign(held_.size(), false);
@@ -122,7 +119,7 @@ class Refit {
   std::vector<bool> risen_;  ///< by joint: a step that was rejected since the last good one raised its misfit
   std::unique_ptr<Linearised> around_;  ///< the best so far
   Misfit least_;
-  int tried_ = 0;
+  int steps_ = 0;
 };
 
 }  // namespace

@@ -70,8 +70,8 @@ TEST_P(Real, HeldOutErrorIsNoWorseThanTheBaseline) {
 // Limits: 2 % above what was measured, docs/findings/benchmarks.md, which has the goals, too.
 INSTANTIATE_TEST_SUITE_P(
     Sets, Real,
-    testing::Values(RealSet{"emps", 100, 40, 0.05, {3.22}, 0.623, 0.623},
-                    RealSet{"kuka_kr300", 20, 15, 0.25, {184, 545, 294, 51.8, 94.8, 39.5}, 0.657, 0.657},
+    testing::Values(RealSet{"emps", 100, 40, 0.05, {3.22}, 0.576, 0.576},
+                    RealSet{"kuka_kr300", 20, 15, 0.25, {184, 545, 294, 51.8, 94.8, 39.5}, 0.592, 0.634},
                     // Its baseline knows a piece of physics that is not in the nominal list; the torque's default band
                     // is too narrow for it.
                     RealSet{"staubli_tx40", 100, 40, 0.05, {1.85, 4.13, 1.06, 0.590, 1.01, 1.16}, 0.836, 0.948},
