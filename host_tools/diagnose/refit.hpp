@@ -8,7 +8,7 @@ namespace fxdyn::diagnosis {
 /// by gauss_newton(), the model linearised again at every step: large delays, gaps, tilts and loads come out right.
 /// Only logs that fit are looked at. A joint whose friction has no form that the model knows keeps no other from being
 /// fitted: where steps do no good, its widths and shapes are held.
-/// @param rounds of step and judgement; steps that do no good, some four for each time that joints are held, come on top
+/// @param rounds of step and judgement; steps that do no good, four for each time that joints are held, come on top
 void refit(Models& models, const std::vector<SessionLog>& logs, const std::vector<Eigen::VectorXd>& whitening,
            int rounds);
 
