@@ -146,7 +146,7 @@ std::vector<Likely> set_aside(Outcome& outcome, Gate& gate, const IdentifiedMode
     gone.push_back(finding.id);
     if (finding.evidence.certainty == Certainty::unlisted) continue;
     const std::size_t i = gate.place(*outcome.problem, finding.id);
-    const double felt = outcome.models.options.gate.least_felt;
+    const double felt = outcome.models.options.gate.least_gain;
     out.push_back({finding, fit_of(with.current, finding.id), felt_at(gate, i, felt)});
   }
   while (!gone.empty()) {

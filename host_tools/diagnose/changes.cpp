@@ -21,7 +21,7 @@ bool is_changed(const Unknown& u, double beyond) {
 std::vector<EffectCandidate> changed_effects(const Linearised& problem) {
   std::vector<EffectCandidate> out;
   for (const Unknown& u : problem.unknowns()) {
-    if (!is_changed(u, problem.options().prior.changed)) continue;
+    if (!is_changed(u, problem.options().gate.sure_deviations)) continue;
     const EffectFit& fit = problem.log_columns().joint(u.joint).effects[u.effect];
     // Of these, one that comes on top is the change: torques that add up, with shapes of their own.
     const EffectInfo& info = *find_effect(fit.effect);
@@ -35,7 +35,7 @@ std::vector<std::string> changed_parameters(const Linearised& problem) {
   std::vector<std::string> out;
   std::set<std::size_t> joints;
   for (const Unknown& u : problem.unknowns()) {
-    if (!is_changed(u, problem.options().prior.changed)) continue;
+    if (!is_changed(u, problem.options().gate.sure_deviations)) continue;
     joints.insert(u.joint);
     const EffectFit& now = problem.log_columns().joint(u.joint).effects[u.effect];
     const Joint& joint = problem.log_columns().joint_of_robot(u.joint);

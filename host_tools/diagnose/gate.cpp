@@ -362,7 +362,7 @@ void judge_robot(Gate& gate, const Outcome& outcome) {
     if (!outcome.problem->groups()[gate.groups[i]].on_body) continue;
     double left = 0;
     for (Index j = 0; j < held.excess.size(); ++j) {
-      if (held.alone[i][j] > options.least_felt) left += held.excess[j];
+      if (held.alone[i][j] > options.least_gain) left += held.excess[j];
     }
     const double back = held.alone[i].sum();
     gate.robot_closure[i] = back / std::max(back + left, 1e-300);

@@ -20,7 +20,7 @@ struct NoiseOptions {
   double mostly_gap = 3;
 };
 
-/// What is known of parameters before the logs are looked at. All but `changed` are standard deviations.
+/// What is known of parameters before the logs are looked at. All are standard deviations.
 struct PriorOptions {
   /// share of itself; change of a coefficient between two healthy sessions, of friction in proportion to the velocity:
   /// the grease's warmth; hand, decision 0005
@@ -45,8 +45,6 @@ struct PriorOptions {
   double smallest_load = 1e-3;
   /// -; a share that is 1 by definition; theory: any value far below the data's own deviation holds it at 1
   double share = 1e-3;
-  /// standard deviations; a coefficient that moved further has changed; theory: 2 Phi(-2) = 4.6 % of healthy ones
-  double changed = 2;
 };
 
 /// Logs, before anything is fitted.
@@ -125,7 +123,8 @@ struct LackOfFitOptions {
 
 /// What judges names on data that fitted no coefficient.
 struct GateOptions {
-  /// noise variances; what an effect must bring; theory: chi^2 of one coefficient, 4.6 % of noise brings more
+  /// noise variances; what an effect must bring, and from where on a joint feels one on the robot; theory: chi^2 of one
+  /// coefficient, 4.6 % of noise brings more
   double least_gain = 4;
   /// noise variances; theory: 4 deviations of one coefficient, 6e-5 of noise brings more. What brings that beside free
   /// curves of all other variables is believed whatever else is missing
@@ -150,7 +149,8 @@ struct GateOptions {
   /// share of the noise's power; structure that is more remains, however small a part of the gap it is; hand: 12 % more
   /// error than noise
   double beyond_noise = 0.25;
-  /// standard deviations; coefficients of a name are off nothing by; theory: 2 Phi(-2) = 4.6 % of noise is further off
+  /// standard deviations; coefficients of a name are off nothing by, or those of a healthy session off where they were;
+  /// theory: 2 Phi(-2) = 4.6 % of noise is further off
   double sure_deviations = 2;
   /// log10 odds against nothing and against the closest rival; an effect is established; theory: 1000 to 1
   double established = 3;
@@ -158,8 +158,6 @@ struct GateOptions {
   double established_deviations = 4;
   /// log10 odds likewise; an effect is likely; theory: 20 to 1. So little apart, two effects are not told apart
   double likely = 1.3;
-  /// noise variances; from there on a joint feels an effect on the robot; hand
-  double least_felt = 6;
 };
 
 /// Free curves of what has no name.

@@ -292,7 +292,7 @@ class ReportWriter {
   bool is_felt(const EffectId& on_robot, std::size_t j) const {
     const Gate& gate = conclusion_.gate;
     const std::size_t i = gate.place(problem_, on_robot);
-    return i < gate.groups.size() && gate.held.alone[i][static_cast<Index>(j)] > problem_.options().gate.least_felt;
+    return i < gate.groups.size() && gate.held.alone[i][static_cast<Index>(j)] > problem_.options().gate.least_gain;
   }
 
   JointDiagnosis moving(std::size_t j) {
@@ -382,7 +382,7 @@ class ReportWriter {
     for (std::size_t i = 0; i < conclusion_.gate.groups.size(); ++i) {
       const Group& group = problem_.groups()[conclusion_.gate.groups[i]];
       if (group.on_body && conclusion_.model.body[group.id.effect].named &&
-          conclusion_.gate.held.alone[i][joint] > problem_.options().gate.least_felt)
+          conclusion_.gate.held.alone[i][joint] > problem_.options().gate.least_gain)
         return true;
     }
     return false;
@@ -401,7 +401,7 @@ class ReportWriter {
       const std::size_t i = gate.place(problem_, id);
       one.joints.emplace();
       for (std::size_t j = 0; j < conclusion_.model.joints.size(); ++j) {
-        if (gate.held.alone[i][static_cast<Index>(j)] > problem_.options().gate.least_felt)
+        if (gate.held.alone[i][static_cast<Index>(j)] > problem_.options().gate.least_gain)
           one.joints->push_back(j + 1);
       }
       one.model_share = body_share(e);

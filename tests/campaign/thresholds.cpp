@@ -40,7 +40,6 @@ std::vector<Threshold> before_the_search() {
       {"prior.offset_change", "share", place<prior, &PriorOptions::offset_change>, Reads::with_baseline},
       {"prior.rotor", "share", place<prior, &PriorOptions::rotor>},
       {"prior.link_rotor", "share", place<prior, &PriorOptions::link_rotor>, Reads::with_link_encoders},
-      {"prior.changed", "deviations", place<prior, &PriorOptions::changed>, Reads::with_baseline},
       {"session.still", "times the noise", place<session, &SessionOptions::still>},
   };
 }
@@ -75,7 +74,6 @@ std::vector<Threshold> of_the_judges() {
       {"gate.established", "log10 odds", place<gate, &GateOptions::established>},
       {"gate.established_deviations", "deviations", place<gate, &GateOptions::established_deviations>},
       {"gate.likely", "log10 odds", place<gate, &GateOptions::likely>},
-      {"gate.least_felt", "noise variances", place<gate, &GateOptions::least_felt>},
       {"impact.beyond", "deviations", place<impact, &ImpactOptions::beyond>, Reads::with_baseline},
       {"impact.times", "-", place<impact, &ImpactOptions::times>, Reads::with_baseline},
       {"impact.added", "impacts", place<impact, &ImpactOptions::added>, Reads::with_baseline},
