@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "host_tools/diagnose/deviations.hpp"
+#include "host_tools/diagnose/harmless.hpp"
 #include "host_tools/diagnose/refit.hpp"
 
 namespace fxdyn::diagnosis {
@@ -161,7 +162,7 @@ std::vector<Likely> set_aside(Outcome& outcome, Gate& gate, const IdentifiedMode
   }
   refit(outcome.models, logs, outcome.whitening, 4);
   outcome.look_again(logs);
-  fit_in_band(outcome, nominal, logs);
+  fit_without_harm(outcome, nominal, logs);
   gate = judge_again(outcome, logs, still);
   return out;
 }

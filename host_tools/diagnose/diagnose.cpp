@@ -13,6 +13,9 @@
 #include "host_tools/diagnose/deviations.hpp"
 #include "host_tools/diagnose/free_curves.hpp"
 #include "host_tools/diagnose/gate.hpp"
+#include "host_tools/diagnose/harmless.hpp"
+#include "host_tools/diagnose/healthy_session.hpp"
+#include "host_tools/diagnose/nominal_model.hpp"
 #include "host_tools/diagnose/recording_faults.hpp"
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/diagnose/sessions.hpp"
@@ -32,43 +35,6 @@ using namespace diagnosis;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-/// Friction with memory that a model lacks looks like a torque that is not aligned: by how much it is beside the
-/// effects that `identify` adds by itself [s].
-double lead_beside_effects(Project project, const GateData& data, Progress& progress) {
-  GateData copy = data;
-  project.identify.effects.reset();
-  return identify(project, copy, progress)->torque_lead_s();
-}
-
-IdentifiedModel nominal_model(Project project, GateData& data, bool healthy, Progress& progress) {
-  if (!project.identify.effects) project.identify.effects = nominal_effects();
-  project.identify.physical = false;
-  project.identify.essential = false;
-  if (project.identify.method == "rls") project.identify.method = "wls";
-  const auto fitter = identify(project, data, progress);
-  if (fitter->torque_lead_s() != 0 && !project.signals.torque_lead_s) {
-    const double lead = lead_beside_effects(project, data, progress);
-    std::erase(data.notes, torque_lead_note(fitter->torque_lead_s()));
-    if (lead != 0) data.notes.push_back(torque_lead_note(lead));
-    fitter->set_torque_lead(lead);
-    weigh(*fitter, project.identify);
-  }
-  if (fitter->torque_lead_s() < 0 && !project.signals.torque_lead_s && !healthy) {
-    // Torque that comes late is an effect with a name; but for a healthy robot it is how its signals are sampled.
-    std::erase(data.notes, torque_lead_note(fitter->torque_lead_s()));
-    fitter->set_torque_lead(0);
-    weigh(*fitter, project.identify);
-  }
-  IdentifiedModel model = finish_model(*fitter, project, data).model;
-  // What bends is found here, with its rivals.
-  for (JointFit& joint : model.joints) {
-    std::erase_if(joint.effects,
-                  [](const EffectFit& fit) { return find_effect(fit.effect)->acts_on == ActsOn::position; });
-    joint.flexible.reset();
-  }
-  return model;
-}
 
 /// One diagnosis, step by step.
 class Diagnoser {
@@ -143,6 +109,12 @@ class Diagnoser {
 
     Outcome outcome = explore(models_, logs_, task_, 2, progress_);
     refuse_faulty_recordings(start, outcome);
+    if (!outcome.models.held.empty()) {
+      // What changed is in the model now: what it changed from is fitted with it.
+      outcome.models.held.clear();
+      refit(outcome.models, logs_, outcome.whitening, 8);
+      outcome.look_again(logs_);
+    }
     Gate gate = pass(outcome, models_.current, logs_, still_);
     if (refit_links(outcome)) gate = pass(outcome, models_.current, logs_, still_);
     weigh_evidence(outcome, gate);
@@ -156,7 +128,7 @@ class Diagnoser {
     result.model = concluded(outcome, gate);
     // What came after the gate (likely names set aside, possible bodies) may have made a finding harm.
     while (const std::optional<EffectId> harmful = harmful_finding(outcome, judged_against, result.model, logs_)) {
-      if (!fit_in_band(outcome, judged_against, logs_)) take_out(outcome, *harmful, logs_);
+      if (!fit_without_harm(outcome, judged_against, logs_)) take_out(outcome, *harmful, logs_);
       gate = judge_again(outcome, logs_, still_);
       result.model = concluded(outcome, gate);
     }
@@ -384,18 +356,38 @@ class Diagnoser {
     return true;
   }
 
+  /// @throws DataError that names the baseline
+  IdentifiedModel healthy_model(const Project& project, GateData& healthy) const {
+    try {
+      IdentifiedModel model = nominal_model(project, healthy, true, progress_);
+      model.logs = data_.references;
+      return model;
+    } catch (const DataError& error) {
+      throw DataError(fmt::format("role = \"baseline\": {}", error.what()));
+    }
+  }
+  /// With what bends already: the healthy session alone.
+  Models bent(IdentifiedModel model) const {
+    Models out;
+    for (const DeflectionEffect& effect : bent_already_) {
+      model.joints[effect.joint].effects.push_back(effect.fit);
+      model.joints[effect.joint].effects.back().named = false;
+    }
+    out.current = std::move(model);
+    out.fixed = models_.fixed;
+    out.options = options();
+    out.smallest_step_s = models_.smallest_step_s;
+    for (const DeflectionEffect& effect : bent_already_) add_rotor(out, effect, options().prior.link_rotor);
+    return out;
+  }
+
   /// What the healthy session has that is not nominal is its background: learned, not reported.
   void learn_baseline() {
     GateData healthy = data_;
     healthy.logs = baseline_;
     healthy.notes.clear();
-    try {
-      models_.healthy = nominal_model(project_, healthy, true, progress_);
-    } catch (const DataError& error) {
-      throw DataError(fmt::format("role = \"baseline\": {}", error.what()));
-    }
+    models_.healthy = healthy_model(project_, healthy);
     mute(logs_, models_.healthy, still_, options().session);
-    models_.healthy.logs = data_.references;
     std::vector<SessionLog> before;
     for (const SessionLog& log : logs_) {
       if (!log.healthy) continue;
@@ -403,46 +395,26 @@ class Diagnoser {
       before.back().healthy = false;
     }
     look_at_links(models_.healthy, before);
-    for (const DeflectionEffect& effect : bent_already_) {
-      models_.healthy.joints[effect.joint].effects.push_back(effect.fit);
-      models_.healthy.joints[effect.joint].effects.back().named = false;
-    }
-    Models alone;
-    alone.current = models_.healthy;
-    alone.fixed = models_.fixed;
-    alone.options = options();
-    alone.smallest_step_s = models_.smallest_step_s;
-    for (const DeflectionEffect& effect : bent_already_) add_rotor(alone, effect, options().prior.link_rotor);
-    for (int round = 0; round < 2; ++round) refit(alone, before, {}, 4);
-    Outcome background;
-    background.models = alone;
-    background.look_again(before);
-    // All that has a form: what stays is taken out of today's logs without one.
-    SearchSettings modest = task_.settings;
-    modest.most = std::max<std::size_t>(2, joints() * task_.settings.max_effects);
-    bool structured = background.structured();
-    if (!structured) {
-      // Ripple is finer than the functions that the test knows.
-      Linearised problem(alone, before);
-      Search ripples_only(problem, modest);
-      structured = !ripples_only.run({}, progress_).groups.empty();
-    }
-    if (structured) {
-      background = explore(alone, before, {modest, task_.never}, 2, progress_);
-      alone = background.models;
-      for (std::size_t j = 0; j < joints(); ++j) {
-        for (EffectFit& fit : alone.current.joints[j].effects) {
-          if (fit.named) notes_.push_back(fmt::format("{}: the baseline has {} already", name_of(j), fit.effect));
-          fit.named = false;
-        }
-        if (!background.structured(j)) continue;
-        models_.background.push_back(j);
-        notes_.push_back(fmt::format("{}: the baseline has structure that no effect explains", name_of(j)));
+    HealthySession learned = learn_healthy(bent(models_.healthy), before, task_, progress_);
+    const double lead = models_.healthy.filter.torque_lead_s;
+    if (lead != 0 && !project_.signals.torque_lead_s) {
+      // Friction with memory looks like a torque column of other times until it is in the model.
+      Project aligned = project_;
+      aligned.signals.torque_lead_s = 0;
+      GateData again = healthy;
+      HealthySession other = learn_healthy(bent(healthy_model(aligned, again)), before, task_, progress_);
+      if (!errs_less(learned, other)) {
+        learned = std::move(other);
+        std::erase(healthy.notes, torque_lead_note(lead));
       }
-      for (EffectFit& fit : alone.current.body) fit.named = false;
     }
-    models_.healthy = models_.current = alone.current;
-    models_.rotors = alone.rotors;
+    for (const EffectCandidate& effect : learned.effects)
+      notes_.push_back(fmt::format("{}: the baseline has {} already", name_of(effect.joint), effect.effect));
+    for (const std::size_t j : learned.structured)
+      notes_.push_back(fmt::format("{}: the baseline has structure that no effect explains", name_of(j)));
+    models_.background = std::move(learned.structured);
+    models_.healthy = models_.current = learned.models.current;
+    models_.rotors = learned.models.rotors;
     add_notes(check_same_robot(models_, logs_, still_));
     data_.notes.insert(data_.notes.end(), healthy.notes.begin(), healthy.notes.end());
   }

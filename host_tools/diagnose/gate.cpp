@@ -6,6 +6,7 @@
 
 #include "host_tools/diagnose/deviations.hpp"
 #include "host_tools/diagnose/explore.hpp"
+#include "host_tools/diagnose/harmless.hpp"
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
@@ -403,18 +404,6 @@ Gate judge_again(const Outcome& outcome, const std::vector<SessionLog>& logs, co
   return gate;
 }
 
-bool fit_in_band(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs) {
-  const GateOptions& options = outcome.models.options.gate;
-  const std::size_t harmed = count_harmed(options, nominal, outcome.models.current, logs);
-  if (harmed == 0) return false;
-  Models in_band = outcome.models;
-  refit(in_band, logs, whole_band(outcome.lack.size()), 4);
-  if (count_harmed(options, nominal, in_band.current, logs) >= harmed) return false;
-  outcome.models = std::move(in_band);
-  outcome.look_again(logs);
-  return true;
-}
-
 Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs,
           const std::vector<bool>& still) {
   choose_time_constants(outcome, logs);
@@ -424,7 +413,7 @@ Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<Se
     gate = judge_again(outcome, logs, still);
     PlainErrors errors{validated, validated};
     if (!gate.groups.empty()) {
-      if (fit_in_band(outcome, nominal, logs)) gate = judge_again(outcome, logs, still);
+      if (fit_without_harm(outcome, nominal, logs)) gate = judge_again(outcome, logs, still);
       if (validated.size() > 0) {
         errors.after = plain_error(outcome.models.current, logs);
       } else {

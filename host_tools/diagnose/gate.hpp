@@ -61,17 +61,13 @@ Gate judge_again(const Outcome& outcome, const std::vector<SessionLog>& logs, co
 /// there are no such logs that of train logs that judge one another.
 Eigen::VectorXd judged_error(const Models& models, const std::vector<SessionLog>& logs);
 
-/// Where a model harms a joint (harmed_joints()): fits it in the whole band, as the nominal one was. One that was
-/// fitted to whitened rows may err more in it wherever the friction is of another form, whatever was found.
-/// @returns whether it harms fewer for that; else the outcome stays as it was
-bool fit_in_band(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs);
 /// Judges each fold by a fit of the others; time constants of drift are chosen by that, and names that do not hold are
 /// taken out of the outcome one by one: those that may be why a joint's plain error on the validate logs is larger than
 /// that of `nominal` (rows near standstill, of which the search believes little, count there too), or, where there are
 /// no such logs, that on train logs that judge one another larger than without what was found; of several the one
 /// without which least is harmed. Then those that bring nothing; those that spoil a joint at which nothing was found;
-/// and those not believed at joints that show no more structure than their background. Where a joint is harmed, the
-/// model is fitted in the whole band first.
+/// and those not believed at joints that show no more structure than their background. Where a joint is harmed,
+/// fit_without_harm() comes first.
 Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs,
           const std::vector<bool>& still);
 

@@ -17,9 +17,17 @@
 namespace fxdyn::diagnosis {
 
 using Eigen::Index;
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
+
+/// Of the unknowns, in the models that the problem is about.
+VectorXd values_of(const Linearised& problem) {
+  VectorXd out(static_cast<Index>(problem.unknowns().size()));
+  for (Index c = 0; c < out.size(); ++c) out[c] = problem.unknowns()[static_cast<std::size_t>(c)].value;
+  return out;
+}
 
 /// -2 ln likelihood of the models as they are, but for a constant: by joint, and of what was known beforehand.
 struct Misfit {
@@ -31,11 +39,9 @@ struct Misfit {
 Misfit misfit(const Linearised& problem) {
   LinearFit now;
   now.columns = problem.unknown_columns();
-  now.x.resize(static_cast<Index>(now.columns.size()));
+  now.x = values_of(problem);
   Misfit out;
-  for (std::size_t c = 0; c < problem.unknowns().size(); ++c) {
-    const Unknown& u = problem.unknowns()[c];
-    now.x[static_cast<Index>(c)] = u.value;
+  for (const Unknown& u : problem.unknowns()) {
     if (u.prior_std > 0) out.of_priors += std::pow((u.value - u.prior) / u.prior_std, 2);
   }
   const VectorXd square = problem.solver().square(now, problem.blocks().fit);
@@ -52,8 +58,8 @@ Misfit misfit(const Linearised& problem) {
 /// held: their friction may be of a form that none suits, and what else there is to fit, at all joints, is linear.
 class Refit {
  public:
-  Refit(std::vector<SessionLog> logs, std::vector<VectorXd> whitening, std::size_t joints)
-      : logs_(std::move(logs)), whitening_(std::move(whitening)), held_(joints, false) {}
+  Refit(std::vector<SessionLog> logs, std::vector<VectorXd> whitening, std::vector<bool> only, std::size_t joints)
+      : logs_(std::move(logs)), whitening_(std::move(whitening)), only_(std::move(only)), held_(joints, false) {}
 
   Models run(Models models, int rounds) {
     if (judge(models) == Trial::rejected) return models;  // no figures at all
@@ -61,10 +67,7 @@ class Refit {
     do {
       risen_.assign(held_.size(), false);
       models = gauss_newton(
-          models, rules,
-          [&](const Models&, int) {
-            return steps_ < rounds ? std::optional(around_->solver().solve(free())) : std::nullopt;
-          },
+          models, rules, [&](const Models&, int) { return steps_ < rounds ? std::optional(step()) : std::nullopt; },
           [&](const Models& from, const LinearFit& fit, double share) {
             Models there = from;
             update(there, around_->unknowns(), fit, share);
@@ -97,12 +100,29 @@ class Refit {
     risen_.assign(held_.size(), false);
     return converged ? Trial::converged : Trial::accepted;
   }
+  /// Coefficients of the free columns, around those of the others as they are.
+  LinearFit step() const {
+    const BlockSolver& solver = around_->solver();
+    MatrixXd gram;
+    VectorXd projection;
+    solver.normal(around_->unknown_columns(), solver.blocks().fit, gram, projection);
+    LinearFit fit;
+    fit.columns = free();
+    VectorXd x = values_of(*around_);
+    for (const Index c : fit.columns) x[c] = 0;
+    projection -= gram * x;
+    fit.information = gram(fit.columns, fit.columns);
+    fit.x = SymmetricSolver(fit.information).solve(VectorXd(projection(fit.columns)));
+    return fit;
+  }
   /// Columns of the unknowns that are not held.
   std::vector<Index> free() const {
     std::vector<Index> out;
     for (const Index c : around_->unknown_columns()) {
       const Unknown& u = around_->unknowns()[static_cast<std::size_t>(c)];
-      if (!(u.is_logarithm() && !u.body && held_[u.joint])) out.push_back(c);
+      const bool of_joint = u.kind != Unknown::Kind::base && !u.body;
+      if (!only_.empty() && !(of_joint && only_[u.joint])) continue;
+      if (!(u.is_logarithm() && of_joint && held_[u.joint])) out.push_back(c);
     }
     return out;
   }
@@ -115,6 +135,7 @@ class Refit {
 
   std::vector<SessionLog> logs_;
   std::vector<VectorXd> whitening_;
+  std::vector<bool> only_;
   std::vector<bool> held_;   ///< by joint: its widths and shapes stay
   std::vector<bool> risen_;  ///< by joint: a step that was rejected since the last good one raised its misfit
   std::unique_ptr<Linearised> around_;  ///< the best so far
@@ -124,12 +145,13 @@ class Refit {
 
 }  // namespace
 
-void refit(Models& models, const std::vector<SessionLog>& all, const std::vector<VectorXd>& given, int rounds) {
+void refit(Models& models, const std::vector<SessionLog>& all, const std::vector<VectorXd>& given, int rounds,
+           const std::vector<bool>& only) {
   std::vector<SessionLog> logs;
   for (const SessionLog& log : all) {
     if (log.fits) logs.push_back(log);
   }
-  models = Refit(std::move(logs), given, models.current.joints.size()).run(models, rounds);
+  models = Refit(std::move(logs), given, only, models.current.joints.size()).run(models, rounds);
 }
 
 void bring_rotor(Models& models, const Rotor& rotor, double inertia) {

@@ -9,8 +9,9 @@ namespace fxdyn::diagnosis {
 /// Only logs that fit are looked at. A joint whose friction has no form that the model knows keeps no other from being
 /// fitted: where steps do no good, its widths and shapes are held.
 /// @param rounds of step and judgement; steps that do no good, four for each time that joints are held, come on top
+/// @param only by joint: whether its effects are fitted, all else stays; empty: everything is
 void refit(Models& models, const std::vector<SessionLog>& logs, const std::vector<Eigen::VectorXd>& whitening,
-           int rounds);
+           int rounds, const std::vector<bool>& only = {});
 
 /// Puts an effect into the current model as one that was named. Payload is given in mass and first moment. What the
 /// link's torque does (friction in proportion to the load, a gear that bends) brings the rotor's inertia with it where

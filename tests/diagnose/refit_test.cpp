@@ -44,5 +44,20 @@ TEST(Refit, FitsAJointWhateverAnotherOneLacks) {
   }
 }
 
+// The second joint's offset is fitted, and nothing else moves although the first one's has changed as well.
+TEST(Refit, OfSomeJointsLeavesAllElseAsItIs) {
+  const IdentifiedModel nominal = test::fitted_puma();
+  std::vector<SessionLog> logs{test::small_session_log(nominal, Role::train, 1)};
+  logs[0].log.tau.col(0).array() += 3;
+  logs[0].log.tau.col(1).array() += 3;
+  Models models = test::around(nominal);
+  refit(models, logs, test::no_whitening(), 8, {false, true, false, false, false, false});
+  const auto offset = [](const IdentifiedModel& model, std::size_t j) { return model.joints[j].effects[2].linear[0]; };
+  EXPECT_NEAR(offset(models.current, 1) - offset(nominal, 1), 3, 0.02);
+  EXPECT_EQ(offset(models.current, 0), offset(nominal, 0));
+  for (std::size_t c = 0; c < nominal.base.size(); ++c)
+    EXPECT_EQ(models.current.base[c].value, nominal.base[c].value) << c;
+}
+
 }  // namespace
 }  // namespace fxdyn::diagnosis

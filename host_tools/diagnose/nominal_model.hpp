@@ -1,0 +1,14 @@
+#pragma once
+
+#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/identify/identify.hpp"
+
+namespace fxdyn::diagnosis {
+
+/// The structural model with nominal effects only, fitted to the logs of `data`, which gets notes. What bends is no
+/// part of it: that is found with its rivals.
+/// @param healthy a torque column that comes late is how this robot's signals are sampled, else it is an effect with a
+/// name @throws DataError as identify() does
+IdentifiedModel nominal_model(Project project, GateData& data, bool healthy, Progress& progress);
+
+}  // namespace fxdyn::diagnosis
