@@ -113,6 +113,28 @@ const Finding* without_a_sure_name(const Outcome& outcome, const Tried& tried) {
 
 }  // namespace
 
+std::optional<Outcome> with_free_background(const Outcome& outcome, const std::vector<SessionLog>& logs) {
+  if (outcome.models.held.empty()) return {};
+  Outcome out;
+  out.models = outcome.models;
+  out.found = outcome.found;
+  out.whitening = outcome.whitening;
+  out.not_identifiable = outcome.not_identifiable;
+  out.models.held.clear();
+  refit(out.models, logs, out.whitening, 8);
+  out.look_again(logs);
+  return out;
+}
+
+void take_if_better(Outcome& outcome, Gate& gate, Outcome other, const Retrial& retrial) {
+  Gate of_other = pass(other, retrial.nominal, retrial.logs, retrial.still);
+  const VectorXd before = judged_error(outcome.models, retrial.logs);
+  const VectorXd after = judged_error(other.models, retrial.logs);
+  if (!errs_less(before, after, outcome.models.options.gate)) return;
+  outcome = std::move(other);
+  gate = std::move(of_other);
+}
+
 bool settle_rivals(Outcome& outcome, Gate& gate, const Retrial& retrial, Progress& progress) {
   constexpr std::size_t most = 4;  // a pass of the search each
   Tried tried;

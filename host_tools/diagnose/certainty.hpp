@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "host_tools/diagnose/explore.hpp"
@@ -23,6 +24,13 @@ struct Retrial {
   const std::vector<bool>& still;
   const SearchTask& task;
 };
+
+/// An outcome around which a background that was held (Models::held) is fitted with all else. Once what it was taken
+/// for is in the model, both sessions say better what it was than the healthy one alone. None: nothing was held.
+std::optional<Outcome> with_free_background(const Outcome& outcome, const std::vector<SessionLog>& logs);
+/// Judges another outcome of the same search, and takes it where it errs less on what judges. @param gate of the
+/// outcome
+void take_if_better(Outcome& outcome, Gate& gate, Outcome other, const Retrial& retrial);
 
 /// Of a finding that is there for sure, and whose rival is within the odds of a sure name, that rival is tried in its
 /// place, with all that is fitted and searched around it: odds are of fits that are linear around the finding, whose

@@ -109,16 +109,12 @@ class Diagnoser {
 
     Outcome outcome = explore(models_, logs_, task_, 2, progress_);
     refuse_faulty_recordings(start, outcome);
-    if (!outcome.models.held.empty()) {
-      // What changed is in the model now: what it changed from is fitted with it.
-      outcome.models.held.clear();
-      refit(outcome.models, logs_, outcome.whitening, 8);
-      outcome.look_again(logs_);
-    }
+    std::optional<Outcome> released = with_free_background(outcome, logs_);
     Gate gate = pass(outcome, models_.current, logs_, still_);
+    if (released) take_if_better(outcome, gate, std::move(*released), retrial());
     if (refit_links(outcome)) gate = pass(outcome, models_.current, logs_, still_);
     weigh_evidence(outcome, gate);
-    if (settle_rivals(outcome, gate, {models_.current, logs_, still_, task_}, progress_) && refit_links(outcome)) {
+    if (settle_rivals(outcome, gate, retrial(), progress_) && refit_links(outcome)) {
       gate = pass(outcome, models_.current, logs_, still_);
       weigh_evidence(outcome, gate);
     }
@@ -151,6 +147,7 @@ class Diagnoser {
   const std::vector<std::string>& notes() const { return notes_; }
 
  private:
+  Retrial retrial() const { return {models_.current, logs_, still_, task_}; }
   void note_who_judges() {
     const auto judges = [](const ProcessedLog& log) { return log.role == Role::validate; };
     if (data_.logs.size() > 1 && std::none_of(data_.logs.begin(), data_.logs.end(), judges)) {
@@ -177,8 +174,9 @@ class Diagnoser {
     } else {
       add_deviations(found, *outcome.problem);
     }
-    mark_named(found.current, outcome);
-    return finished(found.current);
+    IdentifiedModel model = found.current;
+    mark_named(model, outcome);
+    return finished(model);
   }
   /// What is left without a name gets a curve, by joint. It says which variable, and where.
   std::vector<std::optional<CurveResult>> curves_of_the_rest(const Outcome& outcome, const Gate& gate) const {

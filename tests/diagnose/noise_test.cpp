@@ -24,24 +24,24 @@ double correlation(const VectorXd& e) { return e.head(e.size() - 1).dot(e.tail(e
 
 // Standard error of a coefficient: 1 / sqrt(samples) = 0.007.
 constexpr Index samples = 20000;
-constexpr double error = 0.03;
+constexpr double standard_error = 0.03;
 
 TEST(NoiseModel, FindsTheCoefficientsOfAnAutoregression) {
   const VectorXd a = autoregression({coloured(samples, 1.2, -0.5, 1)});
   ASSERT_EQ(a.size(), 6);
-  EXPECT_NEAR(a[0], 1.2, error);
-  EXPECT_NEAR(a[1], -0.5, error);
-  for (Index i = 2; i < 6; ++i) EXPECT_NEAR(a[i], 0, error) << i;
+  EXPECT_NEAR(a[0], 1.2, standard_error);
+  EXPECT_NEAR(a[1], -0.5, standard_error);
+  for (Index i = 2; i < 6; ++i) EXPECT_NEAR(a[i], 0, standard_error) << i;
 }
 
 TEST(NoiseModel, StretchesCountTogether) {
   const VectorXd e = coloured(samples, 0.9, 0, 2);
   const VectorXd a = autoregression({e.head(samples / 4), e.tail(samples / 2)});
-  EXPECT_NEAR(a[0], 0.9, error);
+  EXPECT_NEAR(a[0], 0.9, standard_error);
 }
 
 TEST(NoiseModel, WhiteNoiseAndNothingHaveNoColour) {
-  EXPECT_LT(autoregression({coloured(samples, 0, 0, 3)}).cwiseAbs().maxCoeff(), error);
+  EXPECT_LT(autoregression({coloured(samples, 0, 0, 3)}).cwiseAbs().maxCoeff(), standard_error);
   EXPECT_EQ(autoregression({VectorXd::Zero(100)}), VectorXd::Zero(6));
   EXPECT_EQ(autoregression({}), VectorXd::Zero(6));
 }
@@ -50,7 +50,7 @@ TEST(NoiseModel, PrewhitenedNoiseIsWhiteAndOfItsVariance) {
   const VectorXd e = coloured(samples, 1.2, -0.5, 4);
   ASSERT_GT(correlation(e), 0.7);
   const VectorXd white = prewhitened(e, autoregression({coloured(samples, 1.2, -0.5, 5)}));
-  EXPECT_NEAR(correlation(white), 0, error);
+  EXPECT_NEAR(correlation(white), 0, standard_error);
   EXPECT_NEAR(white.squaredNorm() / static_cast<double>(samples), 1, 0.05);
 }
 
