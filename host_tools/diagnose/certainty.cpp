@@ -114,13 +114,18 @@ const Finding* without_a_sure_name(const Outcome& outcome, const Tried& tried) {
 }  // namespace
 
 std::optional<Outcome> with_free_background(const Outcome& outcome, const std::vector<SessionLog>& logs) {
-  if (outcome.models.held.empty()) return {};
   Outcome out;
   out.models = outcome.models;
+  const auto grew = [&](const EffectCandidate& held) {
+    return std::any_of(outcome.found.begin(), outcome.found.end(), [&](const Finding& finding) {
+      return !finding.id.body && finding.id.joint == held.joint && candidate_of(outcome, finding).effect == held.effect;
+    });
+  };
+  std::vector<EffectCandidate>& held = out.models.held;
+  if (std::erase_if(held, [&](const EffectCandidate& one) { return !grew(one); }) == 0) return {};
   out.found = outcome.found;
   out.whitening = outcome.whitening;
   out.not_identifiable = outcome.not_identifiable;
-  out.models.held.clear();
   refit(out.models, logs, out.whitening, 8);
   out.look_again(logs);
   return out;

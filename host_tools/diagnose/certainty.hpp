@@ -26,7 +26,8 @@ struct Retrial {
 };
 
 /// An outcome around which a background that was held (Models::held) is fitted with all else. Once what it was taken
-/// for is in the model, both sessions say better what it was than the healthy one alone. None: nothing was held.
+/// for is in the model, both sessions say better what it was than the healthy one alone. What only grew stays held: the
+/// finding is what came on top. None: nothing else was held.
 std::optional<Outcome> with_free_background(const Outcome& outcome, const std::vector<SessionLog>& logs);
 /// Judges another outcome of the same search, and takes it where it errs less on what judges. @param gate of the
 /// outcome

@@ -15,7 +15,7 @@ constexpr double late_s = -0.004;
 /// One log of a PUMA whose first joint has presliding friction, learned by a model with this torque lead.
 HealthySession learned(double lead_s, double amplitude) {
   IdentifiedModel robot = test::fitted_puma();
-  robot.joints[0].effects.push_back(test::effect("presliding", {0.05}, {amplitude}));
+  robot.joints[0].effects.push_back(test::effect("presliding", {0.01}, {amplitude}));
   const std::vector<SessionLog> logs{test::small_session_log(robot, Role::train, 1)};
   IdentifiedModel nominal = test::fitted_puma();
   nominal.filter.torque_lead_s = lead_s;
