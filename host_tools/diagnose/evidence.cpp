@@ -85,15 +85,15 @@ class Clamped {
   std::vector<std::string> notes() const {
     // Of the samples. Beyond a position limit gravity is another's; single spikes of derivatives are not worth a word.
     constexpr double worth_a_word[] = {0, 1e-3, 1e-3, 1e-3};
-    const char* const names[] = {"position", "velocity", "acceleration", "torque"};
+    const char* const names[] = {"position", "velocity", "acceleration", "model's torque"};
     std::vector<std::string> out;
     for (Index k = 0; k < beyond_.rows(); ++k) {
       for (Index i = 0; i < 4; ++i) {
         const double share = beyond_(k, i) / std::max(samples_, 1.0);
         if (share == 0 || share < worth_a_word[i]) continue;
         out.push_back(
-            fmt::format("{}: {:.2g} % of the held-out samples are beyond its {} limit, where the firmware clamps; "
-                        "[limits] sets wider ones",
+            fmt::format("{}: in {:.2g} % of the held-out samples the {} is beyond its limit, where the firmware "
+                        "clamps; [limits] sets wider ones",
                         model_.robot.joints[static_cast<std::size_t>(k)].name, 100 * share, names[i]));
       }
     }

@@ -97,7 +97,7 @@ std::string joint_rows(const Terminal& on, const std::vector<JointDiagnosis>& jo
   const std::size_t width = name_width(joints);
   const auto row = [&](const std::string& name, const std::string& verdict, Colour colour, const std::string& gap,
                        const std::string& unit, const std::string& noise, const std::string& left) {
-    return fmt::format("{:<{}}{}{:>19} {:<4}{:>8}{:>18}  ", name, width,
+    return fmt::format("{:<{}}{}{:>19} {:<4}{:>8} {:>17}  ", name, width,
                        in_colour(on, colour, fmt::format("{:<17}", verdict)), gap, unit, noise, left);
   };
   const std::string head =

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cctype>
+#include <iterator>
 
+#include "host_tools/signals/log_reader.hpp"
 #include "host_tools/support/nearest.hpp"
 
 namespace fxdyn {
@@ -41,22 +43,58 @@ std::vector<Names> families(const Names& columns, std::size_t joints) {
 
 std::string quoted(const Names& names) { return fmt::format("[\"{}\"]", fmt::join(names, "\", \"")); }
 
+bool is_signal(const std::string& family) {
+  return std::find(signal_names.begin(), signal_names.end(), family) != signal_names.end();
+}
+
+/// Whether a column has the name that is looked for, for the joint in question or another one.
+bool has(const Names& columns, const std::string& name) {
+  return std::find(columns.begin(), columns.end(), name) != columns.end();
+}
+
+/// The nearest column that is no signal's by name.
+std::string nearest_of(const std::string& missing, const Names& columns) {
+  Names open;
+  std::copy_if(columns.begin(), columns.end(), std::back_inserter(open),
+               [](const std::string& name) { return name != "t" && !is_signal(family_of(name)); });
+  return nearest(missing, open.empty() ? columns : open);
+}
+
+/// The family's columns, joint by joint, with the nearest other one where a single one is missing; empty: more are.
+Names with_nearest(const std::string& family, const Names& columns, std::size_t joints) {
+  Names out;
+  std::size_t absent = 0;
+  for (std::size_t joint = 1; joint <= joints; ++joint) {
+    const std::string name = family + std::to_string(joint);
+    absent += has(columns, name) ? 0 : 1;
+    out.push_back(has(columns, name) ? name : nearest_of(name, columns));
+  }
+  return !family.empty() && joints > 1 && absent == 1 ? out : Names{};
+}
+
 }  // namespace
 
-std::string column_advice(const std::string& missing, const std::vector<std::string>& columns, std::size_t joints) {
-  const std::string signal = family_of(missing);
-  const std::vector<Names> all = families(columns, joints);
-  const auto same = std::find_if(all.begin(), all.end(), [&](const Names& one) { return family_of(one[0]) == signal; });
-  if (!signal.empty() && same != all.end() && same->front() == signal + "0") {
+std::string column_advice(const std::string& signal, const std::string& missing,
+                          const std::vector<std::string>& columns, std::size_t joints) {
+  const std::string family = family_of(missing);
+  std::vector<Names> all = families(columns, joints);
+  const auto same = std::find_if(all.begin(), all.end(), [&](const Names& one) { return family_of(one[0]) == family; });
+  if (!family.empty() && same != all.end() && same->front() == family + "0") {
     return fmt::format("its columns count from 0: name them, as in columns = {{ {} = {} }}", signal, quoted(*same));
   }
-  if (joints > 1 && !signal.empty() && !all.empty()) {
+  if (const Names completed = with_nearest(family, columns, joints); !completed.empty()) {
+    return fmt::format("nearest is '{}'; if that is it: columns = {{ {} = {} }}", nearest_of(missing, columns), signal,
+                       quoted(completed));
+  }
+  // What has a signal's own name is that signal.
+  std::erase_if(all, [&](const Names& one) { return is_signal(family_of(one[0])) && family_of(one[0]) != signal; });
+  if (joints > 1 && !family.empty() && !all.empty()) {
     Names words;
     for (const Names& one : all) words.push_back(fmt::format("{} .. {}", one.front(), one.back()));
     return fmt::format("there is one a joint of {}; name those that are it, as in columns = {{ {} = {} }}",
                        fmt::join(words, ", of "), signal, quoted(all.front()));
   }
-  return fmt::format("nearest is '{}' (map it with columns = {{ ... }})", nearest(missing, columns));
+  return fmt::format("nearest is '{}' (map it with columns = {{ ... }})", nearest_of(missing, columns));
 }
 
 }  // namespace fxdyn

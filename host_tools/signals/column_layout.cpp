@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <map>
 
 #include "host_tools/signals/column_advice.hpp"
 #include "host_tools/support/error.hpp"
@@ -32,7 +33,7 @@ ColumnNames::ColumnNames(std::string where, std::vector<std::string> names, bool
 ColumnLayout ColumnNames::layout(std::size_t joints, const LogFormat& format, bool torque_required) {
   joints_ = joints;
   const std::string time = prefix(format, "t");
-  if (!take(time)) missing(time, "time stamps");
+  if (!take(time)) missing("t", time, "time stamps");
   layout_.unit = format.time_unit_s > 0 ? unit_of_seconds(format.time_unit_s) : unit_in_name(time);
   for (std::size_t signal = 0; signal < signal_count; ++signal) {
     const std::string name = signal_names[signal];
@@ -45,7 +46,22 @@ ColumnLayout ColumnNames::layout(std::size_t joints, const LogFormat& format, bo
     const bool required = signal == q || (signal == tau && torque_required) || format.columns.contains(name);
     add(signal, prefix(format, name), joints, required);
   }
+  refuse_two_uses();
   return layout_;
+}
+
+void ColumnNames::refuse_two_uses() const {
+  std::map<int, std::string> uses;
+  for (std::size_t signal = 0; signal < signal_count; ++signal) {
+    for (std::size_t joint = 0; joint < layout_.columns[signal].size(); ++joint) {
+      const int column = layout_.columns[signal][joint];
+      const std::string use = fmt::format("{} of joint {}", signal_names[signal], joint + 1);
+      const auto [before, first] = uses.emplace(column, use);
+      if (column < 0 || first) continue;
+      throw InputError(fmt::format("{}: column '{}' is {} and {}; a column is one signal: correct `columns`", where_,
+                                   layout_.names[static_cast<std::size_t>(column)], before->second, use));
+    }
+  }
 }
 
 /// Where a column is, by its name or, as "#3", by its number from 0.
@@ -81,7 +97,9 @@ void ColumnNames::add_named(std::size_t signal, const std::vector<std::string>& 
   }
   for (std::size_t joint = 0; joint < joints; ++joint) {
     const auto column = take(names[joint]);
-    if (!column) missing(names[joint], fmt::format("signal {} of joint {}", signal_names[signal], joint + 1));
+    if (!column)
+      missing(signal_names[signal], names[joint],
+              fmt::format("signal {} of joint {}", signal_names[signal], joint + 1));
     layout_.columns[signal].push_back(*column);
   }
 }
@@ -102,7 +120,8 @@ void ColumnNames::add(std::size_t signal, const std::string& name, std::size_t j
   }
   const bool complete = found == joints || (signal == qlink && found > 0);  // not every joint has a second encoder
   if (!complete && (required || found > 0)) {
-    missing(absent, fmt::format("signal {} of joint {}", signal_names[signal], absent.substr(name.size())));
+    missing(signal_names[signal], absent,
+            fmt::format("signal {} of joint {}", signal_names[signal], absent.substr(name.size())));
   }
   if (complete) layout_.columns[signal] = columns;
   const std::string next = fmt::format("{}{}", name, joints + 1);
@@ -118,7 +137,7 @@ void ColumnNames::add(std::size_t signal, const std::string& name, std::size_t j
   }
 }
 
-void ColumnNames::missing(const std::string& name, const std::string& meaning) const {
+void ColumnNames::missing(const std::string& signal, const std::string& name, const std::string& meaning) const {
   if (name.starts_with('#')) {
     throw InputError(fmt::format("{}: no column {} ({}): the file has {}, counted from 0", where_, name.substr(1),
                                  meaning, names_.size()));
@@ -135,7 +154,7 @@ void ColumnNames::missing(const std::string& name, const std::string& meaning) c
                     where_, names_.size()));
   }
   throw InputError(
-      fmt::format("{}: no column '{}' ({}); {}", where_, name, meaning, column_advice(name, names_, joints_)));
+      fmt::format("{}: no column '{}' ({}); {}", where_, name, meaning, column_advice(signal, name, names_, joints_)));
 }
 
 Log to_log(ColumnTable table, const ColumnLayout& layout, std::size_t joints) {

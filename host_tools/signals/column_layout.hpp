@@ -40,7 +40,10 @@ class ColumnNames {
   std::optional<int> take(const std::string& name);
   void add_named(std::size_t signal, const std::vector<std::string>& names, std::size_t joints);
   void add(std::size_t signal, const std::string& name, std::size_t joints, bool required);
-  [[noreturn]] void missing(const std::string& name, const std::string& meaning) const;
+  /// @param signal the key of `columns`
+  [[noreturn]] void missing(const std::string& signal, const std::string& name, const std::string& meaning) const;
+  /// @throws InputError: a column is two signals, or two joints'
+  void refuse_two_uses() const;
 
   std::string where_;
   std::vector<std::string> names_;

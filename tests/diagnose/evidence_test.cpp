@@ -92,7 +92,7 @@ TEST(Evidence, ATorqueThatTheFirmwareCutsOffIsSaid) {
   const std::vector<std::string> notes = held_out_evidence(truth, truth, logs).fixed_point.notes;
   const auto said = [&](const std::string& joint) {
     return std::any_of(notes.begin(), notes.end(), [&](const std::string& note) {
-      return note.starts_with(joint) && note.find("beyond its torque limit") != std::string::npos;
+      return note.starts_with(joint) && note.find("model's torque is beyond its limit") != std::string::npos;
     });
   };
   EXPECT_FALSE(said("shoulder"));
