@@ -52,11 +52,17 @@ bool has(const Names& columns, const std::string& name) {
   return std::find(columns.begin(), columns.end(), name) != columns.end();
 }
 
-/// The nearest column that is no signal's by name.
-std::string nearest_of(const std::string& missing, const Names& columns) {
-  Names open;
-  std::copy_if(columns.begin(), columns.end(), std::back_inserter(open),
+/// The columns that are no signal's by name.
+Names open_of(const Names& columns) {
+  Names out;
+  std::copy_if(columns.begin(), columns.end(), std::back_inserter(out),
                [](const std::string& name) { return name != "t" && !is_signal(family_of(name)); });
+  return out;
+}
+
+/// The nearest of them, or of all where there are none.
+std::string nearest_of(const std::string& missing, const Names& columns) {
+  const Names open = open_of(columns);
   return nearest(missing, open.empty() ? columns : open);
 }
 
@@ -69,7 +75,7 @@ Names with_nearest(const std::string& family, const Names& columns, std::size_t 
     absent += has(columns, name) ? 0 : 1;
     out.push_back(has(columns, name) ? name : nearest_of(name, columns));
   }
-  return !family.empty() && joints > 1 && absent == 1 ? out : Names{};
+  return !family.empty() && joints > 1 && absent == 1 && !open_of(columns).empty() ? out : Names{};
 }
 
 }  // namespace

@@ -205,6 +205,32 @@ TEST(Csv, MapsColumnsAndScalesTorque) {
   test::expect_refused(file, {"torque_gain has 1 values for 2 joints"}, [&] { read(file, 2, format); });
 }
 
+TEST(Csv, AMissingColumnsAdviceCanBePastedAndIsOfItsOwnSignal) {
+  const auto one_other = write("one_other.csv", "t,q1,q2,dq1,dq2,tau1,torque2\n0,0,0,0,0,1,2\n1,0,0,0,0,3,4\n");
+  test::expect_refused(one_other,
+                       {"no column 'tau2'", "nearest is 'torque2'", R"(columns = { tau = ["tau1", "torque2"] })"},
+                       [&] { read(one_other, 2, {}); });
+  const auto other_prefix = write("other_prefix.csv", "t,q1,q2,tau1,tau2\n0,0,0,1,2\n1,0,0,3,4\n");
+  LogFormat format;
+  format.columns = {{"tau", "torque"}};
+  test::expect_refused(other_prefix, {"no column 'torque1'", R"(columns = { tau = ["tau1", "tau2"] })"},
+                       [&] { read(other_prefix, 2, format); });
+  const auto none = write("no_torque_at_all.csv", "t,q1,q2,dq1,dq2\n0,0,0,1,2\n1,0,0,3,4\n");
+  try {
+    read(none, 2, {});
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_EQ(std::string(error.what()).find("tau = ["), std::string::npos) << error.what();
+  }
+}
+
+TEST(Csv, AColumnIsOneSignal) {
+  const auto file = write("twice.csv", "t,q1,q2,x\n0,0,0,1\n1,0,0,3\n");
+  LogFormat format;
+  format.joint_columns = {{"tau", {"q1", "x"}}};
+  test::expect_refused(file, {":1:", "column 'q1' is q of joint 1 and tau of joint 1"}, [&] { read(file, 2, format); });
+}
+
 TEST(Csv, ColumnsByNumberNeedNoNames) {
   const std::string rows = "0,1,2,3,4\n0.1,5,6,7,8\n";
   LogFormat format;
