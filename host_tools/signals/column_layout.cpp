@@ -46,7 +46,7 @@ ColumnLayout ColumnNames::layout(std::size_t joints, const LogFormat& format, bo
     const bool required = signal == q || (signal == tau && torque_required) || format.columns.contains(name);
     add(signal, prefix(format, name), joints, required);
   }
-  refuse_two_uses();
+  if (!format.joint_columns.empty()) refuse_two_uses();  // prefixes may be the same: a log of torques alone
   return layout_;
 }
 

@@ -54,7 +54,7 @@ names() {
 }
 
 names viscous_cubic 'coefficient = 0.8' 0.3 0.2 0.25
-names presliding 'distance = 0.01, amplitude = 0.5' 0.2 0.1 0.15
+names viscous_quadratic 'coefficient = 0.7' 0.3 0.2 0.25
 
 # One line each, and nothing is written.
 refused() {
