@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# cli_test.sh FXDYN: on an arm with elastic gears the identified model as feedforward, in fixed point, follows and stops
+# cli_test.sh FXDYN [LINKED]: on an arm with elastic gears the identified model as feedforward, in fixed point, follows and stops
 # better than a PD alone and than a rigid body, its links too where it knows the gears; more data give less error; what
-# can't be done is refused.
+# can't be done is refused. LINKED: the folder of `vibration linked.project`, taken where this program made it.
 set -u
 fxdyn=$1
 arm=$(cd "$(dirname "$0")/../support/elastic_arm" && pwd)
@@ -40,7 +40,11 @@ PYTHON
 
 # The same arm with encoders on its links: how its gears bend is identified from its own logs, and with the motors ahead by
 # that the links follow, too.
-"$fxdyn" vibration linked.project --out linked >loop.txt 2>&1 || fail "vibration, elastic: $(tail -1 loop.txt)"
+if [ "${2:-}/vibration.json" -nt "$fxdyn" ]; then
+  cp -r "$2" linked
+else
+  "$fxdyn" vibration linked.project --out linked >loop.txt 2>&1 || fail "vibration, elastic: $(tail -1 loop.txt)"
+fi
 python3 - <<'PYTHON' || fail "$(cat loop.txt)"
 import json
 # the scenario's compliances, rad/(N m)
