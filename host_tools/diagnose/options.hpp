@@ -43,9 +43,6 @@ struct PriorOptions {
   double load_centre = 0.5;
   /// kg; a load that is as good as none has that prior of its centre; hand
   double smallest_load = 1e-3;
-  /// 1, natural logarithm; step of a width or of a shape from where the model has it; theory: a line drawn there says
-  /// nothing of e times as much. Rows without a reversal leave a width open, and those with one would be judged by it
-  double logarithm = 1;
   /// -; a share that is 1 by definition; theory: any value far below the data's own deviation holds it at 1
   double share = 1e-3;
 };

@@ -87,7 +87,6 @@ class Builder {
     Unknown u;
     u.kind = Unknown::Kind::width;
     u.joint = joint;
-    u.prior_std = models_.options.prior.logarithm;
     out_.all.push_back(u);
   }
 
@@ -158,7 +157,6 @@ class Builder {
     const EffectInfo& info = *find_effect(diagnosis::effect_of(now_, u).effect);
     int count = 0;
     u.kind = Unknown::Kind::shape;
-    u.prior_std = models_.options.prior.logarithm;
     for (u.index = 0; u.index < info.shape.size(); ++u.index) {
       if (!is_shape_free(info, u.index)) continue;
       std::tie(u.lower, u.upper) = shape_limits(models_, u.joint, info, info.shape[u.index]);
