@@ -73,7 +73,10 @@ done
 
 pattern=$(IFS='|'; echo "^($*)\$")
 step "tests"
-ctest --test-dir build/host --parallel "$jobs" --output-on-failure --no-tests=error ${1:+-L "$pattern"}
+ctest --test-dir build/host --parallel "$jobs" --output-on-failure --no-tests=error ${1:+-L "$pattern"} || {
+  tests/failed.py build/host
+  exit 8
+}
 [ $# -eq 0 ] || exit 0
 
 mapfile -t exposed <tests/exposed.txt
