@@ -73,12 +73,17 @@ std::string joint_table(const std::vector<JointFacts>& joints) {
 }
 
 std::string signal_lines(const SignalFacts& signals) {
-  std::string out = fmt::format("motion up to {:.3g} Hz; position filtered at {:.3g} Hz, torque at {:.3g} Hz; ",
-                                signals.excited_hz, signals.position_cutoff_hz, signals.torque_cutoff_hz);
+  const std::string position = signals.position_filtered
+                                   ? fmt::format("filtered at {:.3g} Hz", signals.position_cutoff_hz)
+                                   : std::string("not filtered");
+  std::string out = fmt::format("motion up to {:.3g} Hz; position {}, torque filtered at {:.3g} Hz; ",
+                                signals.excited_hz, position, signals.torque_cutoff_hz);
   if (!signals.torque_lead) return out + "the logs don't tell whether the torque is of the motion's time\n";
   const auto [seconds, resolution] = *signals.torque_lead;
-  return out + fmt::format("torque {:.1f} ms {} the motion, to {:.1f} ms\n", 1000 * std::fabs(seconds),
-                           seconds < 0 ? "behind" : "ahead of", 1000 * resolution);
+  if (std::fabs(seconds) <= resolution)
+    return out + fmt::format("the torque is of the motion's time, within {:.1f} ms\n", 1000 * resolution);
+  return out + fmt::format("the torque is {:.1f} +- {:.1f} ms {} the motion\n", 1000 * std::fabs(seconds),
+                           1000 * resolution, seconds < 0 ? "behind" : "ahead of");
 }
 
 json to_json(const JointFacts& joint) {
@@ -244,10 +249,11 @@ std::vector<CheckFinding> findings_alone(const Project& project, const std::vect
 std::string inline_text(const std::string& lines) {
   std::string out;
   for (const char c : lines) {
-    if (c == '\n') out += out.ends_with(':') ? " " : ", ";
+    if (c == '\n') out += out.ends_with(':') ? " " : " and ";
     if (c != '\n') out += c;
   }
-  return out;
+  const bool several = std::count(lines.begin(), lines.end(), '\n') > 1;
+  return several ? out + " (fxdyn check prints the lines)" : out;
 }
 
 }  // namespace
@@ -278,7 +284,12 @@ CheckResult check(const Project& project, const std::filesystem::path& directory
   if (project.has_role(Role::train)) {
     GateData data = read_gate_data(project, directory);
     append(compare_with_urdf(project, directory, data.logs, options.arrangement), result.findings);
-    result.signals = {data.filter.excited_hz, data.filter.position_cutoff_hz, data.filter.torque_cutoff_hz, {}};
+    const double rate_hz = 1 / data.logs.front().step_s;
+    result.signals = {data.filter.excited_hz,
+                      data.filter.position_cutoff_hz,
+                      data.filter.torque_cutoff_hz,
+                      data.filter.position_cutoff_hz < 0.475 * rate_hz,
+                      {}};
     if (project.check.columns) result.signals->torque_lead = torque_lead(project, data.logs, options.arrangement);
     train = std::move(data.logs);
     known = std::move(data.rows);
@@ -307,7 +318,7 @@ std::string check_table(const CheckResult& result) {
                        finding.text);
     if (!finding.fix.empty()) out += fmt::format("    write {}\n", indented(finding.fix));
   }
-  if (result.findings.empty()) out += "nothing is wrong with these logs\n";
+  if (result.findings.empty()) out += "nothing looks wrong in these logs\n";
   return out;
 }
 

@@ -58,6 +58,7 @@ struct JointFacts {
 struct SignalFacts {
   double excited_hz = 0;  ///< holds 99.9 % of the velocities' energy
   double position_cutoff_hz = 0, torque_cutoff_hz = 0;
+  bool position_filtered = true;  ///< false: the cut-off is half of the sampling rate, ZeroPhaseFilter is the identity
   std::optional<MeasuredLead> torque_lead;  ///< see torque_lead(); none: the logs don't tell
 };
 

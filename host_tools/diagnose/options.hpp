@@ -59,6 +59,12 @@ struct SessionOptions {
   double position_band = 12;
   /// Hz; cut-off of the positions at least; hand
   double lowest_position_hz = 2;
+  /// samples a period of the torque's cut-off; what a faster log is thinned to; theory: what folds back is 1e-3
+  double torque_samples = 16;
+  /// samples a period of the positions' cut-off; .. and for those; theory: seven of them differentiate to 2e-3
+  double position_samples = 8;
+  /// Hz; .. and at least that; theory: the drive's tick of 2 ms, at which effects with memory have to hold
+  double thinned_hz = 500;
   /// periods of the cut-off; dropped at both ends, where the filter swings; hand
   double edge_periods = 3;
   /// s; train logs or baseline at least, after filtering; hand

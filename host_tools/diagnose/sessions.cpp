@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "host_tools/diagnose/models.hpp"
+#include "host_tools/diagnose/thinning.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/regression/encoder_noise.hpp"
 #include "host_tools/regression/row_ranges.hpp"
@@ -37,6 +38,13 @@ void smooth(SessionLog& entry, const SessionOptions& options) {
   log.last = last;
 }
 
+/// How many of its samples go into one.
+Index thinning(const ProcessedLog& log, const SessionOptions& options) {
+  const double needed = std::max({options.thinned_hz, options.torque_samples * log.filter.torque_cutoff_hz,
+                                  options.position_samples * log.filter.position_cutoff_hz});
+  return std::max<Index>(1, static_cast<Index>(1 / (log.step_s * needed) + 1e-9));
+}
+
 bool any(const std::vector<bool>& joints) { return std::find(joints.begin(), joints.end(), true) != joints.end(); }
 
 }  // namespace
@@ -58,8 +66,11 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
     double& cutoff = entry.log.filter.torque_cutoff_hz;
     cutoff = std::min({cutoff, options.highest_cutoff_hz, entry.log.filter.position_cutoff_hz});
     smooth(entry, options);
-    entry.log.decimation = std::max<Index>(log.decimation > 8 ? log.decimation / 8 : 1,
-                                           whole(1 / (log.step_s * options.rows_per_period * cutoff)));
+    const Index k = thinning(entry.log, options);
+    entry.log = thinned(std::move(entry.log), k);
+    const Index decimation = entry.log.decimation;
+    entry.log.decimation = std::max<Index>(decimation > 8 ? decimation / 8 : 1,
+                                           whole(1 / (entry.log.step_s * options.rows_per_period * cutoff)));
     out.push_back(std::move(entry));
   };
   for (const ProcessedLog& log : now) add(log, false, one ? windows.front()[0] : log.t[0]);

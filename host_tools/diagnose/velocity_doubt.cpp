@@ -48,7 +48,7 @@ VectorXd velocity_doubt(const ProcessedLog& log, std::size_t joint, const JointF
   const EffectFit* coulomb = dry_friction_of(friction);
   if (coulomb == nullptr || log.measured_dq.size() > 0 || !(position_noise(log.filter, joint) > 0))
     return VectorXd::Zero(log.rows());
-  const VelocityError error{velocity_noise(log.filter, joint, log.step_s),
+  const VelocityError error{velocity_noise(log.filter, joint, log.step_s / static_cast<double>(log.kept_each)),
                             position_band(log.filter, log.step_s) * log.filter.encoder_step[joint]};
   const double width = friction.sign_width;
   const auto [amplitude, of_load] = sign_friction(friction, *coulomb);

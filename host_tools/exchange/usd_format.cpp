@@ -53,7 +53,7 @@ std::string joint_over(const Joint& joint, const SimpleJoint& said) {
 }
 
 /// @throws InputError: two names that are one in USD
-void check_names(const SimpleRobot& robot) {
+void check_prim_names(const SimpleRobot& robot) {
   std::set<std::string> taken;
   for (const Joint& joint : robot.robot.joints) {
     if (taken.insert(prim_name(joint.name)).second) continue;
@@ -83,7 +83,7 @@ double read_attribute(const std::string& text, const Joint& joint, const char* n
 }  // namespace
 
 void write_usd(const SimpleRobot& robot, const std::filesystem::path& file) {
-  check_names(robot);
+  check_prim_names(robot);
   write_bodies(robot, file);
   const std::string name = prim_name(robot.robot.name);
   std::string text = fmt::format(

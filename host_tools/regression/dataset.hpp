@@ -36,6 +36,7 @@ struct ProcessedLog {
   /// Per joint: the fit uses none of its rows, as it stands still in every log; empty: it uses all joints.
   std::vector<bool> left_out;
   Eigen::Index first = 0, last = 0;  ///< [first, last) is free of filter transients
+  Eigen::Index kept_each = 1;        ///< how many of the recorded samples go into one
   Eigen::Index decimation = 1;       ///< rows for fitting: first, first + decimation, ...
   FilterFit filter;
 

@@ -69,7 +69,8 @@ std::string experiment_for(const std::string& all, std::size_t joint) {
   std::string out;
   for (const std::string& part : split(all)) {
     if (const std::size_t found = part.find(at); found != std::string::npos) return part.substr(found + at.size());
-    if (part == more || part.starts_with(more + ",")) out = "record more motion there";
+    if (part == more) out = "record more of its motion";
+    if (part.starts_with(more + ", ")) out = "record more motion: " + part.substr(more.size() + 2);
   }
   return out;
 }

@@ -67,7 +67,7 @@ def main():
         print(done.stdout[-3000:], done.stderr[-3000:])
         return 1
     failures = []
-    for words in ('about 10 times too small', 'time_unit = "ms"   # by the steps', 'nothing is wrong with these logs'):
+    for words in ('about 10 times too small', 'time_unit = "ms"   # by the steps', 'nothing looks wrong in these logs'):
         if words not in done.stdout + done.stderr:
             failures.append(f'nothing says "{words}"')
     replay = json.loads((work / 'out/replay.json').read_text())
