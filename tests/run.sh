@@ -79,6 +79,7 @@ ctest --test-dir build/host --parallel "$jobs" --output-on-failure --no-tests=er
 }
 [ $# -eq 0 ] || exit 0
 
+# Not model/: it runs under clang's checks of integers and array bounds (tests/portable), and compiling it once more takes minutes.
 mapfile -t exposed <tests/exposed.txt
 sanitize exposed_unit_tests exposed "${exposed[@]}"
 printf '\ndone in %d s\n' "$SECONDS"
