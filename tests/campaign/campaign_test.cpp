@@ -179,6 +179,13 @@ TEST(CampaignScore, PairsOutsideAndClean) {
   EXPECT_TRUE(accepted.at("accepted"));
   EXPECT_TRUE(scored(json::array()).at("false_alarm"));
   EXPECT_EQ(scored(json::array()).at("joints_placed"), 0);
+  // A healthy robot's own friction, rightly named, has a place.
+  json placed_friction = diagnosis, healthy = truth_with(json::array());
+  placed_friction["joints"][1]["where"]["regions"] = json::array({{{"signal", "dq"}, {"from", 0.1}, {"to", 0.2}}});
+  EXPECT_EQ(score(healthy, placed_friction, {}).at("joints_placed"), 1);
+  healthy["background"] = json::array({{{"effect", "stribeck"}, {"joint", 2}, {"names", {"stribeck"}}}});
+  EXPECT_EQ(score(healthy, placed_friction, {}).at("joints_placed"), 0);
+  EXPECT_EQ(score(healthy, placed_friction, {}).at("joints"), 2);
 
   // Where it sits: in the signal, and they overlap.
   const json spot{{"effect", "tight_spot"},

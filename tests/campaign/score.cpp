@@ -105,10 +105,13 @@ std::size_t count_curves(const json& diagnosis) {
   return count;
 }
 
-/// Joints, and those of them that have a sentence with a place.
-void count_places(const json& diagnosis, json& out) {
-  std::size_t joints = 0, placed = 0;
+/// Joints, and those of them that have a sentence with a place. `found`: joints with a healthy robot's own friction
+/// under its name. The sentence is rightly about that, and they don't count.
+void count_places(const json& diagnosis, const std::set<std::size_t>& found, json& out) {
+  std::size_t joints = 0, placed = 0, index = 0;
   for (const json& entry : diagnosis.at("joints")) {
+    ++index;
+    if (found.contains(entry.value("index", index))) continue;
     ++joints;
     placed += static_cast<std::size_t>(!entry.at("where").at("regions").empty());
   }
@@ -136,6 +139,10 @@ json score(const json& truth, const json& diagnosis, std::optional<double> closu
     return std::any_of(list.begin(), list.end(), [&](const json& effect) { return is_right(one, effect); });
   };
   const auto is_healthy = [&](const Named& one) { return is_of(one, truth.at("background")) && !is_of(one, effects); };
+  std::set<std::size_t> with_healthy;
+  for (const Named& one : named) {
+    if (is_healthy(one)) with_healthy.insert(one.joint);
+  }
   std::erase_if(named, is_healthy);
   std::erase_if(likely, is_healthy);
   const auto right_of = [&](const std::vector<Named>& list) {
@@ -149,7 +156,7 @@ json score(const json& truth, const json& diagnosis, std::optional<double> closu
     out["false_alarm"] =
         !named.empty() || verdict == "unexplained" || verdict == "partly_explained" || verdict == "not_excited";
     out["passed"] = !out["false_alarm"];
-    count_places(diagnosis, out);
+    count_places(diagnosis, with_healthy, out);
     return out;
   }
 
