@@ -52,6 +52,7 @@ bool any(const std::vector<bool>& joints) { return std::find(joints.begin(), joi
 std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before,
                                  std::optional<Session>& session, const SessionOptions& options) {
   std::vector<std::array<double, 2>> windows;
+  windows.reserve(now.size());
   for (const ProcessedLog& log : now) windows.push_back({log.t[0], log.t[log.t.size() - 1]});
   std::sort(windows.begin(), windows.end());
   bool one = true;

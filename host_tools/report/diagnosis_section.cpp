@@ -213,7 +213,8 @@ std::string diagnosis_section(const ReportInput& input, const nlohmann::json& fi
     out += evidence_section(*diagnosis.evidence);
     if (diagnosis.evidence->forward) out += forward_section(*diagnosis.evidence->forward);
   }
-  if (!diagnosis.next_experiment.empty()) out += subsection("Next experiment") + paragraph(diagnosis.next_experiment);
+  if (!diagnosis.next_experiment.empty()) out += subsection("Next experiment");
+  for (const std::string& one : words::experiments(diagnosis.next_experiment)) out += paragraph(one);
   for (const std::string& note : diagnosis.notes) out += paragraph("Note: " + note + ".");
   return out + pictures(diagnosis.joints, input.directory);
 }

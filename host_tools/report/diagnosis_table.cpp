@@ -222,7 +222,7 @@ std::string diagnosis_table(const DiagnosisResult& diagnosis, const Terminal& on
          where_lines(on, diagnosis.joints) + curve_lines(on, diagnosis.joints) + undecided_lines(on, diagnosis) +
          alternative_lines(on, diagnosis) + hidden_lines(on, diagnosis);
   if (diagnosis.evidence) out += evidence_lines(on, *diagnosis.evidence);
-  if (!diagnosis.next_experiment.empty()) out += indented(on, "next", diagnosis.next_experiment);
+  for (const std::string& one : words::experiments(diagnosis.next_experiment)) out += indented(on, "next", one);
   for (const std::string& note : diagnosis.notes) out += indented(on, "note", note);
   return out;
 }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 namespace fxdyn::diagnosis_words {
 namespace {
@@ -53,7 +54,7 @@ std::string parameters(const NamedEffect& of, const char* plus_minus) {
     const bool known = is_known(p.std) && *p.std > 0;
     out += fmt::format("{}{} {}{}{}", out.empty() ? "" : ", ", p.name, figure(p.value),
                        known ? fmt::format("{}{:.2g}", plus_minus, *p.std) : "",
-                       p.unit.empty() || p.unit == "-" ? "" : " " + p.unit);
+                       p.unit.empty() || p.unit == "-" || p.unit == "1" ? "" : " " + p.unit);
   }
   return out;
 }
@@ -61,6 +62,17 @@ std::string parameters(const NamedEffect& of, const char* plus_minus) {
 std::string effect(const NamedEffect& of, const char* plus_minus) {
   const std::string values = parameters(of, plus_minus), likely = of.established ? "" : "likely ";
   return likely + of.effect + (values.empty() ? "" : " " + values);
+}
+
+std::vector<std::string> experiments(const std::string& all) {
+  constexpr std::string_view between = "; ";
+  std::vector<std::string> parts;
+  for (std::size_t from = 0; from < all.size();) {
+    const std::size_t end = std::min(all.find(between, from), all.size());
+    parts.push_back(all.substr(from, end - from));
+    from = end + between.size();
+  }
+  return parts;
 }
 
 std::string list(const std::vector<std::string>& names) { return fmt::format("{}", fmt::join(names, ", ")); }

@@ -33,6 +33,8 @@ std::string parameters(const NamedEffect& of, const char* plus_minus);
 /// "joint_2 (4.45 -> 5.37 N*m; 1.6 -> 1.2 on the gate data)": joints at which the error rises on the test logs; "":
 /// none.
 std::string not_borne_out(const DiagnosisResult& diagnosis);
+/// The experiments that `next_experiment` proposes, one after the other.
+std::vector<std::string> experiments(const std::string& all);
 /// "a, b"
 std::string list(const std::vector<std::string>& names);
 /// "2, 3": joints, from 1; "" where it is not known which.

@@ -52,22 +52,11 @@ std::string brings_in_words(const JointAnswer& answer) {
                      100 * (*answer.left / *answer.before - 1));
 }
 
-std::vector<std::string> split(const std::string& all) {
-  constexpr std::string_view between = "; ";
-  std::vector<std::string> parts;
-  for (std::size_t from = 0; from < all.size();) {
-    const std::size_t end = std::min(all.find(between, from), all.size());
-    parts.push_back(all.substr(from, end - from));
-    from = end + between.size();
-  }
-  return parts;
-}
-
 /// What diagnosis proposes for a joint (from 1): of "a or b at joint 3: constant speeds" what follows the colon.
 std::string experiment_for(const std::string& all, std::size_t joint) {
   const std::string at = fmt::format("at joint {}: ", joint), more = fmt::format("record more of joint {}", joint);
   std::string out;
-  for (const std::string& part : split(all)) {
+  for (const std::string& part : words::experiments(all)) {
     if (const std::size_t found = part.find(at); found != std::string::npos) return part.substr(found + at.size());
     if (part == more) out = "record more of its motion";
     if (part.starts_with(more + ", ")) out = "record more motion: " + part.substr(more.size() + 2);
@@ -162,7 +151,7 @@ const char* in_words(Mood mood) {
 
 std::string experiments_for_the_robot(const std::string& all) {
   std::string out;
-  for (const std::string& part : split(all)) {
+  for (const std::string& part : words::experiments(all)) {
     const std::size_t joint = part.find("joint ");
     const bool of_one =
         joint != std::string::npos && joint + 6 < part.size() && part[joint + 6] >= '0' && part[joint + 6] <= '9';

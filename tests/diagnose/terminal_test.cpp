@@ -64,6 +64,18 @@ TEST(DiagnosisTable, ShowsFixedPointAndClosedLoop) {
   expect_parts(flat(table), {"1.88 -> 0.41 0.42 N*m", "0.002 -> 0.0003 rad", "1.5 -> 0.2"});
 }
 
+TEST(DiagnosisTable, EachExperimentHasALineAndAShareHasNoUnit) {
+  json diagnosis = test::diagnosis();
+  diagnosis["next_experiment"] = "a or b at joint 1: slow reversals; c or d at joint 2: constant speeds";
+  diagnosis["joints"][0]["effects"][0]["parameters"][0]["unit"] = "1";
+  const std::string table = diagnosis_table(diagnosis_of(diagnosis));
+  EXPECT_NE(table.find("\n  next: a or b at joint 1: slow reversals\n  next: c or d at joint 2: constant speeds\n"),
+            std::string::npos)
+      << table;
+  EXPECT_EQ(flat(table).find("+-0.05 1"), std::string::npos);
+  EXPECT_NE(flat(table).find("+-0.05"), std::string::npos);
+}
+
 TEST(DiagnosisTable, IsAtMostAHundredColumnsWideWhateverTheNames) {
   json diagnosis = test::diagnosis();
   EXPECT_LE(widest(diagnosis_table(diagnosis_of(diagnosis))), 100U);
