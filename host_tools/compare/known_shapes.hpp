@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/identify/gate_data.hpp"
 #include "host_tools/project/project.hpp"
 

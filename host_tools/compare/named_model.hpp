@@ -1,6 +1,6 @@
 #pragma once
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/identify/gate_data.hpp"
 #include "host_tools/project/project.hpp"
 #include "host_tools/support/progress.hpp"

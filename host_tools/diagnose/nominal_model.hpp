@@ -1,6 +1,6 @@
 #pragma once
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/identify/identify.hpp"
 
 namespace fxdyn::diagnosis {

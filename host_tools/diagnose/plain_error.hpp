@@ -5,7 +5,7 @@
 
 #include "host_tools/diagnose/options.hpp"
 #include "host_tools/diagnose/session_log.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/forward.hpp"
 
 namespace fxdyn::diagnosis {
 

@@ -6,7 +6,7 @@
 
 #include "host_tools/diagnose/linearised.hpp"
 #include "host_tools/diagnose/options.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/forward.hpp"
 #include "host_tools/identify/identify.hpp"
 
 namespace fxdyn::diagnosis {

@@ -9,6 +9,7 @@ struct BroadLearningFit;
 struct EffectFit;
 struct IdentifiedModel;
 struct JointFit;
+struct Session;
 struct TableLayout;
 
 }  // namespace fxdyn

@@ -4,6 +4,7 @@
 
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/numbers/side_by_side.hpp"
 #include "host_tools/robot/robot.hpp"
 #include "model/catalogue.hpp"

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/metrics.hpp"
 #include "host_tools/support/error.hpp"
 

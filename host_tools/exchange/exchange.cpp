@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/exchange/certificate.hpp"
 #include "host_tools/exchange/posterior.hpp"
 #include "host_tools/pipeline/pipeline.hpp"

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/exchange/formats.hpp"
 #include "host_tools/exchange/own_reading.hpp"
 #include "host_tools/exchange/posterior.hpp"

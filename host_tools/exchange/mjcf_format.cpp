@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/exchange/formats.hpp"
 #include "host_tools/exchange/xml_text.hpp"
 #include "host_tools/support/error.hpp"

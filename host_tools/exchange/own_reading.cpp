@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/error.hpp"
 
 namespace fxdyn {

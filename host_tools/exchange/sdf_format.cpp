@@ -5,6 +5,7 @@
 #include <set>
 
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/exchange/formats.hpp"
 #include "host_tools/exchange/sdf_reader.hpp"
 #include "host_tools/exchange/xml_text.hpp"

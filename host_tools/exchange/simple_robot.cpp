@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/error.hpp"
 
 namespace fxdyn {

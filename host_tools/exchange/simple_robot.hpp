@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "host_tools/effects/forward.hpp"
-#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/dataset.hpp"
 #include "host_tools/robot/robot.hpp"
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/exchange/formats.hpp"
 #include "host_tools/robot/urdf_checks.hpp"
 #include "host_tools/robot/write_urdf.hpp"

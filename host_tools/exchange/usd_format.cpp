@@ -5,6 +5,7 @@
 #include <numbers>
 #include <set>
 
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/exchange/formats.hpp"
 #include "host_tools/exchange/own_reading.hpp"
 #include "host_tools/support/error.hpp"
