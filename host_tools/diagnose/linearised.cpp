@@ -105,16 +105,24 @@ std::vector<Index> Linearised::columns_of(const std::vector<std::size_t>& groups
 }
 
 std::vector<MatrixXd> Linearised::make(const Group& group) const {
-  std::vector<MatrixXd> out(joints());
-  for (std::size_t l = 0; l < logs().size(); ++l) {
-    if (logs()[l].healthy) continue;
+  std::vector<std::vector<MatrixXd>> of_log(logs().size(), std::vector<MatrixXd>(joints()));
+  parallel_for(logs().size(), [&](std::size_t l) {
+    if (logs()[l].healthy) return;
     const ProcessedLog& log = logs()[l].log;
-    const Block& b = blocks().of_log[l];
     const EffectColumns full = log_columns_.of(l, group);
     for (std::size_t j = 0; j < joints(); ++j) {
-      if (full.joints[j].size() == 0) continue;
-      if (out[j].size() == 0) out[j].setZero(blocks().rows(), full.joints[j].cols());
-      out[j].middleRows(b.first, b.count) = noise_.apply(l, j, log.decimate(log.filter_columns(full.joints[j])));
+      if (full.joints[j].size() > 0)
+        of_log[l][j] = noise_.apply(l, j, log.decimate(log.filter_columns(full.joints[j])));
+    }
+  });
+  std::vector<MatrixXd> out(joints());
+  for (std::size_t l = 0; l < logs().size(); ++l) {
+    const Block& b = blocks().of_log[l];
+    for (std::size_t j = 0; j < joints(); ++j) {
+      const MatrixXd& rows = of_log[l][j];
+      if (rows.size() == 0) continue;
+      if (out[j].size() == 0) out[j].setZero(blocks().rows(), rows.cols());
+      out[j].middleRows(b.first, b.count) = rows;
     }
   }
   for (std::size_t j = 0; j < joints(); ++j) {

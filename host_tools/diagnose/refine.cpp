@@ -26,25 +26,36 @@ class Refinement {
     MatrixXd gram;
     problem_.solver().normal(columns_, problem_.blocks().fit, gram, projection_);
     inverse_ = SymmetricSolver(gram).inverse();
-    best_ = gain(best_columns_);
+    best_columns_ = problem_.make(group_);
+    best_ = gain_with(best_columns_);
     first_ = best_;
     // A column of an effect on the position costs a simulation.
     rounds_ = find_effect(start.candidate.effect)->acts_on == ActsOn::torque ? 4 : 2;
   }
 
-  /// @param value of group(), see below
-  void search(double& value, double ratio, double least, double most) {
-    std::vector<MatrixXd> made;
-    double best = value;
-    search_beside(best, ratio, rounds_, least, most, [&](double there) {
-      value = there;
-      const double square = gain(made);
-      if (square <= best_) return false;
-      best_ = square;
-      best_columns_ = made;
+  /// @param value of a group: what is searched
+  template <class Value>
+  void search(Value&& value, double ratio, double least, double most) {
+    struct Tried {
+      double square = 0;
+      std::vector<MatrixXd> columns;
+    };
+    const auto make = [&](double there) {
+      Group group = group_;
+      value(group) = there;
+      std::vector<MatrixXd> columns = problem_.make(group);
+      const double square = gain_with(columns);
+      return Tried{square, std::move(columns)};
+    };
+    const auto accept = [&](Tried tried) {
+      if (tried.square <= best_) return false;
+      best_ = tried.square;
+      best_columns_ = std::move(tried.columns);
       return true;
-    });
-    value = best;
+    };
+    double best = value(group_);
+    search_beside(best, ratio, rounds_, least, most, make, accept);
+    value(group_) = best;
   }
 
   /// A load is a body: its second moment brakes and drives as well. Columns around no load lack that, and what they
@@ -64,19 +75,14 @@ class Refinement {
     best_columns_ = std::move(made);
   }
 
-  /// The candidate as it is tried next.
-  Group& group() { return group_; }
+  /// The candidate, as good as it has become.
+  const Group& group() const { return group_; }
   std::optional<Refined> result() {
     if (best_ <= first_) return std::nullopt;
     return Refined{group_, std::move(best_columns_)};
   }
 
  private:
-  /// @param made its columns
-  double gain(std::vector<MatrixXd>& made) const {
-    made = problem_.make(group_);
-    return gain_with(made);
-  }
   double gain_with(const std::vector<MatrixXd>& made) const {
     return gain_of(reduced(made, group_.count), group_.lower, is_share(group_), problem_.options().search.beyond_bound)
         .square;
@@ -160,11 +166,12 @@ std::optional<Refined> refined(const Linearised& problem, const LinearFit& besid
   for (std::size_t sweep = 0; sweep < (shapes.size() > 1 ? sweeps : 1); ++sweep) {
     for (const std::size_t index : shapes) {
       const auto [least, most] = shape_limits(problem.models(), start.candidate.joint, info, info.shape[index]);
-      search.search(search.group().candidate.shape[index], first_ratio(problem, start.candidate, index), least, most);
+      search.search([index](Group& group) -> double& { return group.candidate.shape[index]; },
+                    first_ratio(problem, start.candidate, index), least, most);
     }
   }
-  double& inertia = search.group().rotor_inertia;
-  if (inertia > 0) search.search(inertia, 1.25, 0, 1.1 * inertia);
+  const double inertia = search.group().rotor_inertia;
+  if (inertia > 0) search.search([](Group& group) -> double& { return group.rotor_inertia; }, 1.25, 0, 1.1 * inertia);
   return search.result();
 }
 

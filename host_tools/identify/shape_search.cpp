@@ -8,6 +8,7 @@
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/regression/search_beside.hpp"
 #include "host_tools/support/error.hpp"
+#include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {
 namespace {
@@ -18,24 +19,33 @@ std::vector<double> geometric(double from, double to, int count) {
   return values;
 }
 
+/// Whether what was tried is the best so far, and is from now on.
+bool takes(Candidate& best, Candidate tried) {
+  if (!(tried.judgement.rmse < best.judgement.rmse)) return false;
+  best = std::move(tried);
+  return true;
+}
+
 /// The best of one shape parameter: a geometric grid, then two refinements around its best point.
 template <class Set>
 Candidate search(const Fitter& fitter, std::size_t joint, const JointFit& start, double from, double to, Set&& set) {
   Candidate best{start, {}};
   double best_value = from;
-  const auto attempt = [&](double value) {
+  const auto make = [&](double value) {
     JointFit design = start;
     set(design, value);
     const Judgement judgement = fitter.held_out_with(joint, design, {0.0})[0];
-    if (!(judgement.rmse < best.judgement.rmse)) return false;
-    best = {design, judgement};
-    return true;
+    return Candidate{std::move(design), judgement};
   };
+  const auto accept = [&](Candidate tried) { return takes(best, std::move(tried)); };
   constexpr int points = 12, rounds = 2;
-  for (const double value : geometric(from, to, points)) {
-    if (attempt(value)) best_value = value;
+  const std::vector<double> grid = geometric(from, to, points);
+  std::vector<Candidate> made(grid.size());
+  parallel_for(grid.size(), [&](std::size_t i) { made[i] = make(grid[i]); });
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    if (accept(std::move(made[i]))) best_value = grid[i];
   }
-  search_beside(best_value, std::pow(to / from, 0.5 / (points - 1)), rounds, from, to, attempt);
+  search_beside(best_value, std::pow(to / from, 0.5 / (points - 1)), rounds, from, to, make, accept);
   return best;
 }
 
@@ -108,21 +118,21 @@ void walk(Candidate& best, const std::vector<ShapeRange>& ranges, Attempt&& atte
   constexpr int sweeps = 3, rounds = 3;
   for (int sweep = 0; sweep < sweeps; ++sweep) {
     for (std::size_t i = 0; i < ranges.size(); ++i) {
-      std::vector<double> shape = best.design.effects.back().shape;
-      double best_value = shape[i];
-      search_beside(best_value, sweep == 0 ? 1.5 : 1.2, rounds, ranges[i].from, ranges[i].to, [&](double value) {
+      const std::vector<double> from = best.design.effects.back().shape;
+      double best_value = from[i];
+      const auto make = [&](double value) {
+        std::vector<double> shape = from;
         shape[i] = value;
-        const Candidate one = attempt(shape);
-        if (!(one.judgement.rmse < best.judgement.rmse)) return false;
-        best = one;
-        return true;
-      });
+        return attempt(shape);
+      };
+      const auto accept = [&](Candidate tried) { return takes(best, std::move(tried)); };
+      search_beside(best_value, sweep == 0 ? 1.5 : 1.2, rounds, ranges[i].from, ranges[i].to, make, accept);
     }
   }
 }
 
 /// Several shapes: from the best points of a coarse grid, since there are more valleys than one.
-Candidate search_shapes(const Fitter& fitter, std::size_t joint, JointFit design, const EffectInfo& info,
+Candidate search_shapes(const Fitter& fitter, std::size_t joint, const JointFit& design, const EffectInfo& info,
                         const Scales& scales) {
   constexpr std::size_t most_walks = 5;
   std::vector<std::vector<double>> grid;
@@ -133,11 +143,14 @@ Candidate search_shapes(const Fitter& fitter, std::size_t joint, JointFit design
     grid.push_back(starts(fitter.design(joint), info, shape, ranges.back()));
   }
   const auto attempt = [&](const std::vector<double>& shape) {
-    design.effects.back().shape = shape;
-    return Candidate{design, fitter.held_out_with(joint, design, {0.0})[0]};
+    JointFit with = design;
+    with.effects.back().shape = shape;
+    const Judgement judgement = fitter.held_out_with(joint, with, {0.0})[0];
+    return Candidate{std::move(with), judgement};
   };
-  std::vector<Candidate> all;
-  for (const std::vector<double>& shape : combinations(grid)) all.push_back(attempt(shape));
+  const std::vector<std::vector<double>> points = combinations(grid);
+  std::vector<Candidate> all(points.size());
+  parallel_for(points.size(), [&](std::size_t i) { all[i] = attempt(points[i]); });
   std::stable_sort(all.begin(), all.end(),
                    [](const Candidate& x, const Candidate& y) { return x.judgement.rmse < y.judgement.rmse; });
   Candidate best{design, {}};

@@ -38,7 +38,8 @@ class ThreadLimit {
 };
 
 /// task(i) for i = 0 .. count-1 on as many threads as ThreadLimit leaves. Each i writes its own result, so the outcome
-/// does not depend on their number. The first exception is thrown again here.
+/// does not depend on their number. Loops within share the threads out: they take what this one leaves free. The first
+/// exception is thrown again here.
 template <class Task>
 void parallel_for(std::size_t count, Task&& task) {
   const std::size_t limit = most_threads, threads = std::min(count, limit);
@@ -46,6 +47,7 @@ void parallel_for(std::size_t count, Task&& task) {
   std::exception_ptr failure;
   std::mutex mutex;
   const auto run = [&] {
+    const ThreadLimit within(std::max<std::size_t>(1, limit / std::max<std::size_t>(1, threads)));
     for (std::size_t i; (i = next++) < count;) {
       try {
         task(i);

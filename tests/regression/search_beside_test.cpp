@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
 #include <vector>
 
 namespace fxdyn {
@@ -12,13 +13,14 @@ std::vector<double> tried(double start, double truth, double ratio, int rounds, 
                           double most = 1e9) {
   std::vector<double> values;
   double best = start, distance = std::fabs(std::log(start / truth));
-  search_beside(best, ratio, rounds, least, most, [&](double value) {
-    values.push_back(value);
-    const double now = std::fabs(std::log(value / truth));
-    if (now >= distance) return false;
-    distance = now;
+  const auto make = [&](double value) { return std::pair{value, std::fabs(std::log(value / truth))}; };
+  const auto accept = [&](const std::pair<double, double>& made) {
+    values.push_back(made.first);
+    if (made.second >= distance) return false;
+    distance = made.second;
     return true;
-  });
+  };
+  search_beside(best, ratio, rounds, least, most, make, accept);
   values.push_back(best);
   return values;
 }

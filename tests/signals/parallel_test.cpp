@@ -49,13 +49,21 @@ TEST(ThreadLimit, AnInnerOneDoesNotRaiseIt) {
   EXPECT_EQ(threads_of(20).size(), 1U);
 }
 
-TEST(ThreadLimit, HoldsInLoopsWithinALoop) {
+/// The threads that loops within a loop of `count` tasks may take, where that one may take six.
+std::vector<std::size_t> within(std::size_t count) {
   const std::size_t before = most_threads;
-  most_threads = 2;
-  std::vector<std::size_t> inner(4);
-  parallel_for(inner.size(), [&](std::size_t i) { inner[i] = most_threads; });
+  most_threads = 6;
+  std::vector<std::size_t> out(count);
+  parallel_for(count, [&](std::size_t i) { out[i] = most_threads; });
+  EXPECT_EQ(most_threads, 6U);
   most_threads = before;
-  EXPECT_EQ(inner, std::vector<std::size_t>(4, 2));
+  return out;
+}
+
+TEST(ThreadLimit, IsSharedOutToLoopsWithinALoop) {
+  EXPECT_EQ(within(1), (std::vector<std::size_t>{6}));
+  EXPECT_EQ(within(2), (std::vector<std::size_t>{3, 3}));
+  EXPECT_EQ(within(8), std::vector<std::size_t>(8, 1));
 }
 
 TEST(ThreadLimit, IsOfOneThreadAlone) {
