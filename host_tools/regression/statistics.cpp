@@ -83,7 +83,21 @@ double lagged(const RowMajor& a, const RowMajor& b, Index lag) {
   return Eigen::Map<const VectorXd>(a.data(), count).dot(Eigen::Map<const VectorXd>(b.row(lag).data(), count));
 }
 
-/// Autocorrelation of one joint's noise over a few periods of the filter's cut-off, and the middle of the sandwich.
+/// The number of lags after which an autocorrelation stays below what the estimate itself scatters: the first lag from
+/// which on five in a row are below 2 sqrt(log10 N / N) (Politis, White 2004, Econometric Reviews 23(1), section 3.3).
+/// More lags only add scatter: the sum over them, which is what counts, becomes too small where the fit has taken the
+/// noise's low frequencies.
+Index last_correlated(const VectorXd& autocorrelation, double rows) {
+  constexpr Index quiet = 5;
+  const double least = 2 * std::sqrt(std::log10(rows) / rows) * autocorrelation[0];
+  Index last = 0;
+  for (Index lag = 1; lag < autocorrelation.size() && lag <= last + quiet; ++lag) {
+    if (std::fabs(autocorrelation[lag]) > least) last = lag;
+  }
+  return last;
+}
+
+/// Autocorrelation of one joint's noise, and the middle of the sandwich.
 class NoiseOfJoint {
  public:
   NoiseOfJoint(std::vector<Stretch> stretches, double weight, double rows, Index lags)
@@ -116,10 +130,11 @@ class NoiseOfJoint {
 
  private:
   void spread_out() {
-    VectorXd tapered = noise_;  // flat to half of the lags, then down to zero
-    const auto lags = static_cast<double>(tapered.size());
-    for (Index lag = 0; lag < tapered.size(); ++lag)
-      tapered[lag] *= std::min(1.0, 2 * (1 - static_cast<double>(lag) / lags));
+    // flat to where it has faded, then down to zero over as many lags
+    const Index lags = std::min(noise_.size(), 2 * (last_correlated(noise_, rows_) + 1));
+    VectorXd tapered = noise_.head(lags);
+    for (Index lag = 0; lag < lags; ++lag)
+      tapered[lag] *= std::min(1.0, 2 * (1 - static_cast<double>(lag) / static_cast<double>(lags)));
     for (Stretch& s : stretches_) s.around = correlated(s.x, tapered);
   }
   std::vector<Stretch> stretches_;
@@ -158,7 +173,7 @@ void Fitter::add_standard_deviations(Solution& solution) const {
   const NormalEquations all = with_shapes(solution, shapes);
   const NormalEquations linear = normal_equations();
   const Index p = all.offset.back();
-  // The filter correlates noise over a few periods of its cut-off.
+  // The filter correlates noise over a few periods of its cut-off at most.
   const ProcessedLog& log = logs().front();
   const double rate = 1 / (log.step_s * static_cast<double>(log.decimation));
   const auto lags = static_cast<Index>(std::ceil(4 * rate / log.filter.torque_cutoff_hz)) + 1;
@@ -170,8 +185,8 @@ void Fitter::add_standard_deviations(Solution& solution) const {
   double train_rows = 0;
   for (std::size_t l = 0; l < logs().size(); ++l)
     train_rows += logs()[l].role == Role::train ? static_cast<double>(logs()[l].rows()) : 0;
-  // What the fit takes does not show where there are a few hundred rows a parameter.
-  const bool correcting = train_rows < 300 * static_cast<double>(p);
+  // What the fit takes does not show where there are a thousand rows a parameter.
+  const bool correcting = train_rows < 1000 * static_cast<double>(p);
   parallel_for(joints(), [&](std::size_t j) {
     const Index first = data_->first_base[j], nb = solution.beta.size(), own = own_rows_[j].cols();
     for (Index c = first; c < nb; ++c) columns[j].push_back(c);
