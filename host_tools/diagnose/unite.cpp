@@ -91,7 +91,8 @@ std::optional<Choice> Search::united(const Choice& choice, const EffectInfo& inf
   return with_best(others, candidates_of(info, joint, members, scales_of(problem_, joint)));
 }
 
-/// A law that explains no more than its parts, or with coefficients that it can't have, is those.
+/// A law that explains no more than its parts, or with coefficients that it can't have, is those: where the joint may
+/// have as many effects.
 std::optional<Choice> Search::divided(const Choice& choice, const EffectInfo& info, std::size_t joint) {
   const auto is_here = [&](std::size_t g, std::string_view effect) {
     const Group& group = problem_.groups()[g];
@@ -115,6 +116,11 @@ std::optional<Choice> Search::divided(const Choice& choice, const EffectInfo& in
     groups = tried->groups;
   }
   if (!tried) tried = evaluate(groups);  // the parts are all there
+  const auto here = std::count_if(tried->groups.begin(), tried->groups.end(), [&](std::size_t g) {
+    const Group& group = problem_.groups()[g];
+    return !group.on_body && group.candidate.joint == joint;
+  });
+  if (static_cast<std::size_t>(here) > settings_.max_effects) return {};
   if (tried->impossible < choice.impossible) return tried;
   return tried->impossible == choice.impossible && tried->score + needed > choice.score ? tried : std::nullopt;
 }

@@ -48,7 +48,7 @@ class SearchOfEffects : public testing::Test {
       groups.push_back(group);
     }
     problem_->add_all(groups);
-    Search search(*problem_, {});
+    Search search(*problem_, settings_);
     Choice choice = search.unite(search.run({}, progress_));
     if (!choice.groups.empty()) found_ = search.explain(choice);
     return choice;
@@ -69,6 +69,7 @@ class SearchOfEffects : public testing::Test {
 
   IdentifiedModel model_;
   Options options_;
+  SearchSettings settings_;
   bool baseline_ = false;
   std::vector<SessionLog> logs_;
   std::unique_ptr<Linearised> problem_;
@@ -166,6 +167,14 @@ TEST_F(SearchOfEffects, ALawThatExplainsNoMoreThanItsPartsIsThose) {
   ASSERT_EQ(choice.groups.size(), 2U) << names(choice);
   EXPECT_EQ(candidate(choice, 0).effect, "presliding") << names(choice);
   EXPECT_EQ(candidate(choice, 1).effect, "stribeck") << names(choice);
+}
+
+TEST_F(SearchOfEffects, ALawIsNotDividedIntoMoreEffectsThanAJointMayHave) {
+  settings_.max_effects = 1;
+  const Choice choice = run(1, {test::effect("presliding", {0.01}, {4}), test::effect("stribeck", {0.2}, {2})},
+                            {{"lugre", 1, {0.01, 0.2, 0.7}}});
+  ASSERT_EQ(choice.groups.size(), 1U) << names(choice);
+  EXPECT_EQ(candidate(choice, 0).effect, "lugre") << names(choice);
 }
 
 TEST_F(SearchOfEffects, ManyContactsAreNotOne) {
