@@ -37,10 +37,10 @@ struct Recorded {
       const auto size = static_cast<unsigned>(robot.size());
       KDL::JntArray q(size), dq(size), ddq(size), tau(size);
       for (unsigned j = 0; j < robot.size(); ++j) {
-        const double size = robot.joints[j].type == JointType::revolute ? 1 : 0.05;
-        q(j) = random.uniform(-2, 2) * size;
-        dq(j) = random.uniform(-1.5, 1.5) * size;
-        ddq(j) = random.uniform(-5, 5) * size;
+        const double reach = robot.joints[j].type == JointType::revolute ? 1 : 0.05;
+        q(j) = random.uniform(-2, 2) * reach;
+        dq(j) = random.uniform(-1.5, 1.5) * reach;
+        ddq(j) = random.uniform(-5, 5) * reach;
         if (static_cast<Index>(j) != locked) continue;
         q(j) = 0.4;
         dq(j) = ddq(j) = 0;

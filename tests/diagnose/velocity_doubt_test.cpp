@@ -40,11 +40,11 @@ TEST(EncoderNoise, InTheVelocityIsThatOfDifferentiatedWhiteNoise) {
 
 TEST(EncoderNoise, InTheVelocityIsWhatTheFilterLeavesOfWhiteNoise) {
   constexpr double step_s = 0.001, sigma = 1e-4;
-  constexpr Index samples = 400'000;
+  constexpr Index rows = 400'000;
   Log log;
   log.step_s = step_s;
-  log.t = VectorXd::LinSpaced(samples, 0, step_s * (samples - 1));
-  log.q.resize(samples, 1);
+  log.t = VectorXd::LinSpaced(rows, 0, step_s * (rows - 1));
+  log.q.resize(rows, 1);
   Random random(4);
   for (double& q : log.q.reshaped()) q = sigma * random.normal();
   FilterFit filter = test::filter_of(20, 10, 0.3);

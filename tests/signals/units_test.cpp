@@ -57,7 +57,11 @@ TEST(Units, RadiansAndSecondsAreFine) {
 TEST(Units, DegreesInThePositionOrTheVelocityAreNamed) {
   Log log = sines(2, 1.2, 0.3);
   log.q.col(1) *= degrees;
-  expect_said(log, "q2 looks like degrees (it changes 57.3 times as fast as dq2 says)");
+  expect_said(log, "q2 looks like degrees (the position changes 57.3 times as fast as dq says)");
+  expect_said(log, "position_gain = [1, 0.0174532925]");
+  log.q.col(0) *= degrees;
+  expect_said(log, "q1 and q2 look like degrees");
+  expect_said(log, "position_gain = [0.0174532925, 0.0174532925]");
   log = sines(2, 1.2, 0.3);
   log.dq.col(0) *= degrees;
   expect_said(log, "dq1 looks like degrees (q1 changes only 0.017");
@@ -108,6 +112,7 @@ TEST(Units, WithoutVelocityARangeAtSpeedIsDegrees) {
   Log log = sines(1, 100, 0.3);  // 200 degrees, up to 188 a second
   log.dq.resize(0, 0);
   expect_said(log, "q1 looks like degrees (range 200");
+  expect_said(log, "position_gain = [0.0174532925]");
   // A wheel: so many radians, at a robot's speed.
   log.q = 60 * (0.05 * log.t.array()).sin().matrix();
   EXPECT_EQ(said(log), "");
