@@ -16,6 +16,7 @@ constexpr std::array readers{
     LogReader{"matlab", ".mat", read_array_log, is_matlab, array_columns},
     LogReader{"hdf5", ".h5", read_array_log, is_hdf5, array_columns},
     LogReader{"parquet", ".parquet", read_array_log, is_parquet, array_columns},
+    LogReader{"candump", ".candump", read_can_log, is_can_log, can_columns},
     LogReader{"csv", ".csv", read_csv},
 };
 

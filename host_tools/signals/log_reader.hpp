@@ -82,6 +82,13 @@ std::vector<LogColumns> bag_columns(const std::filesystem::path& file);
 RecordedLog read_array_log(const LogRequest& request);
 std::vector<LogColumns> array_columns(const std::filesystem::path& file);
 
+/// Frames of a CAN bus as candump of can-utils writes them: a row at every SYNC. Columns are q1.., tau1.. of fxdyn's
+/// drive node (setpoints [raw] and torques [N*m | N]) or of CiA 402 drives (counts, per mille; i32 and i16 of 0x180 +
+/// node), and any number of a frame as "181.i32.0": identifier, type (i, u: 8, 16, 32; f32), first byte.
+RecordedLog read_can_log(const LogRequest& request);
+std::vector<LogColumns> can_columns(const std::filesystem::path& file);
+bool is_can_log(const std::filesystem::path& file);
+
 /// The format for a file that names its joints: the columns of the robot's joints, for all signals that the format does
 /// not say. Of other files, the format as it is.
 /// @param joints their names in the URDF, in the order of the chain
