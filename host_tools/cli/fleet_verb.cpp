@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
-#include <sstream>
 
 #include "host_tools/cli/verb.hpp"
 #include "host_tools/fleet/acceptance.hpp"
@@ -17,6 +16,7 @@
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
 #include "host_tools/support/parallel.hpp"
+#include "host_tools/support/quiet.hpp"
 
 namespace fxdyn::cli {
 namespace {
@@ -33,10 +33,11 @@ struct FleetOptions {
   fleet::Chunk chunk;
 };
 
-void add_common(CLI::App& verb, FleetOptions& options) {
+void add_common(CLI::App& verb, FleetOptions& options, const char* jobs) {
   verb.add_option("FLEET", options.file, "fleet file (TOML)")->required();
   verb.add_option("--out", options.out, "directory for the results of all robots")->required();
-  verb.add_option("--jobs", options.jobs, "robots at once (default: the cores)")->check(CLI::Range(1, 4096));
+  verb.add_option("--jobs", options.jobs, fmt::format("robots at once (default: {})", jobs))
+      ->check(CLI::Range(1, 4096));
   verb.add_option("--program", options.program,
                   "started for each robot as PROGRAM VERB PROJECT --out DIR/robots/ID/out (default: this one)");
 }
@@ -61,16 +62,16 @@ fleet::Lock lock_of(const fs::path& directory) {
 void work(const fleet::Fleet& fleet, const fs::path& directory, const FleetOptions& options) {
   const fleet::RunOptions run = run_options(options);
   const std::vector<fleet::Task> tasks = fleet::tasks_of(fleet, directory);
-  fmt::print(stderr, "{} of {} robots to do\n", tasks.size(), fleet.members.size());
+  if (!is_quiet()) fmt::print(stderr, "{} of {} robots to do\n", tasks.size(), fleet.members.size());
   if (!options.slurm) return fleet::run_tasks(fleet, tasks, directory, run);
   fleet::SlurmOptions cluster = options.cluster;
-  std::istringstream words(options.slurm_args);
-  for (std::string word; words >> word;) cluster.arguments.push_back(word);
+  cluster.arguments = fleet::words_of(options.slurm_args);
   fleet::run_on_slurm(fleet, tasks, directory, run, cluster);
 }
 
 void run_fleet(const FleetOptions& options) {
   const fleet::Fleet fleet = fleet::read_fleet(options.file);
+  if (options.slurm && options.accepted.empty()) fleet::check_slurm();
   check_writable(options.out);
   const fs::path directory = fs::absolute(options.out).lexically_normal();
   const fleet::Lock lock = lock_of(directory);
@@ -81,9 +82,13 @@ void run_fleet(const FleetOptions& options) {
     fleet::accept(fleet, directory, options.accepted);
   const fleet::Summary summary = fleet::summarise(fleet, directory);
   fmt::print("{}", fleet::write_summary(summary, options.out));
+  if (is_quiet()) {
+    for (const fleet::RobotSummary& robot : summary.robots)
+      if (!robot.complaint.empty()) fmt::print(stderr, "{} failed: {}\n", robot.id, robot.complaint);
+  }
   const bool failed = std::any_of(summary.robots.begin(), summary.robots.end(),
                                   [](const fleet::RobotSummary& robot) { return !robot.complaint.empty(); });
-  if (failed)
+  if (failed && options.accepted.empty())
     throw DataError("robots failed, see the list; the others are done, and the same command tries these again");
 }
 
@@ -98,7 +103,7 @@ int jobs_of_task() {
 
 Action add_fleet(CLI::App& verb) {
   const auto options = std::make_shared<FleetOptions>();
-  add_common(verb, *options);
+  add_common(verb, *options, "the cores");
   verb.add_option("--accept", options->accepted,
                   "runs nothing: today's state of these robots (ids, or all) is their new baseline");
   verb.add_flag("--slurm", options->slurm, "as a job array of Slurm; --out has to be seen by all nodes");
@@ -110,7 +115,7 @@ Action add_fleet(CLI::App& verb) {
 
 Action add_fleet_worker(CLI::App& verb) {
   const auto options = std::make_shared<FleetOptions>();
-  add_common(verb, *options);
+  add_common(verb, *options, "SLURM_CPUS_PER_TASK, else 1");
   verb.add_option("--chunk", options->chunk.index, "which part of the fleet, from 0")->required();
   verb.add_option("--of", options->chunk.of, "number of parts (default: the part is DIR/chunks/CHUNK.txt)")
       ->check(CLI::PositiveNumber);

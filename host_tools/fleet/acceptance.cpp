@@ -56,10 +56,21 @@ std::optional<Acceptance> acceptance_of(const fs::path& directory, const std::st
 
 void accept(const Fleet& fleet, const fs::path& directory, const std::vector<std::string>& ids) {
   std::vector<std::string> asked = ids;
+  const auto is_done = [&](const Member& member) {
+    const RobotFolder folder(directory, member.id);
+    try {
+      return folder.is_done(inputs_of(fleet, member, folder.path()).hash);
+    } catch (const InputError&) {
+      return false;  // a project or a log is gone
+    }
+  };
   if (ids.size() == 1 && ids.front() == "all") {
     asked.clear();
     for (const Member& member : fleet.members) {
-      if (RobotFolder(directory, member.id).result()) asked.push_back(member.id);
+      if (is_done(member))
+        asked.push_back(member.id);
+      else
+        fmt::print(stderr, "{}: has no result of today's logs: not accepted\n", member.id);
     }
     if (asked.empty()) throw InputError("--accept all: no robot has a result: start the fleet without --accept first");
   }
@@ -68,10 +79,10 @@ void accept(const Fleet& fleet, const fs::path& directory, const std::vector<std
   for (const std::string& id : asked) {
     const Member& member = member_of(fleet, id);
     const RobotFolder folder(directory, id);
-    const auto state = folder.result();
-    if (!state || !folder.is_done(inputs_of(fleet, member, folder.path()).hash))
+    if (!is_done(member))
       throw InputError(
           fmt::format("--accept {}: it has no result of today's logs: start the fleet without --accept first", id));
+    const auto state = folder.result();
     const json content{{"schema", schema}, {"id", id}, {"by", user()}, {"at", now}, {"state", to_json(*state)}};
     files.emplace_back(file_of(directory, id), content.dump(1) + "\n");
   }

@@ -118,17 +118,19 @@ std::string head(const Summary& summary) {
     failed += robot.complaint.empty() ? 0 : 1;
     drifting += robot.drifts ? 1 : 0;
   }
-  const FalseDiscovery& f = summary.false_discovery;
   std::string out = "<h1>Fleet</h1>\n";
   out += fmt::format("<p class=\"quiet\">fxdyn {} {}, {} robots: {} drift, {} failed</p>\n", version,
                      escape(summary.verb), summary.robots.size(), drifting, failed);
+  const auto stand = [](const FalseDiscovery& f) {
+    return fmt::format("{} of {}{}", f.discoveries, f.hypotheses,
+                       f.discoveries > 0 ? fmt::format(", p up to 10^{:.1f}", f.log10_threshold) : "");
+  };
   out += paragraph(fmt::format(
-      "{} hypotheses (every joint, and every robot as a whole) were tested together. {} stand at a false-discovery "
-      "rate of "
-      "{:g} (Benjamini-Hochberg{}). A robot drifts where one of these is new since its reference: the state that was "
-      "accepted, else its healthy session.",
-      f.hypotheses, f.discoveries, f.rate,
-      f.discoveries > 0 ? fmt::format(", p up to 10^{:.1f}", f.log10_threshold) : ""));
+      "Every joint, and every robot as a whole, was tested at a false-discovery rate of {:g} (Benjamini-Hochberg). "
+      "Something is there at {}. Something is new at {}. New is what the robot's reference did not have: the state "
+      "that "
+      "was accepted, else its healthy session. A robot with something new drifts.",
+      summary.false_discovery.rate, stand(summary.false_discovery), stand(summary.false_discovery_of_new)));
   return out;
 }
 

@@ -19,8 +19,12 @@ namespace fs = std::filesystem;
 }  // namespace
 
 bool RobotFolder::is_done(const std::string& hash) const {
-  return fs::exists(path_ / "result.json") && fs::exists(path_ / "input.sha256") &&
-         read_file(path_ / "input.sha256") == hash + "\n";
+  if (!fs::exists(path_ / "input.sha256") || read_file(path_ / "input.sha256") != hash + "\n") return false;
+  try {
+    return result().has_value();
+  } catch (const InputError&) {
+    return false;  // what a power cut left of it: done again
+  }
 }
 
 void remove_leftovers(const fs::path& folder) {

@@ -19,6 +19,7 @@
 #include "host_tools/fleet/signals.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/parallel.hpp"
+#include "host_tools/support/quiet.hpp"
 
 namespace fxdyn::fleet {
 namespace {
@@ -138,6 +139,7 @@ class Runner {
 
   void say(const std::string& id, const std::string& what) {
     ++ended_;
+    if (is_quiet()) return;
     const double left = seconds_since(started_) / static_cast<double>(ended_) * static_cast<double>(total_ - ended_);
     fmt::print(stderr, "[{}/{}, {:.0f} s left] {}: {}\n", ended_, total_, left, id, what);
     said_ = Clock::now();
@@ -145,6 +147,7 @@ class Runner {
 
   /// A robot of an hour is not a robot that hangs.
   void say_what_is_at_work() {
+    if (is_quiet()) return;
     constexpr std::size_t shown = 8;  // of a line that can be read
     std::vector<std::string> words;
     for (const auto& [process, running] : running_) {

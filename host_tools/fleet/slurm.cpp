@@ -43,6 +43,11 @@ std::string in_path(const std::string& name) {
   return "";
 }
 
+InputError no_command(const std::string& name) {
+  return InputError(
+      fmt::format("no {} on this machine: run it where Slurm's commands are, or leave out --slurm", name));
+}
+
 struct Answer {
   bool good = false;
   std::string text;
@@ -52,9 +57,7 @@ struct Answer {
 Answer ask(std::vector<std::string> words, const fs::path& directory) {
   const fs::path output = directory / "slurm" / (words.front() + ".txt");
   const std::string program = in_path(words.front());
-  if (program.empty())
-    throw InputError(
-        fmt::format("no {} on this machine: run it where Slurm's commands are, or leave out --slurm", words.front()));
+  if (program.empty()) throw no_command(words.front());
   words.front() = program;
   constexpr std::size_t one_thread = 1;  // the array inherits it; a worker has as many programs as CPUs
   const Program running = start(words, {}, output, one_thread);
@@ -241,6 +244,31 @@ class Submitter {
 
 }  // namespace
 
+void check_slurm() {
+  if (in_path("sbatch").empty()) throw no_command("sbatch");
+}
+
+std::vector<std::string> words_of(const std::string& text) {
+  std::vector<std::string> out;
+  bool within = false;  // a word, which may be empty in quotes
+  char quote = 0;
+  for (const char c : text) {
+    if (quote != 0 ? c == quote : (c == '\'' || c == '"')) {
+      quote = quote != 0 ? '\0' : c;
+      if (!within) out.emplace_back();
+      within = true;
+    } else if (quote == 0 && (c == ' ' || c == '\t')) {
+      within = false;
+    } else {
+      if (!within) out.emplace_back();
+      within = true;
+      out.back() += c;
+    }
+  }
+  if (quote != 0) throw InputError(fmt::format("--slurm-args {}: a {} is not closed", text, quote));
+  return out;
+}
+
 void run_on_slurm(const Fleet& fleet, const std::vector<Task>& tasks, const fs::path& directory, const RunOptions& run,
                   const SlurmOptions& options) {
   if (!tasks.empty()) Submitter(fleet, directory, run, options).work(tasks);
@@ -263,6 +291,10 @@ void work_on_chunk(const Fleet& fleet, const fs::path& directory, const Chunk& c
   }
   if (ids.empty()) return;
   run_tasks(fleet, tasks_of(fleet, directory, ids), directory, run);
+  for (const std::string& id : ids) {
+    if (const std::string complaint = RobotFolder(directory, id).complaint(); !complaint.empty())
+      fmt::print(stderr, "{} failed: {}\n", id, complaint);
+  }
 }
 
 }  // namespace fxdyn::fleet

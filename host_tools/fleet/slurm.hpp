@@ -25,6 +25,12 @@ struct SlurmOptions {
   int useless_rounds = 3;
 };
 
+/// @throws InputError: this machine has no sbatch
+void check_slurm();
+/// The words of a command line: blanks part them, but not within ' or ".
+/// @throws InputError: a quotation mark is not closed
+std::vector<std::string> words_of(const std::string& text);
+
 /// Submits an array of `fxdyn fleet-worker --chunk k`, waits for the files, and submits again what is missing once the
 /// array is gone. What counts as done stands in the files alone: neither sacct nor exit codes are asked.
 /// @throws InputError: no sbatch, or it refuses

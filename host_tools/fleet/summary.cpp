@@ -44,17 +44,17 @@ json to_json(const NamedParameter& p, const std::vector<NamedParameter>& before)
 
 bool has_a_gap(Verdict verdict) { return verdict == Verdict::unexplained || verdict == Verdict::partly_explained; }
 
-/// The same joints, or it is another robot.
-void check_accepted(const RobotSummary& robot) {
+/// @returns a complaint: the accepted state has other joints; it is another robot's
+std::string complaint_of_accepted(const RobotSummary& robot) {
   const auto& now = robot.state->joints;
   const auto& then = robot.accepted->state.joints;
   const bool same = std::equal(now.begin(), now.end(), then.begin(), then.end(),
                                [](const auto& a, const auto& b) { return a.joint == b.joint && a.unit == b.unit; });
-  if (!same || robot.state->robot != robot.accepted->state.robot)
-    throw InputError(fmt::format(
-        "accepted/{0}.json: is the baseline of another robot ('{1}', {2} joints; today '{3}', {4}): remove it, or run "
-        "`fxdyn fleet .. --accept {0}`",
-        robot.id, robot.accepted->state.robot, then.size(), robot.state->robot, now.size()));
+  if (same && robot.state->robot == robot.accepted->state.robot) return "";
+  return fmt::format(
+      "accepted/{0}.json: is the baseline of another robot ('{1}', {2} joints; today '{3}', {4}): remove it, or run "
+      "`fxdyn fleet .. --accept {0}`",
+      robot.id, robot.accepted->state.robot, then.size(), robot.state->robot, now.size());
 }
 
 void add_findings(RobotSummary& robot, std::size_t joint, const std::string& where,
@@ -94,24 +94,43 @@ double log10_p(const std::vector<FoundEffect>& effects, const std::optional<doub
   return std::min(0.0, lowest + std::log10(2.0));
 }
 
+/// What is new at a joint (0: on the robot as a whole), as if nothing else had been found there.
+double log10_p_of_new(const RobotSummary& robot, std::size_t joint) {
+  std::vector<FoundEffect> fresh;
+  for (const Finding& finding : robot.findings) {
+    if (finding.joint == joint && finding.is_new) fresh.push_back(finding.found);
+  }
+  const bool gap = std::any_of(robot.unnamed.begin(), robot.unnamed.end(),
+                               [&](const Unnamed& unnamed) { return unnamed.joint == joint; });
+  return log10_p(fresh, gap ? robot.state->joints[joint - 1].lack_log10_p : std::nullopt);
+}
+
+/// Two families of tests: what is there, and what is new. What was there all along is certain on most robots, and would
+/// make room for false news among its own kind.
 void judge(Summary& summary, double rate) {
-  std::vector<double> all;
+  std::vector<double> all, fresh;
   for (const RobotSummary& robot : summary.robots) {
     if (!robot.state || !robot.state->verdict) continue;
     for (const JointState& joint : robot.state->joints) all.push_back(log10_p(joint.effects, joint.lack_log10_p));
     all.push_back(log10_p(robot.state->on_robot, {}));
+    for (std::size_t joint = 0; joint <= robot.state->joints.size(); ++joint)
+      fresh.push_back(log10_p_of_new(robot, joint));
   }
   summary.false_discovery = benjamini_hochberg(all, rate);
-  const FalseDiscovery& limit = summary.false_discovery;
-  const auto passes = [&](double p) { return limit.discoveries > 0 && p <= limit.log10_threshold; };
+  summary.false_discovery_of_new = benjamini_hochberg(fresh, rate);
+  const auto passes = [](const FalseDiscovery& limit, double p) {
+    return limit.discoveries > 0 && p <= limit.log10_threshold;
+  };
   for (RobotSummary& robot : summary.robots) {
     for (Finding& finding : robot.findings) {
-      finding.discovered = passes(log10_p({finding.found}, {}));
+      finding.discovered = passes(finding.is_new ? summary.false_discovery_of_new : summary.false_discovery,
+                                  log10_p({finding.found}, {}));
       // Of a likely effect the name is in doubt, not that something is there.
       robot.drifts = robot.drifts || (finding.is_new && finding.discovered);
     }
     for (Unnamed& gap : robot.unnamed) {
-      gap.discovered = passes(log10_p({}, robot.state->joints[gap.joint - 1].lack_log10_p));
+      gap.discovered =
+          passes(summary.false_discovery_of_new, log10_p({}, robot.state->joints[gap.joint - 1].lack_log10_p));
       robot.drifts = robot.drifts || gap.discovered;
     }
   }
@@ -225,10 +244,16 @@ Summary summarise(const Fleet& fleet, const fs::path& directory) {
     robot.project = fs::relative(member.project, fleet.file.parent_path()).generic_string();
     const RobotFolder folder(directory, member.id);
     robot.complaint = folder.complaint();
-    robot.state = folder.result();
-    robot.accepted = acceptance_of(directory, member.id);
+    try {
+      robot.state = folder.result();
+      robot.accepted = acceptance_of(directory, member.id);
+    } catch (const InputError& error) {
+      robot.complaint = error.what();
+    }
     if (!robot.state && robot.complaint.empty()) robot.complaint = "no result yet: start the fleet again";
-    if (robot.state && robot.accepted) check_accepted(robot);
+    if (robot.state && robot.accepted && robot.complaint.empty()) robot.complaint = complaint_of_accepted(robot);
+    // One robot's broken file costs nobody else.
+    if (!robot.complaint.empty()) robot.state.reset();
     if (robot.state) compare(robot);
     summary.robots.push_back(std::move(robot));
   }
@@ -249,19 +274,21 @@ json to_json(const Summary& summary) {
   }
   for (const Cluster& c : summary.clusters)
     clusters.push_back({{"robot", c.robot}, {"joint", c.where}, {"effect", c.effect}, {"ids", c.ids}});
-  const FalseDiscovery& f = summary.false_discovery;
+  const auto family = [](const FalseDiscovery& f) {
+    return json{{"method", "Benjamini-Hochberg"},
+                {"rate", f.rate},
+                {"hypotheses", f.hypotheses},
+                {"discoveries", f.discoveries},
+                {"log10_p_threshold", f.discoveries > 0 ? json(f.log10_threshold) : json()}};
+  };
   return {{"schema", "fxdyn.fleet/1"},
           {"tool_version", version},
           {"verb", summary.verb},
           {"count", summary.robots.size()},
           {"failed", failed},
           {"drifting", drifting},
-          {"false_discovery",
-           {{"method", "Benjamini-Hochberg"},
-            {"rate", f.rate},
-            {"hypotheses", f.hypotheses},
-            {"discoveries", f.discoveries},
-            {"log10_p_threshold", f.discoveries > 0 ? json(f.log10_threshold) : json()}}},
+          {"false_discovery", family(summary.false_discovery)},
+          {"false_discovery_of_new", family(summary.false_discovery_of_new)},
           {"robots", robots},
           {"clusters", clusters}};
 }

@@ -69,9 +69,10 @@ struct FalseDiscovery {
 
 struct Summary {
   std::string verb;
-  std::vector<RobotSummary> robots;  ///< worst first
-  std::vector<Cluster> clusters;     ///< of two robots or more, largest first
-  FalseDiscovery false_discovery;
+  std::vector<RobotSummary> robots;       ///< worst first
+  std::vector<Cluster> clusters;          ///< of two robots or more, largest first
+  FalseDiscovery false_discovery;         ///< of what is there
+  FalseDiscovery false_discovery_of_new;  ///< of what is new since the robots' references
 };
 
 /// Benjamini and Hochberg 1995: the largest p that is at most rate k / m, k its rank of m. All hypotheses whose log10 p
@@ -79,8 +80,7 @@ struct Summary {
 /// for any dependence between hypotheses (Wang and Ramdas 2022, "False discovery rate control with e-values").
 FalseDiscovery benjamini_hochberg(std::vector<double> log10_p, double rate);
 
-/// From DIR/robots and DIR/accepted.
-/// @throws InputError: an accepted state is of another robot
+/// From DIR/robots and DIR/accepted. What can't be read of one robot is its complaint.
 Summary summarise(const Fleet& fleet, const std::filesystem::path& directory);
 nlohmann::json to_json(const Summary& summary);
 std::string html_of(const Summary& summary);

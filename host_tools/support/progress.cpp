@@ -23,6 +23,7 @@ bool on_terminal() {
 }  // namespace
 
 void be_quiet() { quiet = true; }
+bool is_quiet() { return quiet; }
 void set_progress_listener(ProgressListener listener) { told = std::move(listener); }
 
 void Progress::stage(const std::string& name, std::size_t total) {

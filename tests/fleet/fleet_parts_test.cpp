@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -5,6 +6,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "host_tools/fleet/file_hashes.hpp"
 #include "host_tools/fleet/fleet_file.hpp"
@@ -242,6 +244,43 @@ TEST_F(FleetFile, AWeakerEffectOfTheSameJointIsADiscoveryToo) {
   EXPECT_TRUE(findings[0].discovered);
   EXPECT_TRUE(findings[1].discovered);
   EXPECT_FALSE(findings[2].discovered);  // twice 10^-1.3 is more than 0.025
+}
+
+// What every robot has makes no room for chance among what is new.
+TEST_F(FleetFile, WhatIsNewIsHeldAgainstWhatIsNewAlone) {
+  const auto state_with = [](std::vector<fleet::FoundEffect> effects) {
+    fleet::RobotState state;
+    state.verdict = Verdict::explained;
+    state.joints = {{"hinge", "N*m", Verdict::explained, {}, std::move(effects), {}}};
+    return state;
+  };
+  const fleet::FoundEffect known{"presliding", true, 2000, {}}, doubtful{"backlash", false, 1.9, {}};
+  const std::filesystem::path out = folder_.path() / "out";
+  std::string projects;
+  for (int i = 0; i < 10; ++i) {
+    const std::string id = fmt::format("r{}", i);
+    write(id + ".toml", "");
+    write("out/accepted/" + id + ".json", nlohmann::json{{"schema", "fxdyn.fleet_accepted/1"},
+                                                         {"id", id},
+                                                         {"by", "test"},
+                                                         {"at", "2026-11-28T00:00:00Z"},
+                                                         {"state", fleet::to_json(state_with({known}))}}
+                                              .dump());
+    fleet::RobotFolder(out, id).finish(i == 7 ? state_with({known, doubtful}) : state_with({known}), 1);
+  }
+  const fleet::Summary summary = fleet::summarise(read("projects = \"*.toml\""), out);
+  EXPECT_EQ(summary.false_discovery.discoveries, 10u);
+  // 2 * 10^-1.9 is less than 0.05 / 2, and more than 0.05 / 20.
+  EXPECT_EQ(summary.false_discovery_of_new.hypotheses, 20u);
+  EXPECT_EQ(summary.false_discovery_of_new.discoveries, 0u);
+  for (const fleet::RobotSummary& robot : summary.robots) EXPECT_FALSE(robot.drifts) << robot.id;
+}
+
+TEST(SlurmArguments, StayTogetherInQuotes) {
+  using Words = std::vector<std::string>;
+  EXPECT_EQ(fleet::words_of(" -p night  --mem=4G "), (Words{"-p", "night", "--mem=4G"}));
+  EXPECT_EQ(fleet::words_of("--comment=\"a 'b' c\" -x ''"), (Words{"--comment=a 'b' c", "-x", ""}));
+  EXPECT_THROW(fleet::words_of("--comment=\"a"), InputError);
 }
 
 TEST_F(FleetFile, WhatIsAtWorkIsToldWhileNothingEnds) {

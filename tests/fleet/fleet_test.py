@@ -224,20 +224,46 @@ class Fleets(unittest.TestCase):
         self.assertEqual(self.fake(env={"FAKE_RESULTS": str(self.folder / "healed")}).returncode, 0)
         self.assertTrue(any("payload" in gone for gone in self.robot("a")["gone"]))
 
-    def test_a_baseline_of_another_robot_is_refused(self):
+    def test_a_baseline_of_another_robot_is_its_complaint_alone(self):
         self.robots("a", "b")
         self.fleet()
         self.assertEqual(self.fake().returncode, 0)
         self.assertEqual(self.run_fleet("--accept", "all").returncode, 0)
-        page = (self.folder / "out/fleet.json").read_bytes()
         accepted = self.folder / "out/accepted"
         state = json.loads((accepted / "a.json").read_text())
         state["state"]["joints"][1]["joint"] = "wrist"
         (accepted / "a.json").write_text(json.dumps(state))
-        self.complains(self.fake(), 2, "accepted/a.json: is the baseline of another robot", "--accept a")
+        self.complains(self.fake(), 1, "robots failed")
+        self.assertIn("accepted/a.json: is the baseline of another robot", self.robot("a")["error"])
+        self.assertIn("--accept a", self.robot("a")["error"])
+        self.assertEqual((self.robot("b")["error"], self.robot("b")["reference"]), (None, "accepted"))
+        quiet = self.fake("--quiet")
+        self.assertEqual((quiet.returncode, quiet.stdout), (1, ""))
+        self.assertTrue(quiet.stderr.startswith("a failed: accepted/a.json: is the baseline"), quiet.stderr)
         shutil.copy(accepted / "b.json", accepted / "a.json")
-        self.complains(self.fake(), 2, "a.json: is no accepted state of 'a'")
+        self.complains(self.fake(), 1, "robots failed")
+        self.assertIn("a.json: is no accepted state of 'a'", self.robot("a")["error"])
+
+    def test_a_result_that_is_cut_is_made_again(self):
+        self.robots("a", "b")
+        self.fleet()
+        self.assertEqual(self.fake().returncode, 0)
+        page = (self.folder / "out/fleet.json").read_bytes()
+        (self.folder / "out/robots/a/result.json").write_text("")
+        done = self.fake()
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("1 of 2 robots to do", done.stderr)
         self.assertEqual((self.folder / "out/fleet.json").read_bytes(), page)
+
+    def test_all_that_are_done_are_accepted_and_the_others_told(self):
+        self.robots("a", "b")
+        self.fleet()
+        self.assertEqual(self.fake().returncode, 0)
+        (self.folder / "a.robot").write_text((self.folder / "a.robot").read_text() + "# changed\n")
+        done = self.run_fleet("--accept", "all")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("a: has no result of today's logs: not accepted", done.stderr)
+        self.assertEqual([r["id"] for r in self.result()["robots"] if r["accepted"]], ["b"])
 
     def test_overrides_and_baselines_reach_the_project(self):
         self.robots("a")
