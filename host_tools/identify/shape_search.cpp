@@ -15,6 +15,7 @@ namespace {
 
 std::vector<double> geometric(double from, double to, int count) {
   std::vector<double> values;
+  values.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) values.push_back(from * std::pow(to / from, static_cast<double>(i) / (count - 1)));
   return values;
 }

@@ -25,6 +25,7 @@ std::string leave_out_velocity(const Log& log) {
 /// The line to write where these joints' positions are in degrees.
 std::string gain_line(const std::vector<bool>& in_degrees) {
   std::vector<std::string> gains;
+  gains.reserve(in_degrees.size());
   for (const bool is : in_degrees) gains.emplace_back(is ? "0.0174532925" : "1");
   return fmt::format("position_gain = [{}] (in its [[log]], or in [signals] for all logs)", fmt::join(gains, ", "));
 }
