@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <type_traits>
 
 #include "host_tools/effects/effect_library.hpp"
 #include "host_tools/effects/joint_fit.hpp"
@@ -119,13 +120,14 @@ const std::vector<EffectInfo>& effect_infos() {
   static const std::vector<EffectInfo> list = [] {
     std::vector<EffectInfo> all;
     const auto add = [&]<class E>() {
-      bool sign = false, constant = false;
+      bool sign = false, constant = false, memory = false;
       if constexpr (acts_on<E> != ActsOn::body) {
         sign = uses_sign<E>();
         constant = has_constant<E>();
+        memory = !std::is_empty_v<typename E::template State<Real>>;
       }
       all.push_back({E::traits, E::name, E::equation, E::shape, E::linear, acts_on<E>, needs_structural<E>,
-                     needs_total<E>, needs_peers<E>, sign, constant});
+                     needs_total<E>, needs_peers<E>, sign, constant, memory});
     };
     Catalogue::for_each(add);
     BodyEffects::for_each(add);

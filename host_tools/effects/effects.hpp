@@ -19,6 +19,7 @@ struct EffectInfo : EffectTraits {
   bool needs_structural, needs_total, needs_peers;
   bool uses_sign;     ///< its phi depends on the joint's sign width
   bool has_constant;  ///< one of its phi is 1
+  bool remembers;     ///< it has a state: its phi depend on the motion before
   /// Bends under the load: acts on the position and needs the rigid-body torque.
   bool bends() const { return acts_on == ActsOn::position && needs_structural; }
   /// Separates a rotor from the base parameters: it follows the load without the rotor's own inertia.

@@ -36,7 +36,8 @@ void add_log(Totals& sum, const ExportFormat& format, const std::filesystem::pat
              const IdentifiedModel& model, const ProcessedLog& log) {
   const MotionRows motion = log.motion();
   const ReplayedTorque replayed = format.replay(file, meant, motion, log.step_s);
-  const Eigen::MatrixXd said = predict(meant, motion.q, motion.dq, motion.ddq, log.step_s);
+  const Eigen::MatrixXd said =
+      format.whole_model ? settled(meant, motion) : predict(meant, motion.q, motion.dq, motion.ddq, log.step_s);
   const Eigen::MatrixXd full = predict(model, log), written = as_recorded(replayed.tau, model, log);
   const std::vector<JointMetrics> of_file = judge(log, written), of_model = judge(log, full);
   const Eigen::Index count = log.last - log.first;
@@ -69,7 +70,7 @@ Certificate certify(const ExportFormat& format, const std::filesystem::path& fil
                     const CertificateOptions& options) {
   Certificate out{format.name, file.filename().string(), format.reader, to_string(logs.at(0).role), {}, {}};
   Totals sum(static_cast<Eigen::Index>(meant.joints.size()));
-  const IdentifiedModel simple = as_model(meant, model);
+  const IdentifiedModel simple = format.whole_model ? model : as_model(meant, model);
   for (const ProcessedLog& log : logs) {
     add_log(sum, format, file, simple, model, log);
     out.logs.push_back(log.name);
@@ -79,15 +80,16 @@ Certificate certify(const ExportFormat& format, const std::filesystem::path& fil
     JointCertificate joint;
     joint.name = meant.robot.joints[j].name;
     joint.unit = meant.robot.joints[j].torque_unit();
-    joint.written = meant.joints[j];
-    joint.left_out = left_out(model, j, format.has_armature, format.has_stribeck);
+    if (!format.whole_model) joint.written = meant.joints[j];
+    joint.left_out =
+        format.whole_model ? settled_effects(model, j) : left_out(model, j, format.has_armature, format.has_stribeck);
     joint.cannot_say = std::sqrt(sum.cannot_say[k] / sum.samples);
     joint.file_rmse = std::sqrt(sum.file[k] / sum.samples);
     joint.model_rmse = std::sqrt(sum.model[k] / sum.samples);
     joint.misread = sum.misread[k];
     joint.largest = sum.largest[k];
     joint.sliding_share = sum.sliding[k] / sum.samples;
-    joint.as_meant = joint.misread <= options.as_meant * joint.largest;
+    joint.as_meant = joint.misread <= (format.whole_model ? options.as_meant_fixed : options.as_meant) * joint.largest;
     out.joints.push_back(joint);
   }
   return out;
@@ -96,18 +98,22 @@ Certificate certify(const ExportFormat& format, const std::filesystem::path& fil
 nlohmann::json to_json(const Certificate& certificate) {
   nlohmann::json joints = nlohmann::json::array();
   for (const JointCertificate& joint : certificate.joints) {
-    joints.push_back({{"joint", joint.name},
-                      {"unit", joint.unit},
-                      {"damping", joint.written.damping},
-                      {"friction", joint.written.friction},
-                      {"armature", joint.written.armature},
-                      {"left_out", joint.left_out},
-                      {"cannot_say", joint.cannot_say},
-                      {"file_rmse", joint.file_rmse},
-                      {"model_rmse", joint.model_rmse},
-                      {"misread", std::isfinite(joint.misread) ? nlohmann::json(joint.misread) : nlohmann::json()},
-                      {"sliding_share", joint.sliding_share},
-                      {"as_meant", joint.as_meant}});
+    nlohmann::json entry = {
+        {"joint", joint.name},
+        {"unit", joint.unit},
+        {"left_out", joint.left_out},
+        {"cannot_say", joint.cannot_say},
+        {"file_rmse", joint.file_rmse},
+        {"model_rmse", joint.model_rmse},
+        {"misread", std::isfinite(joint.misread) ? nlohmann::json(joint.misread) : nlohmann::json()},
+        {"sliding_share", joint.sliding_share},
+        {"as_meant", joint.as_meant}};
+    if (joint.written) {
+      entry.update({{"damping", joint.written->damping},
+                    {"friction", joint.written->friction},
+                    {"armature", joint.written->armature}});
+    }
+    joints.push_back(std::move(entry));
   }
   return {{"schema", "fxdyn.certificate/1"},    {"format", certificate.format},
           {"file", certificate.file},           {"read_back_by", certificate.reader},

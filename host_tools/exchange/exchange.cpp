@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "host_tools/effects/identified_model.hpp"
@@ -34,8 +35,8 @@ std::vector<ProcessedLog> held_out_logs(Pipeline& pipeline) {
 
 /// What the project alone decides: asked before hours of work.
 /// @throws InputError
-void check_project(const Project& project) {
-  if (!project.identify.physical) {
+void check_project(const Project& project, bool bodies) {
+  if (bodies && !project.identify.physical) {
     throw InputError(fmt::format(
         "{}: a simulator takes possible bodies only: set `physical = true` in [identify], then export again",
         project.file.string()));
@@ -60,14 +61,19 @@ Robot possible_bodies(const Pipeline& pipeline) {
 
 std::string export_for_simulators(Pipeline& pipeline, const std::vector<std::string>& formats) {
   for (const std::string& name : formats) export_format(name);  // an unknown one: before hours of work
-  check_project(pipeline.project());
-  const IdentifiedModel model = pipeline.model();
-  const Robot bodies = possible_bodies(pipeline);
+  const auto whole = [](const std::string& name) { return export_format(name).whole_model; };
+  const bool bodies = !std::all_of(formats.begin(), formats.end(), whole);
+  check_project(pipeline.project(), bodies);
+  const bool tables = std::any_of(formats.begin(), formats.end(), whole);
+  const IdentifiedModel model = tables ? pipeline.exported() : pipeline.model();
+  const Robot links = bodies ? possible_bodies(pipeline) : model.robot;
   const std::vector<ProcessedLog> held_out = held_out_logs(pipeline), train = pipeline.logs(Role::train);
   std::string out;
   for (const std::string& name : formats) {
     const ExportFormat& format = export_format(name);
-    SimpleRobot simple = simple_robot(model, bodies, format.has_armature, train, {}, format.has_stribeck);
+    SimpleRobot simple = format.whole_model
+                             ? SimpleRobot{model.robot, std::vector<SimpleJoint>(model.robot.size()), {}}
+                             : simple_robot(model, links, format.has_armature, train, {}, format.has_stribeck);
     simple.urdf = pipeline.project().urdf;
     if (format.has_ranges) simple.ranges = joint_ranges(pipeline.project(), model, train);
     const fs::path file = pipeline.directory() / format.file;

@@ -24,6 +24,9 @@ std::span<const ExportFormat> export_formats() {
                    own_reader, true, write_bam, replay_bam, true},
       ExportFormat{"usd", "USD: a layer with PhysX joint friction and armature; bodies as URDF", "simulator_usd.usda",
                    own_reader, true, write_usd, replay_usd},
+      ExportFormat{"inverse_dynamics_solver",
+                   "ROS 2: a plug-in of inverse_dynamics_solver with the whole model, from the drive's tables",
+                   "inverse_dynamics_solver", own_reader, true, write_solver_package, replay_tables, true, false, true},
   };
   return all;
 }

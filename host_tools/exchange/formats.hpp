@@ -34,6 +34,9 @@ struct ExportFormat {
                            double step_s);
   bool has_stribeck = false;  ///< it knows more dry friction at low speed
   bool has_ranges = false;    ///< it says what the logs leave open: SimpleRobot::ranges are asked for
+  /// It holds the model as the drive's tables have it: SimpleRobot has names only, and replay() expects the model
+  /// itself.
+  bool whole_model = false;
 };
 
 std::span<const ExportFormat> export_formats();
@@ -68,5 +71,17 @@ ReplayedTorque replay_bam(const std::filesystem::path& file, const IdentifiedMod
 void write_usd(const SimpleRobot& robot, const std::filesystem::path& file);
 ReplayedTorque replay_usd(const std::filesystem::path& file, const IdentifiedModel& expected, const MotionRows& motion,
                           double step_s);
+
+// solver_package.cpp
+/// A package of ROS 2 in `folder`, with the tables.hpp that stands beside it.
+/// @throws InputError: a joint's name that C++ can't hold in quotes
+void write_solver_package(const SimpleRobot& robot, const std::filesystem::path& folder);
+/// Torques of the drive's tables of `expected`, each state held until what effects remember has settled.
+ReplayedTorque replay_tables(const std::filesystem::path& folder, const IdentifiedModel& expected,
+                             const MotionRows& motion, double step_s);
+/// The same in double precision: what replay_tables() is meant to give.
+Eigen::MatrixXd settled(const IdentifiedModel& model, const MotionRows& motion);
+/// Effects of a joint that remember, which the package takes as settled.
+std::vector<std::string> settled_effects(const IdentifiedModel& model, std::size_t joint);
 
 }  // namespace fxdyn

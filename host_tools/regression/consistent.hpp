@@ -32,8 +32,8 @@ struct ConsistentFit {
 /// Interior-point Newton whose barrier is the prior: the divergence between pseudo-inertias
 ///   D(P || P0) = tr(P0^-1 P) - log det(P0^-1 P) - 4
 /// (Lee, Wensing, Park, "Geometric robot dynamic identification", T-RO 2020), which no choice of units or frames
-/// changes, and r / r0 - log(r / r0) - 1 for a rotor. Its weight falls to a hundredth of the information of one
-/// independent row. Where some possible bodies make the least squares solution, that is the result and the prior only
+/// changes, and r / r0 - log(r / r0) - 1 for a rotor. Its weight falls to that of one
+/// row of the data. Where some possible bodies make the least squares solution, that is the result and the prior only
 /// chooses among those.
 ConsistentFit fit_consistent(const ConsistentProblem& problem);
 

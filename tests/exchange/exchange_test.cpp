@@ -201,8 +201,9 @@ TEST_P(Exchange, LossIsThatOfWhatIsLeftOut) {
   Eigen::VectorXd x = columns.colPivHouseholderQr().solve(right);
   if (x[1] < 0) x << columns.col(0).dot(right) / columns.col(0).squaredNorm(), 0;
   ASSERT_GE(x.minCoeff(), 0);
-  EXPECT_NEAR(joint.written.damping, x[0], 1e-6 * x[0]);
-  EXPECT_NEAR(joint.written.friction, x[1], 1e-6 * x[0]);
+  ASSERT_TRUE(joint.written.has_value());
+  EXPECT_NEAR(joint.written->damping, x[0], 1e-6 * x[0]);
+  EXPECT_NEAR(joint.written->friction, x[1], 1e-6 * x[0]);
   const Eigen::VectorXd fast = over.joint_velocity(changed);
   const Eigen::VectorXd lost = rest_of(over, viscous, rotor, spring) - x[0] * fast - x[1] * fast.cwiseSign();
   const double expected = test::rms(over.filter_columns(lost).middleRows(over.first, over.last - over.first));

@@ -81,18 +81,13 @@ enabled = false
 '''
 
 
-def rows(path):
-    with open(path) as file:
-        return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
-
-
 class Replay:
     """The held-out log through a file: RMS of true torque minus the file's, joint by joint [N m]."""
 
     def __init__(self, work):
         edge = json.loads((work / 'out/model.json').read_text())['filter']['edge_s']  # the certificate drops it, too
-        self.log = [row for row in rows(work / 'logs/a.csv') if HELD_OUT_S + edge <= row['t'] < END_S - edge][::2]
-        truth = {row['t']: row for row in rows(work / 'logs/a.truth.csv')}
+        self.log = [row for row in replay.rows(work / 'logs/a.csv') if HELD_OUT_S + edge <= row['t'] < END_S - edge][::2]
+        truth = {row['t']: row for row in replay.rows(work / 'logs/a.truth.csv')}
         self.tau = [[truth[row['t']][f'tau{j}'] for j in (1, 2)] for row in self.log]
 
     def bodies(self, urdf):
@@ -203,14 +198,14 @@ def read_trajectory(path):
 def check_trajectory(work):
     """The whole model's torque, so nothing is lost: what is there is the true torque, but for friction's turns, which
     the torque's cut-off rounds off."""
-    plan, log = work / 'plan.csv', rows(work / 'logs/a.csv')
+    plan, log = work / 'plan.csv', replay.rows(work / 'logs/a.csv')
     names = ['t', 'q1', 'q2', 'dq1', 'dq2', 'ddq1', 'ddq2']
     with open(plan, 'w') as file:
         csv.writer(file).writerows([names] + [[row[name] if name != 't' else row[name] + 5 for name in names] for row in log])
     run('predict', '--model', work / 'out/model.json', '--log', plan, '--out', work / 'plan', '--trajectory', '--raw')
     joints, points = read_trajectory(work / 'plan/plan.yaml')
     check(joints == list(JOINTS) and len(points) == len(log), f'{joints}, {len(points)} points')
-    truth = rows(work / 'logs/a.truth.csv')
+    truth = replay.rows(work / 'logs/a.truth.csv')
     middle = range(500, len(log) - 500)
     check(all(abs(points[k]['t'] - log[k]['t']) < 1e-9 for k in middle), 'time counts from the first point')
     for j in range(2):

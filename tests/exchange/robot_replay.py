@@ -2,6 +2,7 @@
 
 URDF: Newton and Euler's recursion in the links' frames. Files: read as their own documentation has it, in the documented
 units, by a reader that shares nothing with the writer."""
+import csv
 import json
 import math
 import re
@@ -10,6 +11,12 @@ import types
 import xml.etree.ElementTree as xml
 
 GRAVITY = 9.81
+
+
+def rows(path):
+    """A log, row by row."""
+    with open(path) as file:
+        return [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
 
 
 def add(a, b): return [x + y for x, y in zip(a, b)]

@@ -29,6 +29,8 @@ TEST(EffectDeclarations, ListsAreThoseOfTheTraits) {
   };
   using Names = std::vector<std::string_view>;
   EXPECT_EQ(named([](const EffectInfo& info) { return info.has_constant; }), (Names{"offset", "spring"}));
+  EXPECT_EQ(named([](const EffectInfo& info) { return info.remembers; }),
+            (Names{"presliding", "friction_drift", "delay", "elasticity", "lugre", "maxwell_slip"}));
   EXPECT_EQ(named([](const EffectInfo& info) { return info.bends(); }), (Names{"elasticity", "backlash"}));
   EXPECT_EQ(named([](const EffectInfo& info) { return info.of_spectrum(); }), (Names{"ripple"}));
   EXPECT_EQ(named([](const EffectInfo& info) { return info.drifts(); }), (Names{"friction_drift"}));
