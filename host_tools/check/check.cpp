@@ -34,6 +34,16 @@ bool is_in_each_log(const Robot& robot, const std::vector<ProcessedLog>& logs, d
   });
 }
 
+/// Whether a log, its columns changed, is explained together with the train logs.
+bool settles(const Robot& robot, const TorqueSamples& train, const TorqueSamples& log, const Arrangement& change,
+             const ArrangementOptions& options) {
+  const auto rise = [&](const TorqueSamples& samples) {
+    const double times = disagreement(robot, train, samples, options);
+    return times * times - 1;
+  };
+  return rise(arranged(log, change)) <= options.settled_rise * rise(log);
+}
+
 /// In the order of a project's columns.
 std::vector<std::string> signals_in(const std::vector<ProcessedLog>& logs) {
   const ProcessedLog& log = logs.front();
@@ -137,6 +147,7 @@ std::vector<CheckFinding> check_columns(const Project& project, const std::vecto
     before = finding.move.result;
     found.push_back(std::move(finding));
   }
+  if (others != nullptr && !settles(project.robot, *others, samples, before, options)) found.clear();
   const std::vector<std::string> signals = signals_in(logs);
   for (const ArrangementFinding& finding : found) out.push_back(in_words(finding, before, project, signals, options));
   return out;
@@ -156,7 +167,7 @@ std::vector<CheckFinding> what_makes_it_agree(const Project& project, const Torq
   std::vector<CheckFinding> out;
   if (found.empty()) return out;
   const Arrangement& after = found.back().move.result;
-  if (disagrees(project.robot, train, arranged(samples, after), options)) return out;
+  if (disagreement(project.robot, train, arranged(samples, after), options) > options.disagree) return out;
   for (const ArrangementFinding& finding : found) out.push_back(in_words(finding, after, project, signals, options));
   return out;
 }
@@ -179,7 +190,7 @@ std::vector<CheckFinding> check_one_log(const Project& project, const TorqueSamp
   const double lead_s = project.signals.torque_lead_s.value_or(0);
   const TorqueSamples samples = sample_torque(logs, options.samples, lead_s);
   std::vector<CheckFinding> out;
-  if (!disagrees(project.robot, train, samples, options)) return out;
+  if (disagreement(project.robot, train, samples, options) <= options.disagree) return out;
   std::vector<CheckFinding> found = check_columns(alone, logs, options, &train);
   std::erase_if(found, [](const CheckFinding& finding) { return !finding.error; });
   // What changed since the healthy session, such as a gain or a zero, is for the diagnosis to find.

@@ -67,6 +67,9 @@ struct ArrangementOptions {
   double unexplained = 0.5, explained = 0.3;
   /// -; a log whose samples raise a joint's residual by more is looked at alone; hand: another speed raises it by less
   double disagree = 1.3;
+  /// share of that rise, in squares; a change of one log's columns leaves no more of it; hand: another model of
+  /// friction explains a log of reversals by turned axes, and leaves all of it
+  double settled_rise = 0.2;
   /// findings in one set of logs, at most
   int most = 4;
 };

@@ -136,8 +136,8 @@ bool is_unexplained(const Project& project, const std::vector<ProcessedLog>& log
   return given.enough && given.most > options.unexplained;
 }
 
-bool disagrees(const Robot& robot, const TorqueSamples& train, const TorqueSamples& log,
-               const ArrangementOptions& options) {
+double disagreement(const Robot& robot, const TorqueSamples& train, const TorqueSamples& log,
+                    const ArrangementOptions& options) {
   TorqueSamples both = train;
   const auto append = [](const Eigen::MatrixXd& more, Eigen::MatrixXd& to) {
     to.conservativeResize(to.rows() + more.rows(), Eigen::NoChange);
@@ -150,13 +150,14 @@ bool disagrees(const Robot& robot, const TorqueSamples& train, const TorqueSampl
   both.independent += log.independent;
   const Arrangement given = as_given(robot);
   const ArrangementEvidence alone(robot, train, options), together(robot, both, options);
-  if (!alone.enough()) return false;
+  double out = 1;
+  if (!alone.enough()) return out;
   const Eigen::VectorXd before = alone(given).rms, after = together(given).rms;
   for (Eigen::Index j = 0; j < before.size(); ++j) {
     const double size = std::sqrt(train.tau.col(j).squaredNorm() / static_cast<double>(train.size()));
-    if (alone.moves(j) && after[j] > options.disagree * std::max(before[j], options.perfect * size)) return true;
+    if (alone.moves(j)) out = std::max(out, after[j] / std::max(before[j], options.perfect * size));
   }
-  return false;
+  return out;
 }
 
 bool are_exchanged(const Project& project, const std::vector<Log>& train, const ArrangementOptions& options) {

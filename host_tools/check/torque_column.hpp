@@ -39,10 +39,11 @@ std::optional<MeasuredLead> torque_lead(const Project& project, const std::vecto
 /// Whether the URDF leaves most of a joint's torque in the train logs unexplained.
 bool is_unexplained(const Project& project, const std::vector<ProcessedLog>& logs, const ArrangementOptions& options);
 
-/// Whether a log and the train logs can't be explained together: it needs other bodies, or has other columns. The train
-/// logs' residual grows where both are fitted as one, with as many samples of each.
-bool disagrees(const Robot& robot, const TorqueSamples& train, const TorqueSamples& log,
-               const ArrangementOptions& options);
+/// How badly a log and the train logs are explained together: it needs other bodies, or has other columns. The train
+/// logs' residual grows where both are fitted as one, with as many samples of each: by that factor, at the joint where
+/// it grows most; 1: not at all, or too few samples.
+double disagreement(const Robot& robot, const TorqueSamples& train, const TorqueSamples& log,
+                    const ArrangementOptions& options);
 
 /// Whether positions stand in the torque's columns and torques in the position's: the exchanged columns are explained
 /// by the URDF, the given ones are not.
