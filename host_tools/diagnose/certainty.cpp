@@ -35,6 +35,20 @@ std::vector<std::size_t> felt_at(const Gate& gate, std::size_t i, double least) 
 
 }  // namespace
 
+double new_since_baseline(Linearised& problem, const std::vector<std::size_t>& groups, std::size_t i) {
+  Group both = problem.groups()[groups[i]];
+  both.in_model = false;
+  std::vector<std::size_t> with = groups;
+  with[i] = problem.add(both, problem.make(both, true));
+  const LinearFit today = problem.solver().solve(problem.columns_of(groups)),
+                  always = problem.solver().solve(problem.columns_of(with));
+  double out = 0;
+  for (Index j = 0; j < today.square.size(); ++j) {
+    if (today.square[j] > 0) out += today.rows[j] * (always.square[j] / today.square[j] - 1);
+  }
+  return out;
+}
+
 void judge(Evidence& evidence, bool holds, double form, const GateOptions& options) {
   const double rival = evidence.against_rival.value_or(options.established);
   evidence.there = evidence.against_nothing >= options.established;
@@ -53,9 +67,14 @@ void weigh_evidence(Outcome& outcome, const Gate& gate) {
   for (Finding& finding : outcome.found) {
     const std::size_t i = gate.place(*outcome.problem, finding.id);
     if (i == gate.groups.size()) continue;
-    const Group& group = outcome.problem->groups()[gate.groups[i]];
+    const Group group = outcome.problem->groups()[gate.groups[i]];  // a copy: groups are added
     Evidence& evidence = finding.evidence;
     evidence.against_nothing = gain_of(gate, group, i) / variances_per_decade;
+    if (outcome.models.has_baseline && !group.on_body) {
+      // Data that can't say whether it is new are no reason to leave out what is there.
+      const double changed = new_since_baseline(*outcome.problem, gate.groups, i) / variances_per_decade;
+      if (changed < 0) evidence.against_nothing = std::min(evidence.against_nothing, changed);
+    }
     if (finding.rival) evidence.against_rival = finding.rival->gain / variances_per_decade;
     evidence.deviations = off_nothing[i];
     const auto j = static_cast<Index>(group.candidate.joint);

@@ -14,6 +14,13 @@ namespace fxdyn::diagnosis {
 /// @param form share of such a curve's closure that it has
 void judge(Evidence& evidence, bool holds, double form, const GateOptions& options);
 
+/// What the data say against the same effect in both sessions instead of in today's alone [noise variances]: what the
+/// healthy robot has too, too little of it for the healthy session alone to show, is no change. Linear, with shapes as
+/// they are.
+/// @param problem with a baseline; gets columns, which are in no model
+/// @param groups of its model; @param i place there of the effect, which is not on the body
+double new_since_baseline(Linearised& problem, const std::vector<std::size_t>& groups, std::size_t i);
+
 /// What speaks for each finding, with all of them in the model.
 void weigh_evidence(Outcome& outcome, const Gate& gate);
 

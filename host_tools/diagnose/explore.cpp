@@ -52,12 +52,17 @@ std::vector<VectorXd> colours(const Models& models, const std::vector<SessionLog
 }
 
 /// Friction that the healthy session has beside the nominal one: it may have changed, which is no second one of it.
+/// What is held (Models::held) has changed by more than sessions differ: there the second one is the change.
 std::vector<EffectCandidate> friction_of_background(const Models& models) {
   std::vector<EffectCandidate> out;
   for (std::size_t j = 0; j < models.current.joints.size(); ++j) {
     for (const EffectFit& fit : models.current.joints[j].effects) {
       const EffectInfo& info = *find_effect(fit.effect);
-      if (!fit.named && info.friction && !info.nominal && !info.several) out.push_back({fit.effect, j, fit.shape});
+      const bool held = std::any_of(models.held.begin(), models.held.end(), [&](const EffectCandidate& one) {
+        return one.effect == fit.effect && one.joint == j;
+      });
+      if (!fit.named && !held && info.friction && !info.nominal && !info.several)
+        out.push_back({fit.effect, j, fit.shape});
     }
   }
   return out;

@@ -22,6 +22,7 @@ inline constexpr double variances_per_decade = 2 * std::numbers::ln10;
 
 /// What speaks for an effect. Odds are log10 of likelihood ratios on the logs that judge.
 struct Evidence {
+  /// Where the data rather have the same effect in the healthy session too, which is no change: against that, below 0.
   double against_nothing = 0;
   std::optional<double> against_rival{};  ///< none: nothing else comes near
   double deviations = 0;                  ///< standard deviations by which its coefficients are off nothing

@@ -134,9 +134,10 @@ struct Products {
 Products products(const Linearised& problem, std::size_t joint, const LinearFit& fit, double w,
                   const VectorXd& residual, const MatrixXd& all_features, bool healthy) {
   Products out;
-  out.functions = only(problem, joint, all_features, problem.blocks().fit, healthy);
+  const std::vector<std::size_t>& blocks = problem.blocks().fit;
+  out.functions = only(problem, joint, all_features, blocks, healthy);
   const MatrixXd& f = out.functions;
-  const VectorXd e = only(problem, residual, problem.blocks().fit, healthy);
+  const VectorXd e = only(problem, residual, blocks, healthy);
   const MatrixXd cross = times_columns(problem, joint, fit, w, f);
   out.fitted = SymmetricSolver(fit.information).inverse() * cross;
   out.gram = w * (f.transpose() * f) - cross.transpose() * out.fitted;
@@ -148,7 +149,7 @@ Products products(const Linearised& problem, std::size_t joint, const LinearFit&
   out.size = (w * f.colwise().squaredNorm().transpose().array()).max(1e-300).sqrt().inverse();
   out.residual = w * f.transpose() * e;
   out.whole = w * e.squaredNorm();
-  for (const std::size_t i : problem.blocks().fit) {
+  for (const std::size_t i : blocks) {
     if (problem.blocks().all[i].healthy == healthy) out.rows += static_cast<double>(problem.blocks().all[i].count);
   }
   return out;
@@ -173,71 +174,153 @@ TimeStructure in_time(const Linearised& problem, const VectorXd& residual, const
   return {std::min(out.p, slow.p), std::max(out.share, slow.share)};
 }
 
+/// One over the variance of what a fit leaves of a joint.
+double weight(const Linearised& problem, std::size_t joint, const LinearFit& fit) {
+  const auto k = static_cast<Index>(joint);
+  return fit.rows[k] / std::max(fit.square[k], noise_free * fit.rows[k] / problem.solver().weights()[k]);
+}
+
+/// Shares of the residual: with few rows noise alone fills many of its directions.
+double odds(double part, double of) { return part / std::max(of - part, 1e-9 * of); }
+
+/// How much of today's residual of a joint is a function of its state, against what noise, the healthy
+/// session and the encoder's steps make of that.
+class StateTest {
+ public:
+  StateTest(const Linearised& problem, std::size_t joint, const LinearFit& fit, const LinearFit* alone,
+            const MatrixXd& features, const VectorXd& residual)
+      : problem_(problem),
+        joint_(joint),
+        fit_(fit),
+        w_(weight(problem, joint, fit)),
+        rows_of_fit_(fit.rows[static_cast<Index>(joint)]),
+        today_(products(problem, joint, fit, w_, residual, features, false)) {
+    // Fitted on its own: what today's structure does to common parameters is not the healthy session's.
+    VectorXd healthy = residual;
+    if (alone != nullptr) {
+      healthy = residual_with_background(problem, joint, *alone);
+      before_ = products(problem, joint, *alone, problem.solver().weights()[static_cast<Index>(joint)], healthy,
+                         features, true);
+    }
+    // Stand-ins, in both sessions, have been fitted by nothing yet.
+    const MatrixXd noise = stand_ins(problem, joint, residual, healthy, problem.blocks().fit);
+    of_noise_ = unfitted(noise);
+    for_each_of_today(
+        [&](const Block& b) { mean_noise_ += w_ * noise.middleRows(b.first, b.count).squaredNorm() / draws; });
+    const Background* background = problem.background(joint);
+    fitted_ = static_cast<double>(background != nullptr ? background->functions().cols() : 0);
+    for (const Index c : fit.columns) fitted_ += problem.solver().rows(joint).place(c) >= 0 ? 1 : 0;
+  }
+
+  /// What the encoder's steps make counts as expected from now on. @returns whether they make anything
+  bool expect_encoder_errors() {
+    const Linearised* seen = problem_.through_encoders();
+    if (seen == nullptr) return false;
+    const LinearFit fit = seen->solver().solve(seen->columns_of(in_model(*seen)));
+    w_seen_ = weight(*seen, joint_, fit);
+    seen_ = products(*seen, joint_, fit, w_seen_, seen->solver().residual(joint_, fit),
+                     features(*seen, joint_, seen->has_baseline()), false);
+    return true;
+  }
+
+  /// All functions together see anything; a family sees its own kind where it is small (Bonferroni).
+  double smallest_chance() const {
+    const std::vector<Family> all = families(problem_.joints());
+    double smallest = chance_of({0, of_noise_.rows()});
+    for (const Family& family : all) smallest = std::min(smallest, static_cast<double>(all.size()) * chance_of(family));
+    return smallest;
+  }
+
+ private:
+  /// What is expected of a statistic, as a share; how many free numbers one of it has, and it is known by.
+  struct Expected {
+    double share = 0, freedom = 0, known_by = 0;
+  };
+
+  template <class Do>
+  void for_each_of_today(Do&& each) const {
+    for (const std::size_t i : problem_.blocks().fit) {
+      const Block& b = problem_.blocks().all[i];
+      if (!b.healthy) each(b);
+    }
+  }
+  /// Products of the functions with rows that nothing was fitted to yet, as the fit would leave them.
+  MatrixXd unfitted(const MatrixXd& rows) const {
+    MatrixXd out = w_ * (today_.functions.transpose() * rows) -
+                   today_.fitted.transpose() * times_columns(problem_, joint_, fit_, w_, rows);
+    if (const Background* background = problem_.background(joint_); background != nullptr)
+      out -= today_.taken.transpose() * (background->functions().transpose() * rows);
+    return out;
+  }
+
+  double chance_of(const Family& family) const {
+    const Projection statistic(today_.gram, today_.size, family);
+    const auto rank = static_cast<double>(statistic.rank());
+    // The columns are fitted to both sessions; today's rows bear their share of them.
+    const double rest = today_.rows - fitted_ * today_.rows / rows_of_fit_ - rank;
+    // With hardly more rows than functions no statement is possible.
+    if (rank == 0 || rest <= problem_.options().lack_of_fit.free_rows * rank) return 1.0;
+    VectorXd null(draws);
+    for (Index s = 0; s < null.size(); ++s) null[s] = statistic(of_noise_.col(s));
+    const double mean = null.mean(),
+                 variance = (null.array() - mean).square().sum() / static_cast<double>(null.size() - 1);
+    const double freedom = std::clamp(2 * mean * mean / std::max(variance, 1e-300), 1.0, rank);
+    Expected expected{odds(mean, mean_noise_), freedom, rest};
+    if (before_.rows > 0) expect_healthy(family, rank, rest, expected);
+    if (seen_.rows > 0) expect_encoder(family, odds(mean, mean_noise_), rest, expected);
+    return chance(odds(statistic(today_.residual), today_.whole) / std::max(expected.share, 1e-300), expected.freedom,
+                  expected.known_by);
+  }
+  /// What the healthy session has of it beyond noise (friction near standstill, where the velocity is uncertain, or a
+  /// background that another motion shows otherwise) is no change: the same share, however many rows there are.
+  void expect_healthy(const Family& family, double rank, double rest, Expected& expected) const {
+    const Projection then(before_.gram, before_.size, family);
+    const auto also = static_cast<double>(then.rank());
+    const double beyond =
+        std::max(0.0, odds(then(before_.residual), before_.whole) - also / std::max(before_.rows - also, 1.0));
+    expected.share = std::max(expected.share, rank / rest + beyond);
+    // A background is known as well as so many of its functions determine it, not rows.
+    if (problem_.background(joint_) != nullptr)
+      expected.known_by = expected.share * expected.share /
+                          (expected.share * expected.share / rest + beyond * beyond / expected.freedom);
+  }
+  /// What a robot without anything missing has of it, seen through the same encoders: one draw, and known by one, of as
+  /// many free numbers as its directions count, (sum c^2)^2 / sum c^4.
+  void expect_encoder(const Family& family, double of_noise, double rest, Expected& expected) const {
+    const Projection seen(seen_.gram, seen_.size, family);
+    const auto rank = static_cast<double>(seen.rank());
+    const Eigen::ArrayXd square = seen.coordinates(seen_.residual).array().square();
+    // Its noise is not today's.
+    const double made = (square.sum() - rank) * w_ / w_seen_ / today_.whole;
+    if (!(of_noise + made > expected.share)) return;
+    const double directions = std::max(square.sum() * square.sum() / std::max(square.square().sum(), 1e-300), 1.0);
+    const double share = of_noise + made;
+    const auto free = [&](double noise) {
+      return share * share / (of_noise * of_noise / noise + made * made / directions);
+    };
+    expected = {share, free(expected.freedom), free(rest)};
+  }
+
+  const Linearised& problem_;
+  std::size_t joint_;
+  const LinearFit& fit_;
+  double w_, w_seen_ = 1, rows_of_fit_, mean_noise_ = 0, fitted_ = 0;
+  Products today_, before_{}, seen_{};
+  MatrixXd of_noise_;
+};
+
 }  // namespace
 
 LackOfFit lack_of_fit(const Linearised& problem, std::size_t joint, const LinearFit& fit, const LinearFit* alone,
                       const MatrixXd& all_features) {
   LackOfFit out;
   const auto k = static_cast<Index>(joint);
-  const double w = fit.rows[k] / std::max(fit.square[k], noise_free * fit.rows[k] / problem.solver().weights()[k]);
   const VectorXd residual = problem.solver().residual(joint, fit);
   if (fit.square[k] * problem.solver().weights()[k] < no_variance_left * fit.rows[k]) return out;
-  const Background* background = problem.background(joint);
-  const Products today = products(problem, joint, fit, w, residual, all_features, false);
-  // Fitted on its own: what today's structure does to common parameters is not the healthy session's.
-  Products before;
-  VectorXd healthy = residual;
-  if (alone != nullptr) {
-    healthy = residual_with_background(problem, joint, *alone);
-    before = products(problem, joint, *alone, problem.solver().weights()[k], healthy, all_features, true);
-  }
-  // Stand-ins, in both sessions, have been fitted by nothing yet.
-  const MatrixXd noise = stand_ins(problem, joint, residual, healthy, problem.blocks().fit);
-  MatrixXd theirs = w * (today.functions.transpose() * noise) -
-                    today.fitted.transpose() * times_columns(problem, joint, fit, w, noise);
-  if (background != nullptr) theirs -= today.taken.transpose() * (background->functions().transpose() * noise);
-  double mean_noise = 0;
-  for (const std::size_t i : problem.blocks().fit) {
-    const Block& b = problem.blocks().all[i];
-    if (!b.healthy) mean_noise += w * noise.middleRows(b.first, b.count).squaredNorm() / draws;
-  }
-  auto fitted = static_cast<double>(background != nullptr ? background->functions().cols() : 0);
-  for (const Index c : fit.columns) fitted += problem.solver().rows(joint).place(c) >= 0 ? 1 : 0;
-  // Shares of the residual: with few rows noise alone fills many of its directions.
-  const auto odds = [](double part, double of) { return part / std::max(of - part, 1e-9 * of); };
-  const auto chance_of = [&](const Family& family) {
-    const Projection statistic(today.gram, today.size, family);
-    const auto rank = static_cast<double>(statistic.rank());
-    // The columns are fitted to both sessions; today's rows bear their share of them.
-    const double rest = today.rows - fitted * today.rows / fit.rows[k] - rank;
-    // With hardly more rows than functions no statement is possible.
-    if (rank == 0 || rest <= problem.options().lack_of_fit.free_rows * rank) return 1.0;
-    VectorXd null(draws);
-    for (Index s = 0; s < null.size(); ++s) null[s] = statistic(theirs.col(s));
-    const double mean = null.mean(),
-                 variance = (null.array() - mean).square().sum() / static_cast<double>(null.size() - 1);
-    const double freedom = std::clamp(2 * mean * mean / std::max(variance, 1e-300), 1.0, rank);
-    double expected = odds(mean, mean_noise), known_by = rest;
-    // What the healthy session has of it beyond noise (friction near standstill, where the velocity is uncertain, or a
-    // background that another motion shows otherwise) is no change: the same share, however many rows there are.
-    if (before.rows > 0) {
-      const Projection then(before.gram, before.size, family);
-      const auto also = static_cast<double>(then.rank());
-      const double beyond =
-          std::max(0.0, odds(then(before.residual), before.whole) - also / std::max(before.rows - also, 1.0));
-      expected = std::max(expected, rank / rest + beyond);
-      // A background is known as well as so many of its functions determine it, not rows.
-      if (background != nullptr)
-        known_by = expected * expected / (expected * expected / rest + beyond * beyond / freedom);
-    }
-    return chance(odds(statistic(today.residual), today.whole) / std::max(expected, 1e-300), freedom, known_by);
-  };
-  // All functions together see anything; a family sees its own kind where it is small.
-  const std::vector<Family> all = families(problem.joints());
-  out.state_p = chance_of({0, all_features.cols()});
-  for (const Family& family : all) {
-    out.state_p = std::min(out.state_p, static_cast<double>(all.size()) * chance_of(family));
-  }
+  StateTest test(problem, joint, fit, alone, all_features, residual);
+  out.state_p = test.smallest_chance();
+  if (out.state_p < problem.options().lack_of_fit.state && test.expect_encoder_errors())
+    out.state_p = test.smallest_chance();
   out.time_p = in_time(problem, residual, problem.blocks().fit, residual).p;
   return out;
 }

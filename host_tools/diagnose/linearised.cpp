@@ -1,21 +1,41 @@
 #include "host_tools/diagnose/linearised.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "host_tools/diagnose/base_parameters.hpp"
 #include "host_tools/diagnose/design_matrix.hpp"
+#include "host_tools/diagnose/encoder_error.hpp"
 #include "host_tools/diagnose/features.hpp"
 #include "host_tools/diagnose/load_places.hpp"
 #include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/parallel.hpp"
+#include "host_tools/support/random.hpp"
 
 namespace fxdyn::diagnosis {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+namespace {
+
+/// White noise of which as much stays below a log's torque cut-off as a model leaves of its torques [N*m | N].
+/// @param error of the model, at full rate
+MatrixXd as_much_noise(const ProcessedLog& log, const MatrixXd& error, std::uint64_t seed) {
+  const MatrixXd left = log.decimate(log.filter_columns(error));
+  Eigen::RowVectorXd size(left.cols());
+  for (Index j = 0; j < left.cols(); ++j) size[j] = robust_sigma(left.col(j));
+  const double band = std::min(1.0, 2 * log.filter.torque_cutoff_hz * log.step_s);
+  Random random(seed);
+  MatrixXd out(error.rows(), error.cols());
+  for (double& one : out.reshaped()) one = random.normal();
+  return out * (size / std::sqrt(band)).asDiagonal();
+}
+
+}  // namespace
 
 Linearised::Linearised(const Models& models, const std::vector<SessionLog>& logs, std::vector<VectorXd> whitening)
     : log_columns_(models, logs),
@@ -104,10 +124,10 @@ std::vector<Index> Linearised::columns_of(const std::vector<std::size_t>& groups
   return out;
 }
 
-std::vector<MatrixXd> Linearised::make(const Group& group) const {
+std::vector<MatrixXd> Linearised::make(const Group& group, bool in_both) const {
   std::vector<std::vector<MatrixXd>> of_log(logs().size(), std::vector<MatrixXd>(joints()));
   parallel_for(logs().size(), [&](std::size_t l) {
-    if (logs()[l].healthy) return;
+    if (logs()[l].healthy && !in_both) return;
     const ProcessedLog& log = logs()[l].log;
     const EffectColumns full = log_columns_.of(l, group);
     for (std::size_t j = 0; j < joints(); ++j) {
@@ -154,6 +174,25 @@ const std::vector<MatrixXd>& Linearised::load_columns() const {
     }
   });
   return load_;
+}
+
+const Linearised* Linearised::through_encoders() const {
+  std::call_once(seen_made_, [&] {
+    seen_logs_ = logs();
+    bool any = false;
+    for (std::size_t l = 0; l < seen_logs_.size(); ++l) {
+      SessionLog& entry = seen_logs_[l];
+      if (entry.healthy) continue;
+      const std::optional<MotionRows> moved = see_again(entry.log);
+      if (!moved) continue;
+      any = true;
+      entry.cache = std::make_shared<RowCache>();
+      const MatrixXd error = entry.log.tau - log_columns_.torque_of(l, log_columns_.model(l));
+      entry.log.tau = log_columns_.torque_along(l, *moved) + as_much_noise(entry.log, error, l + 1);
+    }
+    if (any) seen_ = std::make_unique<Linearised>(models(), seen_logs_, noise_.whitening());
+  });
+  return seen_.get();
 }
 
 namespace {

@@ -52,12 +52,16 @@ class Linearised {
   /// torque separates it from the base parameters: around an effect that is not among the groups it would do its work.
   std::vector<Eigen::Index> columns_of(const std::vector<std::size_t>& groups) const;
 
-  /// Columns of candidates (current session), whitened: per joint rows x columns, below them those that the joint's
-  /// background adds; 0 x 0 where nothing is felt. Safe from several threads.
-  std::vector<Eigen::MatrixXd> make(const Group& group) const;
+  /// Columns of candidates (current session; `in_both`: of the healthy one as well), whitened: per joint rows x
+  /// columns, below them those that the joint's background adds; 0 x 0 where nothing is felt. Safe from several
+  /// threads.
+  std::vector<Eigen::MatrixXd> make(const Group& group, bool in_both = false) const;
   /// Columns of a load that is any body: d torque / d (mass, first moment, second moment: xx, yy, zz, and twice xy, xz,
   /// yz), as make() has them; made once. Safe from several threads.
   const std::vector<Eigen::MatrixXd>& load_columns() const;
+  /// The same of a robot that is this model and nothing else, seen through the same encoders (seen_again()); null where
+  /// they make no error. Made once. Safe from several threads.
+  const Linearised* through_encoders() const;
   /// Appends them as a group; returns its index.
   std::size_t add(Group group, const std::vector<Eigen::MatrixXd>& columns);
   void add_all(std::vector<Group> groups);
@@ -77,6 +81,9 @@ class Linearised {
   std::vector<std::unique_ptr<Background>> background_;  ///< per joint
   mutable std::once_flag load_made_;
   mutable std::vector<Eigen::MatrixXd> load_;
+  mutable std::once_flag seen_made_;
+  mutable std::vector<SessionLog> seen_logs_;
+  mutable std::unique_ptr<Linearised> seen_;
 };
 
 /// Covariance of the base parameters, whatever else is fitted.

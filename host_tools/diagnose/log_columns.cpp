@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/effect_roles.hpp"
@@ -18,6 +19,26 @@ using Eigen::VectorXd;
 /// All that robot_with() keeps [bytes]: enough for every rotor of a session of usual length.
 constexpr double most_kept = 64e6;
 
+namespace {
+
+/// Of a motion below a cut-off [Hz].
+Motion slow_part(const Motion& all, double cutoff) {
+  const ZeroPhaseFilter filter(cutoff, all.step_s);
+  return {all.name, all.step_s, all.t, filter.apply(all.q), filter.apply(all.dq), filter.apply(all.ddq)};
+}
+
+/// @param slow null: gears bend by all of the motion
+MatrixXd torque_of_both(const IdentifiedModel& model, const Motion& all, const Motion* slow) {
+  const auto torque = [](const IdentifiedModel& m, const Motion& motion) {
+    return fxdyn::predict(m, motion.q, motion.dq, motion.ddq, motion.step_s);
+  };
+  const auto stiff = slow != nullptr ? stiffened(model) : std::nullopt;
+  if (!stiff) return torque(model, all);
+  return torque(*stiff, all) + torque(model, *slow) - torque(*stiff, *slow);
+}
+
+}  // namespace
+
 LogColumns::LogColumns(const Models& models, const std::vector<SessionLog>& logs)
     : models_(std::make_shared<const Models>(models)),
       logs_(&logs),
@@ -31,12 +52,8 @@ LogColumns::LogColumns(const Models& models, const std::vector<SessionLog>& logs
     MotionRows m = log.motion();
     motions_[l] = std::make_unique<Motion>(
         Motion{log.name, log.step_s, log.t, std::move(m.q), std::move(m.dq), std::move(m.ddq)});
-    if (const double cutoff = logs[l].bending_hz; cutoff > 0) {
-      const Motion& all = *motions_[l];
-      const ZeroPhaseFilter filter(cutoff, log.step_s);
-      slow_[l] = std::make_unique<Motion>(
-          Motion{all.name, all.step_s, all.t, filter.apply(all.q), filter.apply(all.dq), filter.apply(all.ddq)});
-    }
+    if (const double cutoff = logs[l].bending_hz; cutoff > 0)
+      slow_[l] = std::make_unique<Motion>(slow_part(*motions_[l], cutoff));
     robot_[l] = std::make_shared<RobotColumns>(with_load_of(log, model(l)), *motions_[l]);
   });
 }
@@ -172,13 +189,15 @@ std::shared_ptr<const RobotColumns> LogColumns::robot_with(std::size_t log, cons
 }
 
 MatrixXd LogColumns::torque_of(std::size_t log, IdentifiedModel model) const {
-  const auto torque = [&](const IdentifiedModel& m, const Motion& motion) {
-    return fxdyn::predict(m, motion.q, motion.dq, motion.ddq, motion.step_s);
-  };
-  model = with_load_of((*logs_)[log].log, std::move(model));
-  const auto stiff = slow_[log] ? stiffened(model) : std::nullopt;
-  if (!stiff) return torque(model, *motions_[log]);
-  return torque(*stiff, *motions_[log]) + torque(model, *slow_[log]) - torque(*stiff, *slow_[log]);
+  return torque_of_both(with_load_of((*logs_)[log].log, std::move(model)), *motions_[log], slow_[log].get());
+}
+
+MatrixXd LogColumns::torque_along(std::size_t log, const MotionRows& motion) const {
+  const SessionLog& entry = (*logs_)[log];
+  const Motion all{entry.log.name, entry.log.step_s, entry.log.t, motion.q, motion.dq, motion.ddq};
+  std::optional<Motion> slow;
+  if (slow_[log]) slow = slow_part(all, entry.bending_hz);
+  return torque_of_both(with_load_of(entry.log, model(log)), all, slow ? &*slow : nullptr);
 }
 
 }  // namespace fxdyn::diagnosis

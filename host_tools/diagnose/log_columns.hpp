@@ -55,6 +55,8 @@ class LogColumns {
   Eigen::MatrixXd follow(std::size_t log, std::size_t joint, Eigen::MatrixXd columns) const;
   /// What a model says of a log's motion [N*m | N]; its gears bend by what is not noise.
   Eigen::MatrixXd torque_of(std::size_t log, IdentifiedModel model) const;
+  /// .. of another motion that is sampled like the log's, for the model of the log's session.
+  Eigen::MatrixXd torque_along(std::size_t log, const MotionRows& motion) const;
   /// Whether torque_of() differs from RobotColumns::torque() for that.
   bool bends_slowly(std::size_t log) const;
 

@@ -23,16 +23,13 @@ constexpr double sigma_of_median = 1.4826;
 /// Of a function's own square: what it may be of the others and still counts. A numeric choice.
 constexpr double dependent = 1e-4;
 
-/// Standard deviation of normal noise from its median: what sticks may be far off without being noise.
-double robust_sigma(const Blocks& blocks, const VectorXd& residual) {
-  std::vector<double> magnitude;
+VectorXd of_fit(const Blocks& blocks, const VectorXd& residual) {
+  std::vector<double> out;
   for (const std::size_t b : blocks.fit) {
     const Block& block = blocks.all[b];
-    for (Index i = 0; i < block.count; ++i) magnitude.push_back(std::fabs(residual[block.first + i]));
+    out.insert(out.end(), residual.data() + block.first, residual.data() + block.first + block.count);
   }
-  const auto middle = magnitude.begin() + static_cast<std::ptrdiff_t>(magnitude.size() / 2);
-  std::nth_element(magnitude.begin(), middle, magnitude.end());
-  return sigma_of_median * *middle;
+  return Eigen::Map<VectorXd>(out.data(), static_cast<Index>(out.size()));
 }
 
 /// A whitened row is as doubtful as those that it is made of.
@@ -47,6 +44,13 @@ VectorXd whitened_doubt(const Blocks& blocks, const VectorXd& doubt, const Vecto
 }
 
 }  // namespace
+
+double robust_sigma(VectorXd values) {
+  values = values.cwiseAbs();
+  double* middle = values.data() + values.size() / 2;
+  std::nth_element(values.data(), middle, values.data() + values.size());
+  return sigma_of_median * *middle;
+}
 
 NoiseModel::NoiseModel(const Blocks& blocks, std::vector<VectorXd> whitening, const std::vector<VectorXd>& doubt,
                        double doubtful)
@@ -111,7 +115,7 @@ NoiseModel estimate_noise(const LogColumns& columns, const BlockSolver& solver, 
   parallel_for(n, [&](std::size_t j) {
     const auto k = static_cast<Index>(j);
     const VectorXd e = solver.residual(j, fit);
-    const double sigma = std::max(robust_sigma(blocks, e), 1e-12 / std::sqrt(solver.weights()[k]));
+    const double sigma = std::max(robust_sigma(of_fit(blocks, e)), 1e-12 / std::sqrt(solver.weights()[k]));
     doubts[j].resize(blocks.rows());
     const VectorXd of_noise = without_background(columns, blocks, j, e);
     std::vector<VectorXd> parts;

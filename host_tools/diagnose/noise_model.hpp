@@ -8,6 +8,10 @@
 
 namespace fxdyn::diagnosis {
 
+/// Standard deviation of normal noise from its median: what sticks may be far off without being noise. values: not
+/// empty
+double robust_sigma(Eigen::VectorXd values);
+
 /// The noise of each joint's rows: an autoregression, and rows that count less as their friction is in doubt.
 class NoiseModel {
  public:

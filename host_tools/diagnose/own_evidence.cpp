@@ -172,15 +172,15 @@ class AtJoint {
   std::vector<OwnEvidence> evidence_;
 };
 
-/// -2 ln likelihood of what judges, but for a constant: sum over the joints of rows times ln of the squares.
-double judged_robot(const Linearised& problem, const std::vector<std::size_t>& groups) {
+/// -2 ln likelihood of what judges, but for a constant: of each joint rows times ln of the squares.
+VectorXd judged_robot(const Linearised& problem, const std::vector<std::size_t>& groups) {
   const BlockSolver& solver = problem.solver();
   VectorXd squares = VectorXd::Zero(static_cast<Index>(problem.joints())), rows = squares;
   for (const Fold& fold : problem.blocks().folds) {
     squares += solver.square(solver.solve(problem.columns_of(groups), fold.fit), fold.judge);
     rows += solver.row_count(fold.judge);
   }
-  return rows.dot(squares.array().max(1e-300).log().matrix());
+  return rows.array() * squares.array().max(1e-300).log();
 }
 
 }  // namespace
@@ -203,10 +203,14 @@ double form_on_robot(Linearised& problem, const std::vector<std::size_t>& groups
     one.in_model = false;
     freed.push_back(problem.add(one, of_joint));
   }
-  const double nothing = judged_robot(problem, others), common = judged_robot(problem, groups),
-               own = judged_robot(problem, freed);
-  if (common >= nothing) return 0;
-  return nothing > own ? (nothing - common) / (nothing - own) : 1.0;
+  const VectorXd nothing = judged_robot(problem, others), common = judged_robot(problem, groups),
+                 own = judged_robot(problem, freed);
+  Index most = 0;
+  const double strongest = (nothing - common).maxCoeff(&most);
+  const double elsewhere = (nothing - common).sum() - strongest,
+               own_elsewhere = (nothing - own).sum() - (nothing - own)[most];
+  if (elsewhere < problem.options().gate.sure_gain) return 0;
+  return own_elsewhere > 0 ? elsewhere / own_elsewhere : 1.0;
 }
 
 std::vector<OwnEvidence> own_evidence(const Linearised& problem, const std::vector<std::size_t>& groups,

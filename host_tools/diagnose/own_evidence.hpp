@@ -34,7 +34,8 @@ std::vector<OwnEvidence> own_evidence(const Linearised& problem, const std::vect
 /// Of what an effect on the robot would close on data that did not fit it if each joint had coefficients of its own for
 /// it, the share that it closes with those that all joints have in common: its form holds. What is missing at one
 /// joint, and is not the effect, such coefficients take and the common ones don't. Whatever else is missing does not
-/// count.
+/// count. The joint that gains most has chosen the common coefficients, so it is left out: the others judge them. 0
+/// where they gain less than `GateOptions::sure_gain`.
 /// @param problem gets columns, which are in no model
 /// @param groups of the problem, named in its model; @param effect one of them, on the body
 double form_on_robot(Linearised& problem, const std::vector<std::size_t>& groups, std::size_t effect);

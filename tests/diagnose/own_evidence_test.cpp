@@ -131,12 +131,13 @@ TEST(EvidenceOfItsOwn, TwoNamesForWhatTheyAreHoldBesideASmallBump) {
 
 /// How well the form of a tilt holds on a PUMA 560 that has one, and an effect at joint 2 beside it.
 /// @param share of the tilt's torque that joint 3 has
-double form_of_tilt(double share, const std::vector<EffectFit>& at_joint) {
+/// @param tilt about x and y [rad]
+double form_of_tilt(double share, const std::vector<EffectFit>& at_joint, std::vector<double> tilt = {0.02, 0.03}) {
   const IdentifiedModel nominal = test::fitted_puma();
   IdentifiedModel upright = nominal;
   for (const EffectFit& fit : at_joint) upright.joints[1].effects.push_back(fit);
   IdentifiedModel tilted = upright;
-  tilted.body.push_back(test::named_effect("gravity_tilt", {}, {0.02, 0.03}));
+  tilted.body.push_back(test::named_effect("gravity_tilt", {}, std::move(tilt)));
   std::vector<SessionLog> logs;
   for (const auto& [role, seed] : {std::pair{Role::train, 1}, std::pair{Role::validate, 2}}) {
     const SessionLog without = test::small_session_log(upright, role, static_cast<std::uint64_t>(seed));
@@ -154,6 +155,11 @@ double form_of_tilt(double share, const std::vector<EffectFit>& at_joint) {
 TEST(FormOnTheRobot, HoldsForWhatAllJointsHaveInCommonWhateverElseOneLacks) {
   EXPECT_GT(form_of_tilt(1, {}), 0.95);
   EXPECT_GT(form_of_tilt(1, {test::named_effect("ripple", {14}, {3, 0})}), 0.8);
+}
+
+// One joint's coefficients are as good as common ones where no other joint judges them.
+TEST(FormOnTheRobot, DoesNotHoldForWhatOneJointAloneLacks) {
+  EXPECT_LT(form_of_tilt(1, {test::named_effect("ripple", {1}, {3, 0})}, {0, 0}), 0.8);
 }
 
 TEST(FormOnTheRobot, DoesNotHoldWhereAJointFeelsItOtherwise) { EXPECT_LT(form_of_tilt(-1, {}), 0.8); }
