@@ -9,6 +9,7 @@
 #include "host_tools/diagnose/encoder_error.hpp"
 #include "host_tools/diagnose/features.hpp"
 #include "host_tools/diagnose/load_places.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/parallel.hpp"

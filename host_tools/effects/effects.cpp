@@ -193,6 +193,7 @@ std::vector<std::string_view> identified_effects() {
   std::stable_sort(found.begin(), found.end(),
                    [](const EffectInfo* a, const EffectInfo* b) { return a->identified < b->identified; });
   std::vector<std::string_view> names;
+  names.reserve(found.size());
   for (const EffectInfo* info : found) names.push_back(info->name);
   return names;
 }
