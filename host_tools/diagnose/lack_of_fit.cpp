@@ -157,7 +157,7 @@ Products products(const Linearised& problem, std::size_t joint, const LinearFit&
 
 /// Whitened residual of a joint with what its background explains still in it.
 VectorXd residual_with_background(const Linearised& problem, std::size_t joint, const LinearFit& fit) {
-  const VectorXd e = problem.solver().residual(joint, fit);
+  VectorXd e = problem.solver().residual(joint, fit);
   const Background* background = problem.background(joint);
   if (background == nullptr) return e;
   return e - background->part(problem.solver().extra_residual(joint, fit));

@@ -16,7 +16,7 @@ inline void shift(Eigen::Index by, const Eigen::VectorXd& values, const Block& b
 
 /// The same, moved by a random part of the block, not by less than 8 % either way.
 inline void shift(Random& random, const Eigen::VectorXd& residual, const Block& block,
-                  Eigen::Ref<Eigen::VectorXd> out) {
+                  Eigen::Ref<Eigen::VectorXd> out) {  // NOLINT(performance-unnecessary-value-param): a reference itself
   const auto by = static_cast<Eigen::Index>(random.uniform(0.08, 0.92) * static_cast<double>(block.count));
   shift(by, residual, block, out);
 }
