@@ -107,11 +107,12 @@ bool has_constant() {
   return false;
 }
 
-/// Base parameters too are confused with effects.
+/// Base parameters, which are no effect, are confused with effects too.
 const EffectTraits& traits_of(std::string_view name) {
   static constexpr EffectTraits of_base{.words = "inertia of the links",
                                         .experiments = {experiments::hopeless, experiments::wide_range_or_baseline}};
-  return name == base_parameters_name ? of_base : *find_effect(name);
+  const EffectInfo* info = find_effect(name);
+  return info == nullptr ? of_base : *info;
 }
 
 }  // namespace
