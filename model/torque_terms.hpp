@@ -98,8 +98,7 @@ class TorqueTerms {
   static Fixed<bits> to_fixed(double x) {
     const double raw = std::nearbyint(std::ldexp(x, bits));
     if (std::isnan(raw)) return {0};
-    const double inside = raw < raw::min32 ? raw::min32 : (raw > raw::max32 ? raw::max32 : raw);
-    return {static_cast<std::int32_t>(inside)};
+    return {static_cast<std::int32_t>(std::clamp<double>(raw, raw::min32, raw::max32))};
   }
   static typename Model::Setpoints as_raw(const Column& q, const Column& dq, const Column& ddq) {
     using N = typename Model::Numbers;
