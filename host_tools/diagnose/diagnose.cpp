@@ -80,7 +80,6 @@ class Diagnoser {
       look_at_links(models_.current, logs_);
     }
     models_.current.session = session_;
-    models_.largest_load = largest_loads(models_, logs_);
     Diagnosis result;
     result.still = still_;
     // Of a baseline alone: what slipped since has bent nothing yet.
@@ -366,7 +365,7 @@ class Diagnoser {
     }
   }
   /// With what bends already: the healthy session alone.
-  Models bent(IdentifiedModel model, const std::vector<SessionLog>& logs) const {
+  Models bent(IdentifiedModel model) const {
     Models out;
     for (const DeflectionEffect& effect : bent_already_) {
       model.joints[effect.joint].effects.push_back(effect.fit);
@@ -377,7 +376,6 @@ class Diagnoser {
     out.options = options();
     out.smallest_step_s = models_.smallest_step_s;
     for (const DeflectionEffect& effect : bent_already_) add_rotor(out, effect, options().prior.link_rotor);
-    out.largest_load = largest_loads(out, logs);
     return out;
   }
 
@@ -395,14 +393,14 @@ class Diagnoser {
       before.back().healthy = false;
     }
     look_at_links(models_.healthy, before);
-    HealthySession learned = learn_healthy(bent(models_.healthy, before), before, task_, progress_);
+    HealthySession learned = learn_healthy(bent(models_.healthy), before, task_, progress_);
     const double lead = models_.healthy.filter.torque_lead_s;
     if (lead != 0 && !project_.signals.torque_lead_s) {
       // Friction with memory looks like a torque column of other times until it is in the model.
       Project aligned = project_;
       aligned.signals.torque_lead_s = 0;
       GateData again = healthy;
-      HealthySession other = learn_healthy(bent(healthy_model(aligned, again), before), before, task_, progress_);
+      HealthySession other = learn_healthy(bent(healthy_model(aligned, again)), before, task_, progress_);
       if (!errs_less(learned, other)) {
         learned = std::move(other);
         std::erase(healthy.notes, torque_lead_note(lead));

@@ -157,18 +157,6 @@ void mute(std::vector<SessionLog>& logs, const IdentifiedModel& model, const std
   }
 }
 
-std::vector<double> largest_loads(const Models& models, const std::vector<SessionLog>& logs) {
-  std::vector<double> out(models.current.joints.size(), 0);
-  const LogColumns columns(models, logs);
-  for (std::size_t l = 0; l < logs.size(); ++l) {
-    const ProcessedLog& log = logs[l].log;
-    const MatrixXd load = columns.robot(l).structural().middleRows(log.first, log.last - log.first);
-    for (std::size_t j = 0; j < out.size(); ++j)
-      out[j] = std::max(out[j], load.col(static_cast<Index>(j)).cwiseAbs().maxCoeff());
-  }
-  return out;
-}
-
 std::vector<std::string> check_same_robot(Models models, const std::vector<SessionLog>& logs,
                                           const std::vector<bool>& still) {
   const SessionOptions options = models.options.session;
