@@ -84,6 +84,8 @@ struct ShapeValues {
   OfScales<ShapeRange> fitted{};  ///< where `identify` begins its search; none: it can't fit the effect
   ShapeSearch search = ShapeSearch::refine;
   bool seen_by_encoder = false;  ///< a path: what is shorter than the encoder's step does not show
+  double least_of_sign = 0;      ///< a velocity: at least so many widths of the joint's sign; 0: any
+  double most_of_load = 0;       ///< a load: at most this share of the joint's largest structural torque; 0: any
   /// For deflections that a link encoder shows: where the fit begins, then what it tries.
   OfScales<ValueList> of_link{};
 

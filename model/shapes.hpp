@@ -28,8 +28,9 @@ namespace detail {
 using Scales = const MotionScales&;
 
 // velocity
+inline constexpr double widths_of_sign = 1.5;
 inline ValueList low_speeds(Scales s) {
-  const double from = std::max(3e-3 * s.speed, 1.5 * s.sign_width);
+  const double from = std::max(3e-3 * s.speed, widths_of_sign * s.sign_width);
   return geometric(std::min(from, 0.1 * s.speed), 0.2 * s.speed, 9);
 }
 inline ValueList usual_speeds(Scales s) { return shares_of(s.speed, {0.025, 0.01, 0.05}); }
@@ -113,9 +114,14 @@ inline ValueList lowest_load(Scales s) { return {-s.structural}; }
 inline ValueList range_of_load(Scales s) { return {2 * s.structural}; }
 }  // namespace detail
 
-/// A velocity below which friction is another one. Narrower than the sign is the sign; wider is viscous friction.
+/// A velocity below which friction is another one; wider is viscous friction.
 inline constexpr ShapeValues velocity{
     .tried = detail::low_speeds, .judged = detail::usual_speeds, .fitted = detail::low_speed_range};
+/// .. of a friction that turns with the joint's sign: narrower than that is the sign.
+inline constexpr ShapeValues velocity_beyond_sign{.tried = detail::low_speeds,
+                                                  .judged = detail::usual_speeds,
+                                                  .fitted = detail::low_speed_range,
+                                                  .least_of_sign = detail::widths_of_sign};
 /// A path over which a contact bends before it slides.
 inline constexpr ShapeValues distance{
     .tried = detail::paths, .judged = detail::usual_paths, .fitted = detail::path_range, .seen_by_encoder = true};
@@ -130,9 +136,10 @@ inline constexpr ShapeValues delay{.tried = detail::delays, .judged = detail::us
 /// Damping over stiffness of a gear [s].
 inline constexpr ShapeValues relaxation{
     .tried = detail::relaxations, .judged = detail::usual_relaxations, .of_link = detail::link_relaxations};
-/// A small load that decides which flank of a gear is in touch.
+/// A small load that decides which flank of a gear is in touch. A gap that the largest load does not close is a spring:
+/// tanh(1 / 0.4) = 0.987.
 inline constexpr ShapeValues small_load{
-    .tried = detail::loads, .judged = detail::usual_loads, .of_link = detail::link_loads};
+    .tried = detail::loads, .judged = detail::usual_loads, .most_of_load = 0.4, .of_link = detail::link_loads};
 /// Coulomb's friction as a share of the static one.
 inline constexpr ShapeValues friction_share{
     .tried = detail::friction_shares, .judged = detail::friction_shares, .fitted = detail::friction_share_range};

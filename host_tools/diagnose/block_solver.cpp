@@ -119,20 +119,20 @@ std::vector<Index> BlockSolver::append(std::span<const std::vector<MatrixXd>> gr
   return first;
 }
 
-LinearFit BlockSolver::estimate_weights() {
+LinearFit BlockSolver::estimate_weights(const std::vector<std::size_t>& blocks) {
   std::vector<Index> all(static_cast<std::size_t>(columns_));
   std::iota(all.begin(), all.end(), Index{0});
   for (int round = 0; round < 2; ++round) {
-    const LinearFit fit = solve(all);
+    const LinearFit fit = solve(all, blocks);
     for (std::size_t j = 0; j < joints(); ++j) {
       double square = 0;
-      for (const std::size_t b : blocks_.fit) square += rows_[j].sums[b].square;
+      for (const std::size_t b : blocks) square += rows_[j].sums[b].square;
       // noise-free: no more than 1e-9 of the signal
       const auto k = static_cast<Index>(j);
       weights_[k] = fit.rows[k] / std::max(fit.square[k], 1e-18 * square + 1e-300);
     }
   }
-  return solve(all);
+  return solve(all, blocks);
 }
 
 void BlockSolver::normal(const std::vector<Index>& columns, const std::vector<std::size_t>& blocks, MatrixXd& gram,

@@ -76,7 +76,8 @@ class BlockSolver {
   /// nothing is felt. @returns by group: its first column
   std::vector<Eigen::Index> append(std::span<const std::vector<Eigen::MatrixXd>> groups);
   /// Weights and coefficients of all columns, by turns. @returns the fit with the weights that it led to
-  LinearFit estimate_weights();
+  LinearFit estimate_weights() { return estimate_weights(blocks_.fit); }
+  LinearFit estimate_weights(const std::vector<std::size_t>& blocks);
 
   LinearFit solve(const std::vector<Eigen::Index>& columns, const std::vector<std::size_t>& blocks) const;
   LinearFit solve(const std::vector<Eigen::Index>& columns) const { return solve(columns, blocks_.fit); }

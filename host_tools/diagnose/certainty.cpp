@@ -87,16 +87,23 @@ void weigh_evidence(Outcome& outcome, const Gate& gate) {
 
 namespace {
 
-/// Whether the second of two outcomes errs less on what judges: at no joint by more than a name may raise the error,
-/// and in the geometric mean of the joints by more than one further pass of the search brings by itself.
-bool errs_less(const VectorXd& before, const VectorXd& after, const GateOptions& options) {
+/// Whether the second of two outcomes errs less on what judges, in the geometric mean of the joints, by more than one
+/// further pass of the search brings by itself: it is the likelier one, with variances unknown.
+bool errs_less_in_all(const VectorXd& before, const VectorXd& after) {
   constexpr double worth_it = 0.99;  // of the squares
   double sum = 0;
   for (Index j = 0; j < before.size(); ++j) {
-    if (is_worse(options, before, after, j)) return false;
     if (before[j] > 0 && after[j] > 0) sum += std::log(after[j] / before[j]);
   }
   return sum < static_cast<double>(before.size()) * std::log(worth_it);
+}
+
+/// .. and at no joint by more than a name may raise the error.
+bool errs_less(const VectorXd& before, const VectorXd& after, const GateOptions& options) {
+  for (Index j = 0; j < before.size(); ++j) {
+    if (is_worse(options, before, after, j)) return false;
+  }
+  return errs_less_in_all(before, after);
 }
 
 using Tried = std::vector<EffectCandidate>;
@@ -155,6 +162,33 @@ void take_if_better(Outcome& outcome, Gate& gate, Outcome other, const Retrial& 
   const VectorXd before = judged_error(outcome.models, retrial.logs);
   const VectorXd after = judged_error(other.models, retrial.logs);
   if (!errs_less(before, after, outcome.models.options.gate)) return;
+  outcome = std::move(other);
+  gate = std::move(of_other);
+}
+
+std::vector<EffectCandidate> named_in(const Outcome& outcome) {
+  std::vector<EffectCandidate> out;
+  for (const Finding& finding : outcome.found) out.push_back(candidate_of(outcome, finding));
+  return out;
+}
+
+void search_again(const std::vector<EffectCandidate>& before, Outcome& outcome, Gate& gate, const Retrial& retrial,
+                  Progress& progress) {
+  const std::vector<EffectCandidate> passed = named_in(outcome);
+  SearchTask task = retrial.task;
+  bool gone = false;
+  for (const EffectCandidate& one : before) {
+    const bool stays = std::any_of(passed.begin(), passed.end(), [&](const EffectCandidate& other) {
+      return other.effect == one.effect && other.joint == one.joint;
+    });
+    gone |= !stays;
+    if (!stays && find_effect(one.effect)->unites_others()) task.never.push_back(one);
+  }
+  if (!gone && !outcome.dropped) return;
+  Outcome other = explore_again(outcome, retrial.logs, task, progress);
+  Gate of_other = pass(other, retrial.nominal, retrial.logs, retrial.still);
+  // The gate sees to it that no joint errs more than in the nominal model.
+  if (!errs_less_in_all(judged_error(outcome.models, retrial.logs), judged_error(other.models, retrial.logs))) return;
   outcome = std::move(other);
   gate = std::move(of_other);
 }

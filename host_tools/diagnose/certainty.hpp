@@ -40,6 +40,15 @@ std::optional<Outcome> with_free_background(const Outcome& outcome, const std::v
 /// outcome
 void take_if_better(Outcome& outcome, Gate& gate, Outcome other, const Retrial& retrial);
 
+/// The effects of an outcome's findings.
+std::vector<EffectCandidate> named_in(const Outcome& outcome);
+/// Where the model is not the one that the search saw last, it searches once more: what needs the torque of the
+/// whole model can't be tried beside a part of it. Without laws that did not pass: a part of one may be there alone.
+/// Whatever the test for structure says, which sees little in few rows.
+/// @param before what was named before the gate @param outcome, gate after it
+void search_again(const std::vector<EffectCandidate>& before, Outcome& outcome, Gate& gate, const Retrial& retrial,
+                  Progress& progress);
+
 /// Of a finding that is there for sure, and whose rival is within the odds of a sure name, that rival is tried in its
 /// place, with all that is fitted and searched around it: odds are of fits that are linear around the finding, whose
 /// other parameters suit it. The one whose model errs less on what judges stays.

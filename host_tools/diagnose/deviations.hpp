@@ -14,8 +14,8 @@ void add_deviations(Models& models, const Linearised& problem);
 
 /// Standard deviations by which the coefficients of each group together are off nothing,
 ///   sqrt(theta^T C^-1 theta), C their covariance with the group's shapes held.
-/// What the shapes leave open is which curve it is, not whether it is there. A share, which is 1 by definition, gets
-/// 1e300.
+/// What the shapes leave open is which curve it is, not whether it is there. A share is 1 by definition: for such an
+/// effect, those by which the least known of its shapes is off 0.
 std::vector<double> deviations_off_nothing(const Linearised& problem, const std::vector<std::size_t>& groups);
 
 /// One over the variances of the joints' residuals, less where these have structure: neighbouring rows then say the

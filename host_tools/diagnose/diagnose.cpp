@@ -80,6 +80,7 @@ class Diagnoser {
       look_at_links(models_.current, logs_);
     }
     models_.current.session = session_;
+    models_.largest_load = largest_loads(models_, logs_);
     Diagnosis result;
     result.still = still_;
     // Of a baseline alone: what slipped since has bent nothing yet.
@@ -110,8 +111,10 @@ class Diagnoser {
     Outcome outcome = explore(models_, logs_, task_, 2, progress_);
     refuse_faulty_recordings(start, outcome);
     std::optional<Outcome> released = with_free_background(outcome, logs_);
+    const std::vector<EffectCandidate> named = named_in(outcome);
     Gate gate = pass(outcome, models_.current, logs_, still_);
     if (released) take_if_better(outcome, gate, std::move(*released), retrial());
+    search_again(named, outcome, gate, retrial(), progress_);
     if (refit_links(outcome)) gate = pass(outcome, models_.current, logs_, still_);
     weigh_evidence(outcome, gate);
     if (settle_rivals(outcome, gate, retrial(), progress_) && refit_links(outcome)) {
@@ -365,7 +368,7 @@ class Diagnoser {
     }
   }
   /// With what bends already: the healthy session alone.
-  Models bent(IdentifiedModel model) const {
+  Models bent(IdentifiedModel model, const std::vector<SessionLog>& logs) const {
     Models out;
     for (const DeflectionEffect& effect : bent_already_) {
       model.joints[effect.joint].effects.push_back(effect.fit);
@@ -376,6 +379,7 @@ class Diagnoser {
     out.options = options();
     out.smallest_step_s = models_.smallest_step_s;
     for (const DeflectionEffect& effect : bent_already_) add_rotor(out, effect, options().prior.link_rotor);
+    out.largest_load = largest_loads(out, logs);
     return out;
   }
 
@@ -393,14 +397,14 @@ class Diagnoser {
       before.back().healthy = false;
     }
     look_at_links(models_.healthy, before);
-    HealthySession learned = learn_healthy(bent(models_.healthy), before, task_, progress_);
+    HealthySession learned = learn_healthy(bent(models_.healthy, before), before, task_, progress_);
     const double lead = models_.healthy.filter.torque_lead_s;
     if (lead != 0 && !project_.signals.torque_lead_s) {
       // Friction with memory looks like a torque column of other times until it is in the model.
       Project aligned = project_;
       aligned.signals.torque_lead_s = 0;
       GateData again = healthy;
-      HealthySession other = learn_healthy(bent(healthy_model(aligned, again)), before, task_, progress_);
+      HealthySession other = learn_healthy(bent(healthy_model(aligned, again), before), before, task_, progress_);
       if (!errs_less(learned, other)) {
         learned = std::move(other);
         std::erase(healthy.notes, torque_lead_note(lead));

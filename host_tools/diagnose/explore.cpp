@@ -68,60 +68,77 @@ std::vector<EffectCandidate> friction_of_background(const Models& models) {
   return out;
 }
 
-/// @param passes the first one and the one after the last: the first of all also says what can't be seen
-Outcome explore_passes(Models models, std::vector<VectorXd> whitening, const std::vector<SessionLog>& logs,
-                       const SearchTask& task, std::pair<int, int> passes, Progress& progress) {
-  Outcome out;
-  for (int pass = passes.first; pass < passes.second; ++pass) {
-    progress.stage(pass == 0 ? "looking for what is missing" : "looking again, around what was found", 8);
-    Linearised problem(models, logs, whitening);
-    std::vector<EffectCandidate> skip = task.never;
-    for (const std::size_t g : in_model(problem)) skip.push_back(problem.groups()[g].candidate);
-    std::erase_if(skip, [](const EffectCandidate& c) { return find_effect(c.effect)->several; });
-    for (const EffectCandidate& has : friction_of_background(models)) skip.push_back(has);
-    problem.add_all(dictionary(problem, skip));
-    progress.step();
-    Search search(problem, task.settings);
-    const std::vector<std::size_t> start = in_model(problem);
-    Choice choice = search.unite(search.run(start, progress));
-    if (pass == 0) out.not_identifiable = blind_spots(problem, search);
-    const std::vector<Found> found = search.explain(choice);  // may take a rival
-    // The model follows the choice. What is appended first leaves the ids of the others as they are.
-    std::vector<EffectId> ids;
-    Index column = first_of_groups(problem, choice);
-    for (const std::size_t g : choice.groups) {
-      const Group& group = problem.groups()[g];
-      ids.push_back(group.in_model ? group.id : name(models, group, choice.fit.x.segment(column, group.count)));
-      column += group.count;
-    }
-    for (const std::size_t g : start) {
-      if (std::find(choice.groups.begin(), choice.groups.end(), g) == choice.groups.end())
-        ids.push_back(problem.groups()[g].id);
-    }
-    const bool changed = ids.size() > choice.groups.size() || choice.groups.size() > start.size();
-    while (ids.size() > choice.groups.size()) {
-      const EffectId gone = ids.back();
-      ids.pop_back();
-      take_back(models, ids, gone);
-    }
-    if (changed) refit(models, logs, problem.noise().whitening(), 4);
-    bool lost = false;
-    for (std::size_t j = 0; j < models.current.joints.size(); ++j) {
-      // A rotor that does not show is none.
-      const EffectFit* rotor = rotor_of(models.current.joints[j]);
-      if (rotor != nullptr && rotor->linear[0] <= 0) lost |= forget_rotor(models, ids, j);
-    }
-    if (lost) refit(models, logs, problem.noise().whitening(), 2);
-    out.found.clear();
-    for (std::size_t i = 0; i < ids.size(); ++i)
-      out.found.push_back({ids[i], found[i].score, found[i].alternatives, found[i].rival});
-    out.models = models;
-    // Without a baseline the gap was part of what looked like noise.
-    whitening = changed && !models.has_baseline ? colours(models, logs) : problem.noise().whitening();
-    out.whitening = whitening;
-    out.look_again(logs);
-    if (!changed || (!out.structured() && out.found.size() < 2)) break;
+/// The model follows the choice. What is appended first leaves the ids of the others as they are.
+/// @returns ids of the choice's effects, in its order
+std::vector<EffectId> follow(const Choice& choice, const Linearised& problem, Models& models) {
+  std::vector<EffectId> ids;
+  Index column = first_of_groups(problem, choice);
+  for (const std::size_t g : choice.groups) {
+    const Group& group = problem.groups()[g];
+    ids.push_back(group.in_model ? group.id : name(models, group, choice.fit.x.segment(column, group.count)));
+    column += group.count;
   }
+  for (const std::size_t g : in_model(problem)) {
+    if (std::find(choice.groups.begin(), choice.groups.end(), g) == choice.groups.end())
+      ids.push_back(problem.groups()[g].id);
+  }
+  while (ids.size() > choice.groups.size()) {
+    const EffectId gone = ids.back();
+    ids.pop_back();
+    take_back(models, ids, gone);
+  }
+  return ids;
+}
+
+/// A rotor that does not show is none. @returns whether there was one
+bool forget_lost_rotors(Models& models, std::vector<EffectId>& ids) {
+  bool lost = false;
+  for (std::size_t j = 0; j < models.current.joints.size(); ++j) {
+    const EffectFit* rotor = rotor_of(models.current.joints[j]);
+    if (rotor != nullptr && rotor->linear[0] <= 0) lost |= forget_rotor(models, ids, j);
+  }
+  return lost;
+}
+
+/// Searches around the models of an outcome, which become those of the choice. @returns whether that is another
+bool explore_once(Outcome& out, const std::vector<SessionLog>& logs, const SearchTask& task, Progress& progress) {
+  Models& models = out.models;
+  Linearised problem(models, logs, out.whitening);
+  const std::vector<std::size_t> start = in_model(problem);
+  std::vector<EffectCandidate> skip = task.never;
+  for (const std::size_t g : start) skip.push_back(problem.groups()[g].candidate);
+  std::erase_if(skip, [](const EffectCandidate& c) { return find_effect(c.effect)->several; });
+  for (const EffectCandidate& has : friction_of_background(models)) skip.push_back(has);
+  problem.add_all(dictionary(problem, skip));
+  progress.step();
+  Search search(problem, task);
+  Choice choice = search.unite(search.run(start, progress));
+  if (out.not_identifiable.empty()) out.not_identifiable = blind_spots(problem, search);
+  const std::vector<Found> found = search.explain(choice);  // may take a rival
+  std::vector<EffectId> ids = follow(choice, problem, models);
+  out.dropped = std::any_of(start.begin(), start.end(), [&](std::size_t g) {
+    return std::find(choice.groups.begin(), choice.groups.end(), g) == choice.groups.end();
+  });
+  const bool changed = out.dropped || ids.size() > start.size();
+  if (changed) refit(models, logs, problem.noise().whitening(), 4);
+  if (forget_lost_rotors(models, ids)) refit(models, logs, problem.noise().whitening(), 2);
+  out.found.clear();
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    out.found.push_back({ids[i], found[i].score, found[i].alternatives, found[i].rival});
+  // Without a baseline the gap was part of what looked like noise.
+  out.whitening = changed && !models.has_baseline ? colours(models, logs) : problem.noise().whitening();
+  out.look_again(logs);
+  return changed;
+}
+
+void tell_stage(Progress& progress, bool first) {
+  progress.stage(first ? "looking for what is missing" : "looking again, around what was found", 8);
+}
+
+Outcome around(Models models, std::vector<VectorXd> whitening) {
+  Outcome out;
+  out.models = std::move(models);
+  out.whitening = std::move(whitening);
   return out;
 }
 
@@ -151,23 +168,38 @@ void Outcome::look_again(const std::vector<SessionLog>& logs) {
 
 Outcome explore(Models models, const std::vector<SessionLog>& logs, const SearchTask& task, int passes,
                 Progress& progress) {
-  std::vector<VectorXd> whitening = colours(models, logs);
-  return explore_passes(std::move(models), std::move(whitening), logs, task, {0, passes}, progress);
+  Outcome out = around(models, colours(models, logs));
+  for (int pass = 0; pass < passes; ++pass) {
+    tell_stage(progress, pass == 0);
+    const bool changed = explore_once(out, logs, task, progress);
+    if (!changed || (!out.structured() && out.found.size() < 2)) break;
+  }
+  return out;
 }
 
 Outcome explore_rival(const Outcome& outcome, const Finding& finding, const std::vector<SessionLog>& logs,
                       const SearchTask& task, Progress& progress) {
-  Models models = outcome.models;
+  Outcome out = around(outcome.models, outcome.whitening);
+  out.not_identifiable = outcome.not_identifiable;
   std::vector<EffectId> others;
   for (const Finding& found : outcome.found) {
     if (!(found.id == finding.id)) others.push_back(found.id);
   }
   // What is appended first leaves ids as they are, and a rotor that both have.
-  name(models, finding.rival->group, finding.rival->coefficients);
-  take_back(models, others, finding.id);
-  refit(models, logs, outcome.whitening, 8);
-  Outcome out = explore_passes(std::move(models), outcome.whitening, logs, task, {1, 2}, progress);
+  name(out.models, finding.rival->group, finding.rival->coefficients);
+  take_back(out.models, others, finding.id);
+  refit(out.models, logs, outcome.whitening, 8);
+  tell_stage(progress, false);
+  explore_once(out, logs, task, progress);
+  return out;
+}
+
+Outcome explore_again(const Outcome& outcome, const std::vector<SessionLog>& logs, const SearchTask& task,
+                      Progress& progress) {
+  Outcome out = around(outcome.models, outcome.whitening);
   out.not_identifiable = outcome.not_identifiable;
+  tell_stage(progress, false);
+  explore_once(out, logs, task, progress);
   return out;
 }
 

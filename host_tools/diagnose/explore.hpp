@@ -20,17 +20,12 @@ struct Outcome {
   std::vector<LackOfFit> lack;
   std::vector<std::vector<std::string>> not_identifiable;  ///< per joint, and of the robot
   std::vector<Eigen::VectorXd> whitening;
+  bool dropped = false;  ///< the last pass took an effect back
 
   bool structured() const;  ///< at any joint
   bool structured(std::size_t joint) const;
   /// Linearises around the models again and looks for lack of fit.
   void look_again(const std::vector<SessionLog>& logs);
-};
-
-/// What a search is asked for.
-struct SearchTask {
-  SearchSettings settings;
-  std::vector<EffectCandidate> never;  ///< effects that are not tried
 };
 
 /// Search, name, fit again around what was named; again where that left structure or found several effects.
@@ -40,5 +35,8 @@ Outcome explore(Models models, const std::vector<SessionLog>& logs, const Search
 /// One such pass around an outcome in which the rival of a finding is in that finding's place.
 Outcome explore_rival(const Outcome& outcome, const Finding& finding, const std::vector<SessionLog>& logs,
                       const SearchTask& task, Progress& progress);
+/// One such pass around an outcome, which stays as it is.
+Outcome explore_again(const Outcome& outcome, const std::vector<SessionLog>& logs, const SearchTask& task,
+                      Progress& progress);
 
 }  // namespace fxdyn::diagnosis

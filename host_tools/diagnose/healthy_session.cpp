@@ -13,7 +13,7 @@ namespace {
 bool has_ripples(const Models& models, const std::vector<SessionLog>& logs, const SearchSettings& settings,
                  Progress& progress) {
   Linearised problem(models, logs);
-  return !Search(problem, settings).run({}, progress).groups.empty();
+  return !Search(problem, {settings, {}}).run({}, progress).groups.empty();
 }
 
 double mean_logarithm(const Eigen::VectorXd& squares) { return squares.array().max(1e-300).log().mean(); }

@@ -23,8 +23,24 @@ struct Count {
   double per_second() const { return seconds > 0 ? impacts / seconds : 0; }
 };
 
-void add(Count& to, const ProcessedLog& log, const VectorXd& error, const ImpactOptions& options) {
+/// Dry friction turns somewhere between the samples about a reversal, so that what one sample has of it says nothing: a
+/// straight line between those before and after.
+void bridge_reversals(VectorXd& error, const VectorXd& dq) {
+  const Index count = error.size();
+  for (Index k = 1; k + 1 < count; ++k) {
+    if (dq[k - 1] * dq[k + 1] > 0) continue;
+    Index end = k + 1;
+    while (end + 1 < count && dq[end - 1] * dq[end + 1] <= 0) ++end;
+    const double step = (error[end] - error[k - 1]) / static_cast<double>(end - k + 1);
+    for (Index i = k; i < end; ++i) error[i] = error[i - 1] + step;
+    k = end;
+  }
+}
+
+/// @param error measured less predicted torque of the joint, all samples
+void add(Count& to, const ProcessedLog& log, std::size_t joint, VectorXd error, const ImpactOptions& options) {
   const Index count = log.last - log.first;
+  bridge_reversals(error, log.joint_velocity(static_cast<Index>(joint)));
   const VectorXd above = (error - log.filter_columns(error)).segment(log.first, count);
   std::vector<double> sizes(above.begin(), above.end());
   for (double& size : sizes) size = std::fabs(size);
@@ -62,7 +78,7 @@ std::vector<std::optional<Impacts>> find_impacts(const IdentifiedModel& model, c
     for (const ProcessedLog& log : logs) {
       const MatrixXd error = log.tau - predict(of, log);
       std::vector<Count>& list = list_of(log);
-      parallel_for(n, [&](std::size_t j) { add(list[j], log, error.col(static_cast<Index>(j)), options); });
+      parallel_for(n, [&](std::size_t j) { add(list[j], log, j, error.col(static_cast<Index>(j)), options); });
     }
   };
   count(model, now,

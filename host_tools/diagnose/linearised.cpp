@@ -46,7 +46,9 @@ Linearised::Linearised(const Models& models, const std::vector<SessionLog>& logs
   const Blocks blocks = make_blocks(logs);
   solver_ = std::make_unique<BlockSolver>(blocks, design_matrix(log_columns_, unknowns_.all, blocks),
                                           static_cast<Index>(unknowns_.all.size()), unknowns_.priors());
-  noise_ = estimate_noise(log_columns_, *solver_, solver_->estimate_weights(), std::move(whitening));
+  // A fit of both sessions would leave in the healthy one what today's gap bends the common parameters by.
+  const std::vector<std::size_t> quiet = log_columns_.has_baseline() ? blocks.fit_of(true) : blocks.fit;
+  noise_ = estimate_noise(log_columns_, *solver_, solver_->estimate_weights(quiet), quiet, std::move(whitening));
   parallel_for(joints(), [&](std::size_t j) { whiten(j); });
   const std::vector<std::size_t>& structured = log_columns_.background();
   parallel_for(structured.size(), [&](std::size_t k) { add_background(structured[k]); });

@@ -23,9 +23,9 @@ constexpr double sigma_of_median = 1.4826;
 /// Of a function's own square: what it may be of the others and still counts. A numeric choice.
 constexpr double dependent = 1e-4;
 
-VectorXd of_fit(const Blocks& blocks, const VectorXd& residual) {
+VectorXd rows_of(const Blocks& blocks, const std::vector<std::size_t>& which, const VectorXd& residual) {
   std::vector<double> out;
-  for (const std::size_t b : blocks.fit) {
+  for (const std::size_t b : which) {
     const Block& block = blocks.all[b];
     out.insert(out.end(), residual.data() + block.first, residual.data() + block.first + block.count);
   }
@@ -107,7 +107,7 @@ VectorXd without_background(const LogColumns& columns, const Blocks& blocks, std
 }
 
 NoiseModel estimate_noise(const LogColumns& columns, const BlockSolver& solver, const LinearFit& fit,
-                          std::vector<VectorXd> whitening) {
+                          const std::vector<std::size_t>& quiet, std::vector<VectorXd> whitening) {
   const Blocks& blocks = solver.blocks();
   const std::size_t n = columns.joints();
   const NoiseOptions& options = columns.options().noise;
@@ -115,7 +115,7 @@ NoiseModel estimate_noise(const LogColumns& columns, const BlockSolver& solver, 
   parallel_for(n, [&](std::size_t j) {
     const auto k = static_cast<Index>(j);
     const VectorXd e = solver.residual(j, fit);
-    const double sigma = std::max(robust_sigma(of_fit(blocks, e)), 1e-12 / std::sqrt(solver.weights()[k]));
+    const double sigma = std::max(robust_sigma(rows_of(blocks, quiet, e)), 1e-12 / std::sqrt(solver.weights()[k]));
     doubts[j].resize(blocks.rows());
     const VectorXd of_noise = without_background(columns, blocks, j, e);
     std::vector<VectorXd> parts;

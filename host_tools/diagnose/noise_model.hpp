@@ -42,9 +42,9 @@ class NoiseModel {
 
 /// From the residual of a fit of all columns to rows that are not whitened yet: the scale of a row comes before the
 /// noise's colour, as rows near standstill may be far off.
-/// @param whitening coefficients to be kept; empty: from the residual of the healthy session, where there is one, else
-/// of all logs that fit
+/// @param fit,quiet of the blocks whose residual is the noise: the healthy session's, where there is one
+/// @param whitening coefficients to be kept; empty: from the residual
 NoiseModel estimate_noise(const LogColumns& columns, const BlockSolver& solver, const LinearFit& fit,
-                          std::vector<Eigen::VectorXd> whitening);
+                          const std::vector<std::size_t>& quiet, std::vector<Eigen::VectorXd> whitening);
 
 }  // namespace fxdyn::diagnosis

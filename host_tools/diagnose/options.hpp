@@ -49,8 +49,9 @@ struct PriorOptions {
 
 /// Logs, before anything is fitted.
 struct SessionOptions {
-  /// rows a period of the torque cut-off; decimation; theory: Nyquist's 2, and room for the filter's slope
-  double rows_per_period = 2.5;
+  /// rows a period of the torque cut-off; decimation; theory: Nyquist. Above it there is no noise, so that errors of
+  /// the model would count there a hundred times as much
+  double rows_per_period = 2.0;
   /// Hz; torque cut-off at most; hand: faster there is nothing that has a name, and many rows
   double highest_cutoff_hz = 40;
   /// s; a robot that rested longer begins a new session; hand: it has cooled

@@ -97,9 +97,9 @@ struct Spectrum {
 
 /// Whether the joint goes through two periods of a wave somewhere, slow enough for the filter to let it through, or is
 /// never too fast for that. What does not come back is no period: it is a torque at a reversal, of any form.
-bool comes_back(const OverAngle& data, double n) {
+bool comes_back(const OverAngle& data, double fastest, double n) {
   const double slow = 2 * std::numbers::pi * data.cutoff_hz / n, periods = 2 * 2 * std::numbers::pi / n;
-  if (*std::max_element(data.speed.begin(), data.speed.end()) <= slow) return true;
+  if (fastest <= slow) return true;
   double low = 0, high = 0;
   bool within = false;
   for (std::size_t k = 0; k < data.q.size(); ++k) {
@@ -139,14 +139,13 @@ Spectrum spectrum_of(const OverAngle& data, const ExpectedPower& power, double l
 }
 
 /// The highest first.
-std::vector<std::size_t> peaks_of(const std::vector<double>& p, std::size_t most) {
+std::vector<std::size_t> peaks_of(const std::vector<double>& p) {
   std::vector<std::size_t> peaks;
   for (std::size_t i = 0; i < p.size(); ++i) {
     const bool peak = (i == 0 || p[i] >= p[i - 1]) && (i + 1 == p.size() || p[i] > p[i + 1]);
     if (peak) peaks.push_back(i);
   }
   std::sort(peaks.begin(), peaks.end(), [&](std::size_t x, std::size_t y) { return p[x] > p[y]; });
-  if (peaks.size() > most) peaks.resize(most);
   return peaks;
 }
 
@@ -158,12 +157,14 @@ std::vector<Group> ripples(const Linearised& problem, std::size_t joint, const V
   const auto info = std::find_if(infos.begin(), infos.end(), [](const EffectInfo& one) { return one.of_spectrum(); });
   if (!(range > 0) || info == infos.end()) return {};
   const OverAngle data = over_angle(problem, joint, residual);
+  const double fastest = *std::max_element(data.speed.begin(), data.speed.end());
   const double cell = 2 * std::numbers::pi / range, step = cell / 4;
   const double lowest = std::max(info->shape[0].lower, std::max(0.6 * cell, 1.3 * std::min(1.0, 6.0 / range)));
   const Spectrum spectrum = spectrum_of(data, ExpectedPower(problem, joint, data.speed), lowest, step);
   std::vector<Group> out;
-  for (const std::size_t i : peaks_of(spectrum.p, most)) {
-    if (!comes_back(data, spectrum.n[i])) continue;
+  for (const std::size_t i : peaks_of(spectrum.p)) {
+    if (out.size() == most) break;
+    if (!comes_back(data, fastest, spectrum.n[i])) continue;
     Group group;
     group.candidate = {std::string(info->name), joint, {spectrum.n[i]}};
     group.nonlinear = 1;

@@ -8,6 +8,7 @@
 
 #include "host_tools/diagnose/refine.hpp"
 #include "host_tools/diagnose/shifted_residual.hpp"
+#include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/parallel.hpp"
@@ -90,6 +91,11 @@ Index first_of_groups(const Linearised& problem, const Choice& choice) {
   return first;
 }
 
+/// Without a healthy session a load is part of the last link.
+bool Search::is_of_links(const Group& group) const {
+  return is_load(group.candidate.effect) && !problem_.has_baseline();
+}
+
 bool Search::allowed(const Choice& state, std::size_t g) const {
   const Group& group = problem_.groups()[g];
   if (!group.in_model && !group.on_body && find_effect(group.candidate.effect)->needs_total) {
@@ -101,7 +107,7 @@ bool Search::allowed(const Choice& state, std::size_t g) const {
       if (!elsewhere && std::find(state.groups.begin(), state.groups.end(), i) == state.groups.end()) return false;
     }
   }
-  if (state.groups.size() >= settings_.most) return false;
+  if (is_of_links(group) || state.groups.size() >= task_.settings.most) return false;
   std::size_t here = 0, robot = 0;
   for (const std::size_t other : state.groups) {
     const Group& o = problem_.groups()[other];
@@ -121,7 +127,7 @@ bool Search::allowed(const Choice& state, std::size_t g) const {
       if (of_spectrum(o) || a == b) return false;
     }
   }
-  return group.on_body ? robot < settings_.robot_effects : here < settings_.max_effects;
+  return group.on_body ? robot < task_.settings.robot_effects : here < task_.settings.max_effects;
 }
 
 Choice Search::evaluate(const std::vector<std::size_t>& groups) const {
@@ -192,7 +198,7 @@ Search::Candidates Search::project(const Choice& state) {
         mine - cross.middleCols(first, group.count).transpose() * out.by_state.middleCols(first, group.count);
     out.products[g].projection = own.segment(first, group.count);
     out.gain[g] = gain_of(out.products[g], group.lower, is_share(group), options().beyond_bound);
-    if (at_start) kept_[g] = out.gain[g].kept;
+    if (at_start) kept_[g] = is_of_links(group) ? 0 : out.gain[g].kept;
     if (out.gain[g].rank > 0 && open) out.usable[g] = 1;
   }
   return out;
@@ -363,42 +369,6 @@ Choice Search::run(const std::vector<std::size_t>& start, Progress& progress) {
     if (!changed) break;
   }
   return best;
-}
-
-/// The choice with what is not needed beside `kept` left out, least needed first.
-Choice Search::pruned(Choice choice, std::size_t kept) const {
-  while (choice.groups.size() > 1) {
-    std::optional<Choice> best;
-    for (const std::size_t g : choice.groups) {
-      if (g == kept) continue;
-      std::vector<std::size_t> others = choice.groups;
-      std::erase(others, g);
-      Choice without = evaluate(others);
-      const bool needed = choice.possible() && choice.score - without.score >= threshold(g);
-      if (!needed && without.possible() && (!best || without.score > best->score)) best = std::move(without);
-    }
-    if (!best) break;
-    choice = std::move(*best);
-  }
-  return choice;
-}
-
-bool Search::trade(Choice& best) {
-  if (best.groups.size() < 2) return false;
-  std::set<std::string> tried;
-  for (const Scored& one : score_all(best, false)) {
-    const Group& group = problem_.groups()[one.group];
-    if (!group.on_body || !tried.insert(group.candidate.effect).second) continue;
-    std::vector<std::size_t> groups = best.groups;
-    const std::size_t added = refine(best, one.group);
-    groups.push_back(added);
-    Choice choice = pruned(evaluate(groups), added);
-    const bool shorter = choice.groups.size() <= best.groups.size();
-    if (!choice.possible() || !shorter || choice.score <= best.score + options().swap_gain) continue;
-    best = std::move(choice);
-    return true;
-  }
-  return false;
 }
 
 /// The best of each effect at each joint, so many of them; and the best of each effect on the robot: its first score is

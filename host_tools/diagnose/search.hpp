@@ -55,10 +55,16 @@ struct SearchSettings {
   std::size_t most = 8;  ///< of the whole robot: what needs more is not explained by the catalogue
 };
 
+/// What a search is asked for.
+struct SearchTask {
+  SearchSettings settings;
+  std::vector<EffectCandidate> never;  ///< effects that are not tried
+};
+
 /// Beam search forward, swaps, backward elimination.
 class Search {
  public:
-  Search(Linearised& problem, const SearchSettings& settings) : problem_(problem), settings_(settings) {}
+  Search(Linearised& problem, const SearchTask& task) : problem_(problem), task_(task) {}
 
   /// @param start groups to begin with (named effects of the model)
   Choice run(const std::vector<std::size_t>& start, Progress& progress);
@@ -111,12 +117,13 @@ class Search {
   double penalty(std::size_t group) const;
   double threshold(std::size_t group) const;
   const SearchOptions& options() const;
+  bool is_of_links(const Group& group) const;
   bool allowed(const Choice& state, std::size_t group) const;
   void find_ripples(const Choice& state, std::optional<std::size_t> joint);
   double samples() const;
 
   Linearised& problem_;
-  SearchSettings settings_;
+  SearchTask task_;
   Eigen::VectorXd thresholds_;
   std::vector<double> kept_;
 };

@@ -45,6 +45,21 @@ Index thinning(const ProcessedLog& log, const SessionOptions& options) {
   return std::max<Index>(1, static_cast<Index>(1 / (log.step_s * needed) + 1e-9));
 }
 
+/// Rows of all logs at one interval, the slowest log's: the noise's colour is learned from some and applied to others.
+void keep_alike_rows(std::vector<SessionLog>& logs, const SessionOptions& options) {
+  double slowest_s = 0, cutoff = 0;
+  for (const SessionLog& entry : logs) {
+    slowest_s = std::max(slowest_s, entry.log.step_s);
+    cutoff = std::max(cutoff, entry.log.filter.torque_cutoff_hz);
+  }
+  const Index samples = std::max<Index>(1, whole(1 / (slowest_s * options.rows_per_period * cutoff)));
+  const double interval_s = static_cast<double>(samples) * slowest_s;
+  for (SessionLog& entry : logs) {
+    const Index own = entry.log.decimation;  // never less, where the project asks for few rows
+    entry.log.decimation = std::max<Index>(own > 8 ? own / 8 : 1, std::lround(interval_s / entry.log.step_s));
+  }
+}
+
 bool any(const std::vector<bool>& joints) { return std::find(joints.begin(), joints.end(), true) != joints.end(); }
 
 }  // namespace
@@ -69,13 +84,11 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
     smooth(entry, options);
     const Index k = thinning(entry.log, options);
     entry.log = thinned(std::move(entry.log), k);
-    const Index decimation = entry.log.decimation;
-    entry.log.decimation = std::max<Index>(decimation > 8 ? decimation / 8 : 1,
-                                           whole(1 / (entry.log.step_s * options.rows_per_period * cutoff)));
     out.push_back(std::move(entry));
   };
   for (const ProcessedLog& log : now) add(log, false, one ? windows.front()[0] : log.t[0]);
   for (const ProcessedLog& log : before) add(log, true, log.t[0]);
+  keep_alike_rows(out, options);
   return out;
 }
 
@@ -155,6 +168,18 @@ void mute(std::vector<SessionLog>& logs, const IdentifiedModel& model, const std
         log.tau(i, k) = torque(i, k) + options.mute_noise * model.joints[j].rated_torque * random.normal();
     }
   }
+}
+
+std::vector<double> largest_loads(const Models& models, const std::vector<SessionLog>& logs) {
+  std::vector<double> out(models.current.joints.size(), 0);
+  const LogColumns columns(models, logs);
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    const ProcessedLog& log = logs[l].log;
+    const MatrixXd load = columns.robot(l).structural().middleRows(log.first, log.last - log.first);
+    for (std::size_t j = 0; j < out.size(); ++j)
+      out[j] = std::max(out[j], load.col(static_cast<Index>(j)).cwiseAbs().maxCoeff());
+  }
+  return out;
 }
 
 std::vector<std::string> check_same_robot(Models models, const std::vector<SessionLog>& logs,

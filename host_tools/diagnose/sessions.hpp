@@ -37,6 +37,9 @@ void leave_out(std::vector<ProcessedLog>& logs, const std::vector<bool>& joints)
 void mute(std::vector<SessionLog>& logs, const IdentifiedModel& model, const std::vector<bool>& joints,
           const SessionOptions& options);
 
+/// By joint: the largest structural torque of the logs [N*m | N].
+std::vector<double> largest_loads(const Models& models, const std::vector<SessionLog>& logs);
+
 /// Base parameters of the baseline with friction, load and tilt of their own against what both sessions measured.
 /// @returns a note for each joint at which nothing explains both @throws DataError: at half of the joints
 std::vector<std::string> check_same_robot(Models models, const std::vector<SessionLog>& logs,

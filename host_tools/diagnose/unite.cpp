@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "host_tools/diagnose/dictionary.hpp"
 #include "host_tools/diagnose/refine.hpp"
@@ -120,7 +121,7 @@ std::optional<Choice> Search::divided(const Choice& choice, const EffectInfo& in
     const Group& group = problem_.groups()[g];
     return !group.on_body && group.candidate.joint == joint;
   });
-  if (static_cast<std::size_t>(here) > settings_.max_effects) return {};
+  if (static_cast<std::size_t>(here) > task_.settings.max_effects) return {};
   if (tried->impossible < choice.impossible) return tried;
   return tried->impossible == choice.impossible && tried->score + needed > choice.score ? tried : std::nullopt;
 }
@@ -137,9 +138,49 @@ bool Search::is_better_held_out(const std::vector<std::size_t>& groups, const st
                      [&](const Fold& fold) { return error(groups, fold) < error(than, fold); });
 }
 
+/// The choice with what is not needed beside `kept` left out, least needed first.
+Choice Search::pruned(Choice choice, std::size_t kept) const {
+  while (choice.groups.size() > 1) {
+    std::optional<Choice> best;
+    for (const std::size_t g : choice.groups) {
+      if (g == kept) continue;
+      std::vector<std::size_t> others = choice.groups;
+      std::erase(others, g);
+      Choice without = evaluate(others);
+      const bool needed = choice.possible() && choice.score - without.score >= threshold(g);
+      if (!needed && without.possible() && (!best || without.score > best->score)) best = std::move(without);
+    }
+    if (!best) break;
+    choice = std::move(*best);
+  }
+  return choice;
+}
+
+bool Search::trade(Choice& best) {
+  if (best.groups.size() < 2) return false;
+  std::set<std::string> tried;
+  for (const Scored& one : score_all(best, false)) {
+    const Group& group = problem_.groups()[one.group];
+    if (!group.on_body || !tried.insert(group.candidate.effect).second) continue;
+    std::vector<std::size_t> groups = best.groups;
+    const std::size_t added = refine(best, one.group);
+    groups.push_back(added);
+    Choice choice = pruned(evaluate(groups), added);
+    const bool shorter = choice.groups.size() <= best.groups.size();
+    if (!choice.possible() || !shorter || choice.score <= best.score + options().swap_gain) continue;
+    best = std::move(choice);
+    return true;
+  }
+  return false;
+}
+
 Choice Search::unite(Choice best) {
   for (const EffectInfo& info : effect_infos()) {
     for (std::size_t j = 0; info.unites_others() && j < problem_.joints(); ++j) {
+      const bool never = std::any_of(task_.never.begin(), task_.never.end(), [&](const EffectCandidate& one) {
+        return one.effect == info.name && one.joint == j;
+      });
+      if (never) continue;
       // What the healthy session has already of that law is no finding, nor is it to be found twice.
       const std::vector<EffectFit>& known = problem_.log_columns().joint(j).effects;
       if (std::any_of(known.begin(), known.end(), [&](const EffectFit& fit) {
@@ -150,7 +191,10 @@ Choice Search::unite(Choice best) {
       std::optional<Choice> tried = united(best, info, j);
       // As any effect it has to bring more than noise does: it holds its parts as special cases.
       if (!tried || tried->score <= best.score + threshold(tried->groups.back())) continue;
-      if (is_better_held_out(tried->groups, best.groups, j)) best = std::move(*tried);
+      if (!is_better_held_out(tried->groups, best.groups, j)) continue;
+      // What stood in for a part of it (a ripple, at reversals) is not needed any more.
+      const std::size_t law = tried->groups.back();
+      best = pruned(std::move(*tried), law);
     }
   }
   return best;

@@ -224,6 +224,12 @@ std::pair<double, double> shape_limits(const Models& models, std::size_t joint, 
     const double step = std::max(filter.encoder_step[joint], std::sqrt(12.0) * filter.position_noise[joint]);
     return {std::clamp(step, shape.lower, 0.1 * shape.upper), shape.upper};
   }
+  if (shape.values.least_of_sign > 0) {
+    const double width = shape.values.least_of_sign * models.current.joints[joint].sign_width;
+    return {std::clamp(width, shape.lower, 0.1 * shape.upper), shape.upper};
+  }
+  if (shape.values.most_of_load > 0 && joint < models.largest_load.size())
+    return {shape.lower, std::clamp(shape.values.most_of_load * models.largest_load[joint], shape.lower, shape.upper)};
   return {shape.lower, upper_bound(info, shape, models.smallest_step_s)};
 }
 

@@ -22,10 +22,24 @@ struct Curve {
   std::uint32_t first = 0;           ///< bump that `weights` begin with
   std::array<Unit<N>, 4> weights{};  ///< of this and the next ones; |error| < 3e-9 in fixed point
 
-  static constexpr Curve at(Argument<N> x) {
-    const auto place = split_argument(x, static_cast<std::uint32_t>(curve_pieces - 1));
-    const Slope up = slope(place.rest), down = slope(N::template proven_narrow<Unit<N>>(N::one() - place.rest));
-    return {place.whole, {down.foot, up.shoulder, down.shoulder, up.foot}};
+  /// The four bumps at x from a knot to the next, of two products alone: with
+  ///   foot = x^3 / 4, bend = 3/4 (x - x^2),
+  ///   bump(2 - x) = foot, bump(1 - x) = 5/4 - bump(x) + bend, bump(x) = 1 - 3/2 x^2 + 3 foot,
+  ///   bump(1 + x) = 1/4 - bend - foot.
+  static constexpr Curve at(Argument<N> argument) {
+    const auto place = split_argument(argument, static_cast<std::uint32_t>(curve_pieces - 1));
+    const Unit<N> x = place.rest, one = N::one();
+    const Unit<N> quarter = narrow(half_of(half_of(one + Unit<N>{})));
+    const Unit<N> square = narrow(x * x);
+    const Unit<N> foot = narrow(half_of(half_of(square * x)));
+    const auto fallen = x - square;
+    const Unit<N> bend = narrow(half_of(half_of(fallen + fallen + fallen)));
+    const Unit<N> half = narrow(half_of(square + Unit<N>{}));
+    const Unit<N> thrice = narrow(foot + narrow(foot + foot));
+    const Unit<N> near = narrow(narrow(one - square) + narrow(thrice - half));
+    const Unit<N> far = narrow(narrow(one - near) + narrow(quarter + bend));
+    const Unit<N> left = narrow(narrow(quarter - bend) - foot);
+    return {place.whole, {left, near, far, foot}};
   }
   /// Every bump times `factor`.
   constexpr Curve times(Unit<N> factor) const {
@@ -48,19 +62,9 @@ struct Curve {
   }
 
  private:
-  struct Slope {
-    Unit<N> foot, shoulder;
-  };
-  /// x^3 / 4 and 1 - 3/2 x^2 + 3/4 x^3, 0 <= x <= 1.
-  static constexpr Slope slope(Unit<N> x) {
-    const auto product = x * x;
-    const auto half = half_of(product);
-    const auto fall = N::template proven_narrow<Unit<N>>(align(product, half) + half);
-    const auto foot =
-        N::template proven_narrow<Unit<N>>(half_of(half_of(N::template proven_narrow<Unit<N>>(product) * x)));
-    const auto rest = N::one() - fall;
-    const auto more = align(foot, rest);
-    return {foot, N::template proven_narrow<Unit<N>>(rest + more + more + more)};
+  template <class W>
+  static constexpr Unit<N> narrow(W w) {
+    return N::template proven_narrow<Unit<N>>(w);
   }
 };
 

@@ -16,7 +16,7 @@ struct Stribeck {
                                        .identified = 4,
                                        .turns_with_sign = TurnsWithSign::amplitude};
   static constexpr std::array shape{ParameterInfo{"velocity", "rad/s", "m/s", 1e-5, 1e3, Quantity::inverse_velocity,
-                                                  "Han, Wu, Hui 2025, Eq. 21", shapes::velocity}};
+                                                  "Han, Wu, Hui 2025, Eq. 21", shapes::velocity_beyond_sign}};
   static constexpr std::array linear{
       ParameterInfo{"amplitude", "N*m", "N", 0, unbounded, Quantity::unit, "Han, Wu, Hui 2025, Eq. 21"}};
   template <class N>

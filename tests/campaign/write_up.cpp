@@ -364,19 +364,22 @@ std::string write_up(const std::vector<json>& results, const std::string& comman
     failed += static_cast<std::size_t>(r.at("status") == "failed");
   }
   text += fmt::format(
-      "{} cases, {} of them could not be had (no joint reaches the size), {} ended without a diagnosis. "
-      "Time of one diagnosis on one thread: median {:.1f} s, longest {:.1f} s; of generating a case: "
-      "median {:.1f} s.\n\n",
+      "{} cases. {} of them could not be had, since no joint reaches the size. {} ended without a diagnosis. Time of "
+      "one diagnosis on one thread: median {:.1f} s, longest {:.1f} s. Generating a case takes {:.1f} s in the "
+      "median.\n\n",
       results.size(), missing, failed, median(times),
       times.empty() ? 0.0 : *std::max_element(times.begin(), times.end()), median(generation));
   text +=
-      "Recording: 40 s a role (10 s fast, 10 s up to 3.5 Hz, 10 s slow, 10 s of reversals), roles baseline, train, "
-      "validate, test, all of different trajectories; 500 Hz, 17-bit encoders, 1 % white and 0.3 % coloured torque "
-      "noise. Sizes: RMS of the noise-free torque change over the train logs at the joint that feels it most, share of "
-      "rated torque. *Visible*: beforehand, from motion and noise alone, the effect stands out by 8 standard "
-      "deviations "
-      "once nominal friction (without a baseline: the whole nominal model) has taken its part, and by 5 from the best "
-      "other effect of the catalogue.\n\n## Figures\n\n| what | goal | reached | cases |\n|---|---|---|---|\n";
+      "**Recording.** Each role has 40 s: 10 s fast, 10 s up to 3.5 Hz, 10 s slow, 10 s of reversals. The roles are "
+      "baseline, train, validate and test, all of different trajectories. The logs have 500 Hz, 17-bit encoders, 1 % "
+      "white and 0.3 % coloured torque noise.\n\n"
+      "**Sizes.** A size is the RMS of the noise-free torque change over the train logs. It is taken at the joint that "
+      "feels it most, as a share of rated torque.\n\n"
+      "**Visible effects.** *Visible* is told beforehand, from motion and noise alone. First nominal friction takes "
+      "its "
+      "part; without a baseline the whole nominal model does. What is left of the effect stands out by 8 standard "
+      "deviations. It also stands out by 5 from the best other effect of the catalogue.\n\n## Figures\n\n| what | goal "
+      "| reached | cases |\n|---|---|---|---|\n";
   for (const Figure& figure : figures(results)) {
     if (figure.cases == 0) continue;
     text += fmt::format("| {} | {} | {}{:.3f}{} | {} |\n", figure.what, figure.goal, figure.met ? "" : "**",
@@ -401,8 +404,7 @@ std::string write_up(const std::vector<json>& results, const std::string& comman
     text += fmt::format("\n## {}\n\n{}\n{}", title, summary_line(results, with_effect), confusion(results, of_group));
   }
   text +=
-      "\nSizes on the MuJoCo plant are those of the internal one; its gears and friction differ a little, so that the "
-      "gap "
+      "\nSizes on the MuJoCo plant are those of the internal one. Its gears and friction differ a little, so the gap "
       "before holds more than the effect.\n";
   text += "\n## What this recording can't tell apart in principle\n\n" + ambiguous_cases(results);
   text +=

@@ -77,5 +77,21 @@ TEST_F(BackToStart, DeviationsOfAnotherModelAreRefused) {
   EXPECT_THROW(add_deviations(models, *outcome.problem), std::out_of_range);
 }
 
+/// Deviations of a delay on the second joint off none.
+double of_delay(double time) {
+  Models models = test::around(test::fitted_puma());
+  models.current.joints[1].effects.push_back(test::named_effect("delay", {time}, {1}));
+  const std::vector<SessionLog> logs{test::small_session_log(models.current, Role::train, 1)};
+  return deviations_off_nothing(Linearised(models, logs, test::no_whitening()), {0})[0];
+}
+
+// Its only coefficient is 1: how far it is off nothing is how well its time is known.
+TEST(DeviationsOffNothing, OfADelayAreThoseOfItsTime) {
+  const double long_one = of_delay(0.02), short_one = of_delay(1e-5);
+  EXPECT_GT(long_one, 10);
+  EXPECT_LT(short_one, 2);
+  EXPECT_GT(short_one, 0);
+}
+
 }  // namespace
 }  // namespace fxdyn::diagnosis

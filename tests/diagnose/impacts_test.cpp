@@ -39,6 +39,21 @@ TEST_F(ImpactsTest, AreFoundOnTheirJoint) {
   EXPECT_NEAR(found[joint]->largest, 2, 0.5);
 }
 
+// Dry friction turns between two samples, and which of them sees it first is chance.
+TEST_F(ImpactsTest, AreNoneWhereTheVelocityTurns) {
+  const auto turning = [this](Role role, std::uint64_t seed) {
+    ProcessedLog out = log(role, seed);
+    const Eigen::VectorXd dq = out.joint_velocity(joint);
+    for (Index k = 1; k + 1 < out.samples(); ++k) {
+      if (dq[k - 1] * dq[k + 1] <= 0) out.tau(k, joint) += 2;
+    }
+    return out;
+  };
+  const ProcessedLog train = turning(Role::train, 1);
+  EXPECT_GT((train.tau - log(Role::train, 1).tau).col(joint).sum(), 10) << "turns often enough to be seen";
+  EXPECT_FALSE(find({train, turning(Role::validate, 2)}, {log(Role::baseline, 3)})[joint]);
+}
+
 TEST_F(ImpactsTest, AreNoneInNoise) {
   for (const auto& found : find({log(Role::train, 1), log(Role::validate, 2)}, {log(Role::baseline, 3)}))
     EXPECT_FALSE(found.has_value());

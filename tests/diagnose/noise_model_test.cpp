@@ -112,6 +112,19 @@ TEST_F(EstimatedNoise, IsInDoubtWhereTheEncoderDoesNotShowTheDirection) {
   }
 }
 
+// A fit of both sessions bends the base parameters that they share, and that would show in the healthy one's residual.
+TEST_F(EstimatedNoise, IsTheHealthySessionsWhateverTodayHolds) {
+  SessionLog today = log_;
+  today.log.tau.col(1) += 20 * (3 * today.log.q.col(1)).array().sin().matrix();
+  log_.healthy = true;
+  Models models = test::around(model_);
+  models.healthy = model_;
+  models.has_baseline = true;
+  const Linearised problem(models, std::vector<SessionLog>{today, log_});
+  EXPECT_NEAR(problem.noise().whitening()[1][0], 0.8, 0.06);
+  EXPECT_NEAR(problem.noise().whitening()[2][0], 0, 0.06);
+}
+
 TEST_F(EstimatedNoise, KeepsAColourThatIsGiven) {
   const std::vector<VectorXd> given(6, VectorXd::Constant(1, 0.3));
   const Linearised problem(test::around(model_), std::vector<SessionLog>{log_}, given);

@@ -48,8 +48,9 @@ class SearchOfEffects : public testing::Test {
       groups.push_back(group);
     }
     problem_->add_all(groups);
-    Search search(*problem_, settings_);
+    Search search(*problem_, task_);
     Choice choice = search.unite(search.run({}, progress_));
+    not_absorbed_ = search.not_absorbed();
     if (!choice.groups.empty()) found_ = search.explain(choice);
     return choice;
   }
@@ -69,11 +70,12 @@ class SearchOfEffects : public testing::Test {
 
   IdentifiedModel model_;
   Options options_;
-  SearchSettings settings_;
+  SearchTask task_;
   bool baseline_ = false;
   std::vector<SessionLog> logs_;
   std::unique_ptr<Linearised> problem_;
   std::vector<Found> found_;
+  std::vector<double> not_absorbed_;
   Progress progress_;
 };
 
@@ -170,7 +172,7 @@ TEST_F(SearchOfEffects, ALawThatExplainsNoMoreThanItsPartsIsThose) {
 }
 
 TEST_F(SearchOfEffects, ALawIsNotDividedIntoMoreEffectsThanAJointMayHave) {
-  settings_.max_effects = 1;
+  task_.settings.max_effects = 1;
   const Choice choice = run(1, {test::effect("presliding", {0.01}, {4}), test::effect("stribeck", {0.2}, {2})},
                             {{"lugre", 1, {0.01, 0.2, 0.7}}});
   ASSERT_EQ(choice.groups.size(), 1U) << names(choice);
@@ -196,6 +198,18 @@ TEST_F(SearchOfEffects, GivesOneLoadForSeveralGains) {
   baseline_ = true;
   const Choice choice = run(robot, candidates);
   EXPECT_EQ(names(choice), "payload  at joint 1; ");
+}
+
+// Its column has how the gear bends under it, those of the base parameters do not: so it could be told from them.
+TEST_F(SearchOfEffects, ALoadOfABendingArmIsTheLastLinksWithoutAHealthySession) {
+  model_.joints[1].effects.push_back(test::effect("elasticity", {0.01}, {2e-4}));
+  IdentifiedModel loaded = model_;
+  loaded.body.push_back(test::effect("payload", {}, {2, 0.1, 0, 0.1}));
+  EXPECT_EQ(names(run(loaded, {{"payload", 0, {}}})).find("payload"), std::string::npos);
+  EXPECT_EQ(not_absorbed_[0], 0);
+  baseline_ = true;
+  EXPECT_NE(names(run(loaded, {{"payload", 0, {}}})).find("payload"), std::string::npos);
+  EXPECT_GT(not_absorbed_[0], 0.1);
 }
 
 TEST_F(SearchOfEffects, NeedsLongerSetsToBringMore) {

@@ -92,5 +92,19 @@ TEST(Thinning, SessionsHoldWhatTheBandNeeds) {
   EXPECT_NEAR(rate(), 4000, 1e-6);
 }
 
+TEST(Thinning, SessionsOfOtherRatesHaveRowsAtOneInterval) {
+  ProcessedLog log = log_at_4_khz();
+  log.tau = sine_of(20);
+  log.filter.torque_cutoff_hz = 40;
+  log.filter.position_cutoff_hz = 200;
+  std::optional<Session> session;
+  const auto interval = [](const SessionLog& entry) {
+    return entry.log.step_s * static_cast<double>(entry.log.decimation);
+  };
+  // 200 Hz would keep every second row, 500 Hz every sixth
+  for (const SessionLog& entry : sessions({thinned(log, 8)}, {thinned(log, 20)}, session, {}))
+    EXPECT_NEAR(interval(entry), 0.01, 1e-9) << entry.log.step_s;
+}
+
 }  // namespace
 }  // namespace fxdyn::diagnosis

@@ -3,6 +3,7 @@
 #include "host_tools/diagnose/unknowns.hpp"
 #include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/braking.hpp"
+#include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/link_parameters.hpp"
 
 #include <gtest/gtest.h>
@@ -79,6 +80,22 @@ TEST_F(UnknownsOfAModel, FrictionMayChangeALittleFromSessionToSession) {
                                     [](const Unknown& u) { return u.change && u.joint == 0 && u.effect == 0; });
   ASSERT_NE(viscous, unknowns.all.end());
   EXPECT_NEAR(viscous->prior_std, std::hypot(0.3 * 1, 1e-3 * 100 / 3), 1e-12);
+}
+
+TEST_F(UnknownsOfAModel, StribeckIsWiderThanTheSign) {
+  const EffectInfo &stribeck = *find_effect("stribeck"), &lugre = *find_effect("lugre");
+  EXPECT_DOUBLE_EQ(shape_limits(models_, 1, stribeck, stribeck.shape[0]).first, 1.5 * 0.02);
+  EXPECT_EQ(shape_limits(models_, 1, lugre, lugre.shape[1]).first, lugre.shape[1].lower);  // its bristles turn it over
+}
+
+TEST_F(UnknownsOfAModel, AGapThatTheLargestLoadDoesNotCloseIsNone) {
+  const EffectInfo& backlash = *find_effect("backlash");
+  models_.largest_load = {5, 50};
+  EXPECT_DOUBLE_EQ(shape_limits(models_, 1, backlash, backlash.shape[0]).second, 0.4 * 50);
+  EXPECT_DOUBLE_EQ(shape_limits(models_, 2, backlash, backlash.shape[0]).second, backlash.shape[0].upper);  // unknown
+  models_.largest_load[0] = 0;
+  const auto [least, most] = shape_limits(models_, 0, backlash, backlash.shape[0]);
+  EXPECT_EQ(least, most);
 }
 
 // model.json with more damping would be refused: bristles would drive the joint.

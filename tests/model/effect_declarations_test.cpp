@@ -228,6 +228,15 @@ TEST(Shapes, VelocitiesBeginAboveTheSign) {
   EXPECT_NEAR(values[4], std::sqrt(0.015 * 0.4), 1e-12) << "equal ratios";
   s.sign_width = 1;
   EXPECT_DOUBLE_EQ(shapes::velocity.tried(s)[0], 0.2) << "however wide the sign is";
+  // Where a fit may lead is where the search begins.
+  s.sign_width = 0.01;
+  EXPECT_DOUBLE_EQ(shapes::velocity_beyond_sign.tried(s)[0], shapes::velocity_beyond_sign.least_of_sign * s.sign_width);
+  EXPECT_EQ(shapes::velocity.least_of_sign, 0);
+}
+
+TEST(Shapes, AGapIsClosedByTheLargestLoad) {
+  EXPECT_NEAR(std::tanh(1 / shapes::small_load.most_of_load), 0.987, 5e-4);
+  EXPECT_EQ(shapes::torque_limit.most_of_load, 0);
 }
 
 TEST(Shapes, ARobotOfOneJointHasNoOthers) {
