@@ -150,6 +150,7 @@ std::optional<Outcome> with_free_background(const Outcome& outcome, const std::v
   std::vector<EffectCandidate>& held = out.models.held;
   if (std::erase_if(held, [&](const EffectCandidate& one) { return !grew(one); }) == 0) return {};
   out.found = outcome.found;
+  out.dropped = outcome.dropped;
   out.whitening = outcome.whitening;
   out.not_identifiable = outcome.not_identifiable;
   refit(out.models, logs, out.whitening, 8);
@@ -176,15 +177,13 @@ void search_again(const std::vector<EffectCandidate>& before, Outcome& outcome, 
                   Progress& progress) {
   const std::vector<EffectCandidate> passed = named_in(outcome);
   SearchTask task = retrial.task;
-  bool gone = false;
   for (const EffectCandidate& one : before) {
     const bool stays = std::any_of(passed.begin(), passed.end(), [&](const EffectCandidate& other) {
       return other.effect == one.effect && other.joint == one.joint;
     });
-    gone |= !stays;
     if (!stays && find_effect(one.effect)->unites_others()) task.never.push_back(one);
   }
-  if (!gone && !outcome.dropped) return;
+  if (passed.size() == before.size() && !outcome.dropped) return;
   Outcome other = explore_again(outcome, retrial.logs, task, progress);
   Gate of_other = pass(other, retrial.nominal, retrial.logs, retrial.still);
   // The gate sees to it that no joint errs more than in the nominal model.

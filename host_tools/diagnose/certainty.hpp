@@ -42,9 +42,9 @@ void take_if_better(Outcome& outcome, Gate& gate, Outcome other, const Retrial& 
 
 /// The effects of an outcome's findings.
 std::vector<EffectCandidate> named_in(const Outcome& outcome);
-/// Where the model is not the one that the search saw last, it searches once more: what needs the torque of the
-/// whole model can't be tried beside a part of it. Without laws that did not pass: a part of one may be there alone.
-/// Whatever the test for structure says, which sees little in few rows.
+/// Where an effect was taken out of the model that the search saw last, it searches once more: what needs the torque of
+/// the whole model can't be tried beside a part of it. Without laws that did not pass: a part of one may be there
+/// alone. Whatever the test for structure says, which sees little in few rows.
 /// @param before what was named before the gate @param outcome, gate after it
 void search_again(const std::vector<EffectCandidate>& before, Outcome& outcome, Gate& gate, const Retrial& retrial,
                   Progress& progress);

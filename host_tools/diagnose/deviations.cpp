@@ -45,7 +45,9 @@ double deviations_of_shapes(const Linearised& problem, const EffectId& id, const
   for (std::size_t c = 0; c < problem.unknowns().size(); ++c) {
     const Unknown& u = problem.unknowns()[c];
     if (u.kind != Unknown::Kind::shape || u.body || u.joint != id.joint || u.effect != id.effect) continue;
-    out = std::min(out, 1 / std::sqrt(covariance(static_cast<Index>(c), static_cast<Index>(c))));
+    const double variance = covariance(static_cast<Index>(c), static_cast<Index>(c));
+    out = variance > 0 ? std::min(out, 1 / std::sqrt(variance)) : 0;  // 0: the data know nothing of it
+    if (!(variance > 0)) break;
   }
   return out;
 }

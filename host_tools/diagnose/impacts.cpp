@@ -24,15 +24,18 @@ struct Count {
 };
 
 /// Dry friction turns somewhere between the samples about a reversal, so that what one sample has of it says nothing: a
-/// straight line between those before and after.
+/// straight line between those before and after. Where the velocity changes its sign for longer, the joint rests.
 void bridge_reversals(VectorXd& error, const VectorXd& dq) {
-  const Index count = error.size();
-  for (Index k = 1; k + 1 < count; ++k) {
-    if (dq[k - 1] * dq[k + 1] > 0) continue;
+  constexpr Index longest = 4;  // samples; two see a reversal, and noise may turn the velocity once more
+  const auto turns = [&](Index k) { return k + 1 < dq.size() && dq[k - 1] * dq[k + 1] < 0; };
+  for (Index k = 1; k + 1 < error.size(); ++k) {
+    if (!turns(k)) continue;
     Index end = k + 1;
-    while (end + 1 < count && dq[end - 1] * dq[end + 1] <= 0) ++end;
-    const double step = (error[end] - error[k - 1]) / static_cast<double>(end - k + 1);
-    for (Index i = k; i < end; ++i) error[i] = error[i - 1] + step;
+    while (turns(end)) ++end;
+    if (end - k <= longest && end < error.size()) {
+      const double step = (error[end] - error[k - 1]) / static_cast<double>(end - k + 1);
+      for (Index i = k; i < end; ++i) error[i] = error[i - 1] + step;
+    }
     k = end;
   }
 }

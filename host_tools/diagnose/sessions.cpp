@@ -45,19 +45,19 @@ Index thinning(const ProcessedLog& log, const SessionOptions& options) {
   return std::max<Index>(1, static_cast<Index>(1 / (log.step_s * needed) + 1e-9));
 }
 
-/// Rows of all logs at one interval, the slowest log's: the noise's colour is learned from some and applied to others.
+/// Rows of all logs at one interval, as near as their samples allow: the noise's colour is learned from some and
+/// applied to others. It is a multiple of the slowest log's, and no shorter than an eighth of what a log asks for.
 void keep_alike_rows(std::vector<SessionLog>& logs, const SessionOptions& options) {
-  double slowest_s = 0, cutoff = 0;
+  double slowest_s = 0, cutoff = 0, asked_s = 0;
   for (const SessionLog& entry : logs) {
     slowest_s = std::max(slowest_s, entry.log.step_s);
     cutoff = std::max(cutoff, entry.log.filter.torque_cutoff_hz);
+    asked_s = std::max(asked_s, entry.log.step_s * static_cast<double>(entry.log.decimation / 8));
   }
-  const Index samples = std::max<Index>(1, whole(1 / (slowest_s * options.rows_per_period * cutoff)));
+  const Index of_band = whole(1 / (slowest_s * options.rows_per_period * cutoff));
+  const Index samples = std::max({Index{1}, of_band, whole_up(asked_s / slowest_s)});
   const double interval_s = static_cast<double>(samples) * slowest_s;
-  for (SessionLog& entry : logs) {
-    const Index own = entry.log.decimation;  // never less, where the project asks for few rows
-    entry.log.decimation = std::max<Index>(own > 8 ? own / 8 : 1, std::lround(interval_s / entry.log.step_s));
-  }
+  for (SessionLog& entry : logs) entry.log.decimation = std::max<Index>(1, std::lround(interval_s / entry.log.step_s));
 }
 
 bool any(const std::vector<bool>& joints) { return std::find(joints.begin(), joints.end(), true) != joints.end(); }

@@ -194,7 +194,10 @@ Choice Search::unite(Choice best) {
       if (!is_better_held_out(tried->groups, best.groups, j)) continue;
       // What stood in for a part of it (a ripple, at reversals) is not needed any more.
       const std::size_t law = tried->groups.back();
-      best = pruned(std::move(*tried), law);
+      const double least = best.score + threshold(law);
+      best = std::move(*tried);
+      if (!best.possible()) continue;
+      if (Choice less = pruned(best, law); less.score > least) best = std::move(less);
     }
   }
   return best;

@@ -413,9 +413,9 @@ inline WholeAndRest<BoundedNumbers::Of<Quantity::unit>> split_count(BoundedNumbe
   return {parts.whole, {{parts.rest, parts.rest, x.value.error}}};
 }
 
-/// A free curve over an interval: weights are never negative and always add up to 3/2, so the curve is between 3/2 of
-/// the least and of the largest height whose bump reaches the interval. It is no steeper than 3/2 of the largest
-/// difference between neighbours a knot distance.
+/// A free curve over an interval: weights are not negative (but by rounding) and always add up to 3/2, so the curve is
+/// between 3/2 of the least and of the largest height whose bump reaches the interval. It is no steeper than 3/2 of the
+/// largest difference between neighbours a knot distance.
 template <>
 struct Curve<BoundedNumbers> {
   Bound x{}, factor{1, 1, 0};

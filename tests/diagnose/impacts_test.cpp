@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/support/random.hpp"
 #include "tests/diagnose/small_log.hpp"
 
 namespace fxdyn::diagnosis {
@@ -50,8 +51,23 @@ TEST_F(ImpactsTest, AreNoneWhereTheVelocityTurns) {
     return out;
   };
   const ProcessedLog train = turning(Role::train, 1);
-  EXPECT_GT((train.tau - log(Role::train, 1).tau).col(joint).sum(), 10) << "turns often enough to be seen";
+  EXPECT_GT((train.tau - log(Role::train, 1).tau).col(joint).sum(), 2 * 18) << "as many impacts would be seen";
   EXPECT_FALSE(find({train, turning(Role::validate, 2)}, {log(Role::baseline, 3)})[joint]);
+}
+
+// Its velocity is noise, which turns all the time.
+TEST_F(ImpactsTest, AreFoundOnAJointThatRests) {
+  const auto resting = [this](Role role, std::uint64_t seed, double size) {
+    ProcessedLog out = log(role, seed);
+    Random random(seed);
+    for (Index k = 0; k < out.samples(); ++k) out.q(k, joint) = 0.3 + 1e-6 * random.normal();
+    out.tau = predict(model_, out);
+    for (double& tau : out.tau.reshaped()) tau += 0.05 * random.normal();
+    for (Index k = 100; k < out.samples(); k += 125) out.tau(k, joint) += size;
+    return out;
+  };
+  const std::vector<ProcessedLog> now{resting(Role::train, 1, 2), resting(Role::validate, 2, 2)};
+  EXPECT_TRUE(find(now, {resting(Role::baseline, 3, 0)})[joint]);
 }
 
 TEST_F(ImpactsTest, AreNoneInNoise) {

@@ -157,6 +157,14 @@ TEST_F(SearchOfEffects, OneLawTakesThePlaceOfThoseThatItUnites) {
   EXPECT_GT(choice.score, problem_->groups().empty() ? 0 : Search(*problem_, {}).evaluate({}).score + 25);
 }
 
+TEST_F(SearchOfEffects, ALawThatIsNotToBeTriedLeavesThePlaceToItsParts) {
+  task_.never = {{"lugre", 1, {}}};
+  const Choice choice = run(1, {test::effect("lugre", {0.014, 0.2, 0.7}, {6, 30})},
+                            {{"presliding", 1, {0.005}}, {"presliding", 1, {0.015}}, {"stribeck", 1, {0.1}}});
+  EXPECT_EQ(names(choice).find("lugre"), std::string::npos) << names(choice);
+  EXPECT_NE(names(choice).find("presliding"), std::string::npos) << names(choice);
+}
+
 TEST_F(SearchOfEffects, OneOfTheUnitedStaysWhereTheOtherDoesNotShow) {
   const Choice choice = run(1, {test::effect("stribeck", {0.2}, {1.5})}, stribeck_grid);
   ASSERT_EQ(choice.groups.size(), 1U) << names(choice);

@@ -133,6 +133,26 @@ TEST(Curve, IsTwiceContinuouslyDifferentiable) {
   for (int knot = 1; knot < 9; ++knot) EXPECT_NEAR(second(knot - 1.1 * h), second(knot + 1.1 * h), 0.01) << knot;
 }
 
+// What BoundedNumbers take for granted (host_tools/numbers/bounded.hpp).
+TEST(Curve, WeightsInFixedPointAreWithinThreeUnitsAndAddUpToThreeHalves) {
+  const auto bump = [](double d) {
+    const double far = std::fabs(d);
+    return far <= 1 ? 1 - 1.5 * far * far + 0.75 * far * far * far : std::pow(std::max(2 - far, 0.0), 3) / 4;
+  };
+  const std::int32_t last = static_cast<std::int32_t>(curve_pieces) << argument_bits;
+  for (std::int32_t raw = 0; raw <= last; raw += 99'991) {
+    const Curve<Fixed32> curve = Curve<Fixed32>::at({raw});
+    const double x = std::ldexp(static_cast<double>(raw), -argument_bits);
+    std::int64_t sum = 0;
+    for (std::size_t i = 0; i < curve.weights.size(); ++i) {
+      const double exact = bump(x + 1 - static_cast<double>(curve.first + i));
+      EXPECT_NEAR(std::ldexp(curve.weights[i].raw, -unit_bits), exact, std::ldexp(3, -unit_bits)) << x << ' ' << i;
+      sum += curve.weights[i].raw;
+    }
+    EXPECT_EQ(sum, std::int64_t{3} << (unit_bits - 1)) << x;
+  }
+}
+
 TEST(Curve, SumsTheBumpsThatAreNotZeroBitForBitAndBoundsHold) {
   Random random(5);
   const Formats all = formats();
