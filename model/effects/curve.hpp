@@ -32,8 +32,8 @@ struct Curve {
     const Unit<N> quarter = narrow(half_of(half_of(one + Unit<N>{})));
     const Unit<N> square = narrow(x * x);
     const Unit<N> foot = narrow(half_of(half_of(square * x)));
-    const auto fallen = x - square;
-    const Unit<N> bend = narrow(half_of(half_of(fallen + fallen + fallen)));
+    const Unit<N> fallen = narrow(x - square);
+    const Unit<N> bend = narrow(fallen - narrow(half_of(half_of(fallen + Unit<N>{}))));
     const Unit<N> half = narrow(half_of(square + Unit<N>{}));
     const Unit<N> thrice = narrow(foot + narrow(foot + foot));
     const Unit<N> near = narrow(narrow(one - square) + narrow(thrice - half));
@@ -42,7 +42,7 @@ struct Curve {
     return {place.whole, {left, near, far, foot}};
   }
   /// Every bump times `factor`.
-  constexpr Curve times(Unit<N> factor) const {
+  [[gnu::always_inline]] constexpr Curve times(Unit<N> factor) const {
     const auto by = [&](Unit<N> weight) { return N::template proven_narrow<Unit<N>>(weight * factor); };
     return {first, {by(weights[0]), by(weights[1]), by(weights[2]), by(weights[3])}};
   }
@@ -53,8 +53,8 @@ struct Curve {
       emit(as<Quantity::unit>, i, there ? weights[i - first] : Unit<N>{});
     }
   }
-  constexpr typename N::TorqueSum sum(Words<N> heights) const {
-    // no loop: compilers would put the weights into memory for it
+  [[gnu::always_inline]] constexpr typename N::TorqueSum sum(Words<N> heights) const {
+    // no loop and no call: compilers would put the weights into memory for it
     const auto term = [&](std::size_t k) {
       return heights.template coefficient<Quantity::unit>(first + k) * weights[k];
     };
@@ -72,7 +72,7 @@ struct Curve {
 /// reciprocal of a knot distance). Half the difference is no larger than the larger of the two, so no format has to
 /// hold more than those.
 template <class N, Quantity quantity, Quantity inverse>
-constexpr Argument<N> place_on_curve(typename N::template Of<quantity> x, Words<N> words) {
+[[gnu::always_inline]] constexpr Argument<N> place_on_curve(typename N::template Of<quantity> x, Words<N> words) {
   const auto half = half_of(x - words.template number<quantity>(0));
   const auto from_start = N::template proven_narrow<typename N::template Of<quantity>>(half);
   return N::template clamp<Argument<N>>(from_start * words.template number<inverse>(1));

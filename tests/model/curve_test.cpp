@@ -116,7 +116,8 @@ TEST(Curve, ReproducesALineAndIsConstantBeyondItsKnots) {
   for (std::size_t i = 0; i < curve_heights; ++i) line[i] = static_cast<double>(i) - 1;
   same.fill(2);
   const Parameters p(-0.5, 2.25, line), flat(-0.5, 2.25, same);  // knots every 0.25
-  for (double q = -2; q <= 3; q += 0.01) {
+  for (int k = -200; k <= 300; ++k) {
+    const double q = 0.01 * k;
     const double knots = std::min(std::max((q + 0.5) / 0.25, 0.0), 9.0);
     EXPECT_NEAR(real<PositionCurve>(p, q), 1.5 * knots, 1e-12) << q;
     EXPECT_NEAR(real<PositionCurve>(flat, q), 3, 1e-14) << q;
