@@ -166,7 +166,7 @@ void Outcome::look_again(const std::vector<SessionLog>& logs) {
   });
 }
 
-Outcome explore(Models models, const std::vector<SessionLog>& logs, const SearchTask& task, int passes,
+Outcome explore(const Models& models, const std::vector<SessionLog>& logs, const SearchTask& task, int passes,
                 Progress& progress) {
   Outcome out = around(models, colours(models, logs));
   for (int pass = 0; pass < passes; ++pass) {

@@ -30,7 +30,7 @@ struct Outcome {
 
 /// Search, name, fit again around what was named; again where that left structure or found several effects.
 /// @param passes at most
-Outcome explore(Models models, const std::vector<SessionLog>& logs, const SearchTask& task, int passes,
+Outcome explore(const Models& models, const std::vector<SessionLog>& logs, const SearchTask& task, int passes,
                 Progress& progress);
 /// One such pass around an outcome in which the rival of a finding is in that finding's place.
 Outcome explore_rival(const Outcome& outcome, const Finding& finding, const std::vector<SessionLog>& logs,

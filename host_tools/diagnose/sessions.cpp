@@ -52,7 +52,8 @@ void keep_alike_rows(std::vector<SessionLog>& logs, const SessionOptions& option
   for (const SessionLog& entry : logs) {
     slowest_s = std::max(slowest_s, entry.log.step_s);
     cutoff = std::max(cutoff, entry.log.filter.torque_cutoff_hz);
-    asked_s = std::max(asked_s, entry.log.step_s * static_cast<double>(entry.log.decimation / 8));
+    const Index eighth = entry.log.decimation / 8;
+    asked_s = std::max(asked_s, entry.log.step_s * static_cast<double>(eighth));
   }
   const Index of_band = whole(1 / (slowest_s * options.rows_per_period * cutoff));
   const Index samples = std::max({Index{1}, of_band, whole_up(asked_s / slowest_s)});
