@@ -125,7 +125,7 @@ ordered_json range_of(const JointRange& range) {
                       {"mean", ordered_json::array()},
                       {"std", ordered_json::array()},
                       {"correlation", ordered_json::array()},
-                      {"radius", std::sqrt(chi_squared_90(open.size()))}};
+                      {"radius", std::sqrt(squared_radius_90(open.size(), range.freedom))}};
   for (const std::size_t i : open) {
     const auto a = static_cast<Eigen::Index>(i);
     ordered_json row = ordered_json::array();
@@ -187,8 +187,7 @@ void write_isaaclab(const SimpleRobot& robot, const std::filesystem::path& file)
           assignment("ARMATURE", "rotor and gears [kg*m^2]", armature) +
           assignment("FRICTION", "dry friction [N*m]", friction) +
           assignment("VISCOUS_FRICTION", "[N*m*s/rad]", viscous) +
-          assignment("RANGES", "of friction alone: what the logs leave open; radius: 90 % of a normal distribution",
-                     ranges);
+          assignment("RANGES", "of friction alone: what the logs leave open; radius: 90 %, of Student's t", ranges);
   write_file(file, text + fmt::format(tail));
 }
 

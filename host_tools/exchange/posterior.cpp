@@ -1,7 +1,6 @@
 #include "host_tools/exchange/posterior.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "host_tools/identify/identify.hpp"
@@ -126,16 +125,33 @@ std::vector<JointRange> joint_ranges(const Project& project, const IdentifiedMod
   for (std::size_t j = 0; j < mean.size(); ++j) {
     const Index own = solution.theta[j].size();
     out.push_back({Eigen::Vector3d(mean[j].damping, mean[j].friction, mean[j].armature),
-                   slope[j] * solution.covariance.block(at, at, own, own) * slope[j].transpose()});
+                   slope[j] * solution.covariance.block(at, at, own, own) * slope[j].transpose(), solution.freedom[j]});
     at += own;
   }
   return out;
 }
 
-double chi_squared_90(std::size_t numbers) {
-  // Abramowitz and Stegun 1964, table 26.8
-  constexpr std::array quantile{0.0, 2.70554345, 4.60517019, 6.25138863};
-  return quantile.at(numbers);
+double squared_radius_90(std::size_t numbers, double freedom) {
+  // u = tan(phi)^2 nu / k has Fisher's density: the share within phi is the integral of sin^(k-1) cos^(nu-1), from 0 to
+  // pi/2 half a beta function (Abramowitz and Stegun 1964, 26.6 and 6.2.1).
+  constexpr int pieces = 200;  // Simpson's rule: the radius to 1e-6
+  if (numbers == 0) return 0;
+  const auto k = static_cast<double>(numbers);
+  const double nu = std::max(freedom, 1.0);
+  const auto density = [&](double phi) { return std::pow(std::sin(phi), k - 1) * std::pow(std::cos(phi), nu - 1); };
+  const auto within = [&](double phi) {
+    const double step = phi / pieces;
+    double sum = density(0) + density(phi);
+    for (int i = 1; i < pieces; ++i) sum += (i % 2 == 1 ? 4 : 2) * density(i * step);
+    return sum * step / 3;
+  };
+  const double wanted = 0.9 * 0.5 * std::beta(k / 2, nu / 2);
+  double low = 0, high = std::atan(40 / std::sqrt(nu));  // the largest radius, of k = 3 and nu = 1, is 12.7
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (within(middle) < wanted ? low : high) = middle;
+  }
+  return nu * std::pow(std::tan(low), 2);
 }
 
 }  // namespace fxdyn

@@ -21,7 +21,9 @@ std::vector<JointRange> joint_ranges(const Project& project, const IdentifiedMod
                                      std::vector<ProcessedLog> train);
 
 /// Squared radius of the ellipsoid x^T Cov^-1 x <= radius^2 that holds a normal vector of 1, 2 or 3 numbers with a
-/// probability of 90 %: the quantile of chi squared with so many degrees of freedom.
-double chi_squared_90(std::size_t numbers);
+/// probability of 90 %, where Cov is an estimate with so many degrees of freedom: k times the 90 % quantile of Fisher's
+/// F with k and `freedom` (Hotelling 1931). The quantile of chi squared, its limit, belongs to a covariance that is
+/// known.
+double squared_radius_90(std::size_t numbers, double freedom);
 
 }  // namespace fxdyn

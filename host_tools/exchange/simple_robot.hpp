@@ -29,6 +29,8 @@ struct JointRange {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   /// A number whose variance is 0 is at its bound of 0, or not fitted.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  /// Degrees of freedom of the estimate of the covariance.
+  double freedom = 0;
 };
 
 /// A robot in a simulator's terms.

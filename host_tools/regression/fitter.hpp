@@ -36,6 +36,7 @@ struct Solution {
   std::vector<double> sign_width_std;
   std::vector<std::vector<std::vector<double>>> shape_std;  ///< [joint][effect][shape], 0: not estimated
   Eigen::MatrixXd covariance;                               ///< of x (NormalEquations)
+  std::vector<double> freedom;                              ///< per joint: degrees of freedom of its estimate
 };
 
 /// The normal equations X^T W X x = X^T W y of a fit, x = [beta; theta of joint 1; theta of joint 2; ..].

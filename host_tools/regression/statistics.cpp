@@ -122,6 +122,9 @@ class NoiseOfJoint {
     noise_ = residual_ + taken;
     spread_out();
   }
+  /// Degrees of freedom of the estimated spectrum, N / (sum over all lags of the taper's square) (Blackman and Tukey
+  /// 1958; Percival and Walden 1993, section 6.10): the middle scatters like chi squared with so many.
+  double freedom() const { return freedom_; }
   MatrixXd middle() const {
     MatrixXd out = MatrixXd::Zero(stretches_[0].x.cols(), stretches_[0].x.cols());
     for (const Stretch& s : stretches_) out += s.x.transpose() * s.around;
@@ -132,13 +135,15 @@ class NoiseOfJoint {
   void spread_out() {
     // flat to where it has faded, then down to zero over as many lags
     const Index lags = std::min(noise_.size(), 2 * (last_correlated(noise_, rows_) + 1));
-    VectorXd tapered = noise_.head(lags);
+    VectorXd taper(lags);
     for (Index lag = 0; lag < lags; ++lag)
-      tapered[lag] *= std::min(1.0, 2 * (1 - static_cast<double>(lag) / static_cast<double>(lags)));
+      taper[lag] = std::min(1.0, 2 * (1 - static_cast<double>(lag) / static_cast<double>(lags)));
+    const VectorXd tapered = taper.cwiseProduct(noise_.head(lags));
+    freedom_ = rows_ / (2 * taper.squaredNorm() - 1);
     for (Stretch& s : stretches_) s.around = correlated(s.x, tapered);
   }
   std::vector<Stretch> stretches_;
-  double weight_, rows_;
+  double weight_, rows_, freedom_ = 0;
   VectorXd residual_, noise_;  ///< autocorrelation at lags 0, 1, ..
 };
 
@@ -182,6 +187,7 @@ void Fitter::add_standard_deviations(Solution& solution) const {
   std::vector<std::vector<Index>> columns(joints());  // of each joint, among all unknowns
   std::vector<MatrixXd> middles(joints());
   std::vector<double> bread(joints(), 1.0);
+  solution.freedom.assign(joints(), 0.0);
   double train_rows = 0;
   for (std::size_t l = 0; l < logs().size(); ++l)
     train_rows += logs()[l].role == Role::train ? static_cast<double>(logs()[l].rows()) : 0;
@@ -216,6 +222,7 @@ void Fitter::add_standard_deviations(Solution& solution) const {
     if (robust_ && untouched > 0) bread[j] = weights / static_cast<double>(untouched);
     noise[j].emplace(std::move(stretches), weights_[static_cast<Index>(j)], rows, lags);
     middles[j] = noise[j]->middle();
+    solution.freedom[j] = noise[j]->freedom();
     if (!correcting) noise[j].reset();  // a long log's rows are not held for all joints
   });
   const MatrixXd inverse = SymmetricSolver(all.information).inverse();
@@ -229,6 +236,7 @@ void Fitter::add_standard_deviations(Solution& solution) const {
     parallel_for(joints(), [&](std::size_t j) {
       noise[j]->correct(inverse(columns[j], columns[j]), covariance(columns[j], columns[j]));
       middles[j] = noise[j]->middle();
+      solution.freedom[j] = noise[j]->freedom();
     });
     covariance = sandwich();
   }

@@ -88,7 +88,7 @@ Joints judged(std::uint64_t seed) {
     const Eigen::VectorXd off = (ranges[j].mean - truth).head(numbers);
     const Eigen::MatrixXd known = ranges[j].covariance.topLeftCorner(numbers, numbers);
     const double distance = off.dot(known.ldlt().solve(off));
-    out.inside += distance <= chi_squared_90(static_cast<std::size_t>(numbers)) ? 1 : 0;
+    out.inside += distance <= squared_radius_90(static_cast<std::size_t>(numbers), ranges[j].freedom) ? 1 : 0;
     ++out.all;
   }
   return out;
@@ -100,10 +100,10 @@ Joints judged(std::uint64_t seed) {
 int main(int argc, char** argv) {
   CLI::App app("How often the 90 % sets of a joint's numbers hold the true ones.");
   std::size_t robots = 1000;
-  std::uint64_t seed = 5000;
+  std::uint64_t seed = 13000;
   double lowest = 0.88, highest = 0.92;
   app.add_option("--robots", robots, "as many are drawn");
-  app.add_option("--seed", seed, "of the first; the estimate of the noise was chosen on 1000 .. 1999");
+  app.add_option("--seed", seed, "of the first; 1000 .. 1999 and 10000 .. 12999 chose how the sets are made");
   app.add_option("--lowest", lowest, "share of the joints, at least");
   app.add_option("--highest", highest, "share of the joints, at most");
   CLI11_PARSE(app, argc, argv);
