@@ -8,6 +8,7 @@
 
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/exchange/load_friction.hpp"
 #include "host_tools/regression/metrics.hpp"
 #include "host_tools/support/error.hpp"
 
@@ -32,12 +33,12 @@ Eigen::MatrixXd as_recorded(const Eigen::MatrixXd& tau, const IdentifiedModel& m
   return model.filter.torque_lead_s == 0 ? tau : at_other_times(tau, model.filter.torque_lead_s / log.step_s);
 }
 
-void add_log(Totals& sum, const ExportFormat& format, const std::filesystem::path& file, const IdentifiedModel& meant,
-             const IdentifiedModel& model, const ProcessedLog& log) {
+void add_log(Totals& sum, const ExportFormat& format, const std::filesystem::path& file, const SimpleRobot& meant,
+             const IdentifiedModel& expected, const IdentifiedModel& model, const ProcessedLog& log) {
   const MotionRows motion = log.motion();
-  const ReplayedTorque replayed = format.replay(file, meant, motion, log.step_s);
+  const ReplayedTorque replayed = format.replay(file, expected, motion, log.step_s);
   const Eigen::MatrixXd said =
-      format.whole_model ? settled(meant, motion) : predict(meant, motion.q, motion.dq, motion.ddq, log.step_s);
+      format.whole_model ? settled(model, motion) : torque_of(meant, model, motion, log.step_s);
   const Eigen::MatrixXd full = predict(model, log), written = as_recorded(replayed.tau, model, log);
   const std::vector<JointMetrics> of_file = judge(log, written), of_model = judge(log, full);
   const Eigen::Index count = log.last - log.first;
@@ -72,7 +73,7 @@ Certificate certify(const ExportFormat& format, const std::filesystem::path& fil
   Totals sum(static_cast<Eigen::Index>(meant.joints.size()));
   const IdentifiedModel simple = format.whole_model ? model : as_model(meant, model);
   for (const ProcessedLog& log : logs) {
-    add_log(sum, format, file, simple, model, log);
+    add_log(sum, format, file, meant, simple, model, log);
     out.logs.push_back(log.name);
   }
   for (std::size_t j = 0; j < meant.joints.size(); ++j) {
@@ -81,8 +82,8 @@ Certificate certify(const ExportFormat& format, const std::filesystem::path& fil
     joint.name = meant.robot.joints[j].name;
     joint.unit = meant.robot.joints[j].torque_unit();
     if (!format.whole_model) joint.written = meant.joints[j];
-    joint.left_out =
-        format.whole_model ? settled_effects(model, j) : left_out(model, j, format.has_armature, format.has_stribeck);
+    joint.left_out = format.whole_model ? settled_effects(model, j)
+                                        : left_out(model, j, format.has_armature, format.has_stribeck, format.has_load);
     joint.cannot_say = std::sqrt(sum.cannot_say[k] / sum.samples);
     joint.file_rmse = std::sqrt(sum.file[k] / sum.samples);
     joint.model_rmse = std::sqrt(sum.model[k] / sum.samples);

@@ -7,6 +7,7 @@
 
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/exchange/certificate.hpp"
+#include "host_tools/exchange/load_friction.hpp"
 #include "host_tools/exchange/posterior.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
 #include "host_tools/project/project.hpp"
@@ -74,6 +75,7 @@ std::string export_for_simulators(Pipeline& pipeline, const std::vector<std::str
     SimpleRobot simple = format.whole_model
                              ? SimpleRobot{model.robot, std::vector<SimpleJoint>(model.robot.size()), {}}
                              : simple_robot(model, links, format.has_armature, train, {}, format.has_stribeck);
+    if (format.has_load) fit_load_friction(simple, model, train);
     simple.urdf = pipeline.project().urdf;
     if (format.has_ranges) simple.ranges = joint_ranges(pipeline.project(), model, train);
     const fs::path file = pipeline.directory() / format.file;

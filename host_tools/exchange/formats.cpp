@@ -19,14 +19,15 @@ std::span<const ExportFormat> export_formats() {
                    "simulator.sdf", "libsdformat", false, write_sdf, replay_sdf},
       ExportFormat{"isaaclab",
                    "Isaac Lab and mjlab: actuators in Python, with ranges to randomise them; bodies as URDF",
-                   "simulator_isaaclab.py", own_reader, true, write_isaaclab, replay_isaaclab, false, true},
-      ExportFormat{"bam", "BAM: friction models m1 and m2 of each joint as JSON; bodies as URDF", "simulator_bam.json",
-                   own_reader, true, write_bam, replay_bam, true},
+                   "simulator_isaaclab.py", own_reader, true, write_isaaclab, replay_isaaclab, false, false, true},
+      ExportFormat{"bam", "BAM: friction models m1 to m6 of each joint as JSON; bodies as URDF", "simulator_bam.json",
+                   own_reader, true, write_bam, replay_bam, true, true},
       ExportFormat{"usd", "USD: a layer with PhysX joint friction and armature; bodies as URDF", "simulator_usd.usda",
                    own_reader, true, write_usd, replay_usd},
       ExportFormat{"inverse_dynamics_solver",
                    "ROS 2: a plug-in of inverse_dynamics_solver with the whole model, from the drive's tables",
-                   "inverse_dynamics_solver", own_reader, true, write_solver_package, replay_tables, true, false, true},
+                   "inverse_dynamics_solver", own_reader, true, write_solver_package, replay_tables, true, true, false,
+                   true},
   };
   return all;
 }

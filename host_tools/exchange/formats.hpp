@@ -33,6 +33,7 @@ struct ExportFormat {
   ReplayedTorque (*replay)(const std::filesystem::path& file, const IdentifiedModel& expected, const MotionRows& motion,
                            double step_s);
   bool has_stribeck = false;  ///< it knows more dry friction at low speed
+  bool has_load = false;      ///< it knows friction that grows with the load
   bool has_ranges = false;    ///< it says what the logs leave open: SimpleRobot::ranges are asked for
   /// It holds the model as the drive's tables have it: SimpleRobot has names only, and replay() expects the model
   /// itself.

@@ -4,8 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/exchange/load_friction.hpp"
 #include "host_tools/support/error.hpp"
 
 namespace fxdyn {
@@ -30,7 +30,7 @@ ReplayedTorque replay_joints(const std::filesystem::path& file, std::vector<Simp
       throw DataError(fmt::format("{}: joint {} is not '{}'", bodies.string(), j + 1, name));
   }
   ReplayedTorque out;
-  out.tau = predict(as_model(found, expected), motion.q, motion.dq, motion.ddq, step_s);
+  out.tau = torque_of(found, expected, motion, step_s);
   out.sliding = (motion.dq.array() != 0).cast<double>();
   return out;
 }

@@ -171,12 +171,12 @@ SimpleRobot simple_robot(const IdentifiedModel& model, const Robot& bodies, bool
   return out;
 }
 
-std::vector<std::string> left_out(const IdentifiedModel& model, std::size_t joint, bool has_armature,
-                                  bool has_stribeck) {
+std::vector<std::string> left_out(const IdentifiedModel& model, std::size_t joint, bool has_armature, bool has_stribeck,
+                                  bool has_load) {
   std::vector<std::string> out;
   const auto said = [&](const std::string& name) {
     return name == "viscous" || name == "coulomb" || (has_armature && name == "rotor_inertia") ||
-           (has_stribeck && name == "stribeck");
+           (has_stribeck && name == "stribeck") || (has_load && name == "load_friction");
   };
   for (const EffectFit& fit : model.joints.at(joint).effects) {
     if (!said(fit.effect)) out.push_back(fit.effect);

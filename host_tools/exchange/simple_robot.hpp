@@ -12,6 +12,19 @@
 
 namespace fxdyn {
 
+/// Dry friction that grows with the torques on the gear, as BAM has it in m3 to m6 (bam/model.py). With the motor's
+/// torque m, the external torque e (gravity and Coriolis, minus what the bodies ask of the joint without acceleration)
+/// and bell = exp(-(dq / stribeck_velocity)^2) the joint has this more of it:
+///   |external e - motor m| + bell |external_stribeck e - motor_stribeck m|, and, where e and m have opposite signs,
+///   + bell external_quad e^2 where |e| < |m|, + bell motor_quad m^2 where |e| > |m|.
+/// In m3 and m4 the coefficients of m and e are the same.
+struct GearFriction {
+  int model = 0;                                     ///< 3 .. 6; 0: none
+  double motor = 0, external = 0;                    ///< [-]
+  double motor_stribeck = 0, external_stribeck = 0;  ///< [-]
+  double motor_quad = 0, external_quad = 0;          ///< [1/(N*m) | 1/N]
+};
+
 /// What the joints of simulators know of friction, at the output of the gear:
 /// tau = armature ddq + damping dq + (friction + stribeck exp(-(dq / stribeck_velocity)^2)) sign(dq).
 struct SimpleJoint {
@@ -21,6 +34,7 @@ struct SimpleJoint {
   double effort = 0;             ///< the drive's limit, 0: not known [N*m | N]
   double stribeck = 0;           ///< more dry friction at low speed; 0 in formats that don't know it [N*m | N]
   double stribeck_velocity = 0;  ///< 0 without [rad/s | m/s]
+  GearFriction load{};           ///< of formats that know it
 };
 
 /// What the logs leave open of a joint's damping, friction and armature, in this order and in the units of SimpleJoint.
@@ -79,6 +93,6 @@ IdentifiedModel as_model(const SimpleRobot& simple, IdentifiedModel model);
 
 /// Effects of a joint, and of the whole body, that a simple robot has no word for. ("bls": the learned part.)
 std::vector<std::string> left_out(const IdentifiedModel& model, std::size_t joint, bool has_armature,
-                                  bool has_stribeck = false);
+                                  bool has_stribeck = false, bool has_load = false);
 
 }  // namespace fxdyn

@@ -125,7 +125,7 @@ def isaaclab_joint(names, joint):
     assert len(found) == 1, f'{joint}: {len(found)} actuators'
     cfg = found[0]
     assert cfg.stiffness == 0 and cfg.damping == 0 and cfg.friction >= cfg.dynamic_friction
-    return lambda dq, ddq: cfg.armature * ddq + cfg.dynamic_friction * sign(dq) + cfg.viscous_friction * dq
+    return lambda dq, ddq, *_: cfg.armature * ddq + cfg.dynamic_friction * sign(dq) + cfg.viscous_friction * dq
 
 
 def mjlab_joint(names, joint):
@@ -133,19 +133,41 @@ def mjlab_joint(names, joint):
     found = [a for a in names['mjlab_actuators']() if any(re.fullmatch(e, joint) for e in a.target_names_expr)]
     assert len(found) == 1, f'{joint}: {len(found)} actuators'
     cfg = found[0]
-    return lambda dq, ddq: cfg.armature * ddq + cfg.frictionloss * sign(dq) + cfg.viscous_damping * dq
+    return lambda dq, ddq, *_: cfg.armature * ddq + cfg.frictionloss * sign(dq) + cfg.viscous_damping * dq
+
+
+def bam_friction(said, motor, external, dq):
+    """bam/model.py: frictionloss and viscous friction, both against the motion [N m]."""
+    bell = math.exp(-abs(dq / said['dtheta_stribeck']) ** said['alpha']) if 'alpha' in said else 0
+    loss = said['friction_base'] + bell * said.get('friction_stribeck', 0) + said['friction_viscous'] * abs(dq)
+    if said['model'] in ('m3', 'm4'):
+        loss += (said['load_friction_base'] + bell * said.get('load_friction_stribeck', 0)) * abs(external - motor)
+    if said['model'] in ('m5', 'm6'):
+        loss += abs(external * said['load_friction_external'] - motor * said['load_friction_motor'])
+        loss += bell * abs(external * said['load_friction_external_stribeck'] - motor * said['load_friction_motor_stribeck'])
+    if said['model'] == 'm6' and sign(external) != sign(motor):
+        if abs(external) < abs(motor):
+            loss += bell * said['load_friction_external_quad'] * external ** 2
+        else:
+            loss += bell * said['load_friction_motor_quad'] * motor ** 2
+    return loss
 
 
 def bam_joint(path, joint):
-    """bam/model.py: frictionloss = base (+ stribeck exp(-|dq/v|^alpha)), against the motion with viscous |dq|."""
+    """The motor's torque moves body and rotor against friction, which grows with the motor's torque in m3 to m6: by
+    bisection. External is the torque of gravity and velocity, as bam/mujoco.py has it."""
     said = json.loads(path.read_text())[joint]
-    assert said['model'] in ('m1', 'm2')
+    assert said['model'] in ('m1', 'm2', 'm3', 'm4', 'm5', 'm6')
 
-    def torque(dq, ddq):
-        loss = said['friction_base']
-        if said['model'] == 'm2':
-            loss += said['friction_stribeck'] * math.exp(-abs(dq / said['dtheta_stribeck']) ** said['alpha'])
-        return said['armature'] * ddq + sign(dq) * (loss + said['friction_viscous'] * abs(dq))
+    def torque(dq, ddq, body, still):
+        low, high = -1e4, 1e4
+        for _ in range(60):
+            motor = (low + high) / 2
+            if motor - body - said['armature'] * ddq < sign(dq) * bam_friction(said, motor, -still, dq):
+                low = motor
+            else:
+                high = motor
+        return motor - body
     return torque
 
 
@@ -155,5 +177,5 @@ def usd_joint(path, joint):
     value = lambda name: float(re.search(r'physxJointAxis:angular:%s = (\S+)' % name, block).group(1))
     assert value('staticFrictionEffort') >= value('dynamicFrictionEffort')
     assert float(re.search(r'drive:angular:physics:damping = (\S+)', block).group(1)) == 0
-    return lambda dq, ddq: (value('armature') * ddq + value('dynamicFrictionEffort') * sign(dq) +
+    return lambda dq, ddq, *_: (value('armature') * ddq + value('dynamicFrictionEffort') * sign(dq) +
                             value('viscousFrictionCoefficient') * math.degrees(dq))

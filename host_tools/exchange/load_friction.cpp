@@ -1,0 +1,220 @@
+#include "host_tools/exchange/load_friction.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/identified_model.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::ArrayXd;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+double bell_of(const SimpleJoint& said, double dq) {
+  return said.stribeck_velocity > 0 ? std::exp(-std::pow(dq / said.stribeck_velocity, 2)) : 0;
+}
+
+double loss_of(const GearFriction& load, double motor, double external, double bell) {
+  double out = std::fabs(load.external * external - load.motor * motor) +
+               bell * std::fabs(load.external_stribeck * external - load.motor_stribeck * motor);
+  if (motor * external >= 0) return out;
+  if (std::fabs(external) < std::fabs(motor)) out += bell * load.external_quad * external * external;
+  if (std::fabs(external) > std::fabs(motor)) out += bell * load.motor_quad * motor * motor;
+  return out;
+}
+
+/// The motor also drives this friction: motor = torque + sign(dq) loss(motor), by iteration, as the loss grows by less
+/// than the motor's torque.
+double with_load(const SimpleJoint& said, double torque, double external, double dq) {
+  const double bell = bell_of(said, dq), sign = dq > 0 ? 1 : dq < 0 ? -1 : 0;
+  double motor = torque;
+  for (int i = 0; i < 200; ++i) {
+    const double next = torque + sign * loss_of(said.load, motor, external, bell);
+    if (std::fabs(next - motor) <= 1e-12 * (1 + std::fabs(torque))) return next;
+    motor = next;
+  }
+  return motor;
+}
+
+/// What bodies get from gravity and velocity: minus the joints' torque without acceleration and friction.
+MatrixXd external_torque(SimpleRobot simple, const IdentifiedModel& model, const MotionRows& motion, double step_s) {
+  simple.joints.assign(simple.joints.size(), {});
+  const MatrixXd still = MatrixXd::Zero(motion.q.rows(), motion.q.cols());
+  return -predict(as_model(simple, model), motion.q, motion.dq, still, step_s);
+}
+
+bool any_load(const SimpleRobot& simple) {
+  return std::any_of(simple.joints.begin(), simple.joints.end(),
+                     [](const SimpleJoint& joint) { return joint.load.model > 0; });
+}
+
+/// Rows of one joint in which it slides.
+struct Sliding {
+  ArrayXd dq, motor, external, friction, bell;  ///< friction: against the motion
+
+  Index rows() const { return dq.size(); }
+};
+
+/// Number of each coefficient among the unknowns; `low`: at low speed.
+struct At {
+  static constexpr Index base = 0, viscous = 1, stribeck = 2, external = 3, motor = 4, external_low = 5, motor_low = 6,
+                         external_quad = 7, motor_quad = 8, all = 9;
+};
+
+bool is_in(int model, Index unknown) {
+  if (unknown == At::stribeck) return model >= 4;
+  if (unknown == At::external_low || unknown == At::motor_low) return model >= 4;
+  return unknown < At::external_quad || model == 6;
+}
+
+/// Columns of the unknowns where |external e - motor m| has the sign that `last` gives it. m3 and m4: one coefficient
+/// for both torques, in the external's place.
+MatrixXd columns_of(const Sliding& at, int model, const VectorXd& last) {
+  MatrixXd out = MatrixXd::Zero(at.rows(), At::all);
+  out.col(At::base).setOnes();
+  out.col(At::viscous) = at.dq.abs();
+  const bool directional = model >= 5;
+  const auto pair = [&](Index of_external, Index of_motor, const ArrayXd& weight) {
+    if (!directional) {
+      out.col(of_external) = weight * (at.external - at.motor).abs();
+      return;
+    }
+    const ArrayXd inner = last[of_external] * at.external - last[of_motor] * at.motor;
+    const ArrayXd sign = (inner >= 0).select(ArrayXd::Ones(at.rows()), -1.0);
+    out.col(of_external) = weight * sign * at.external;
+    out.col(of_motor) = -weight * sign * at.motor;
+  };
+  pair(At::external, At::motor, ArrayXd::Ones(at.rows()));
+  if (model >= 4) {
+    out.col(At::stribeck) = at.bell;
+    pair(At::external_low, At::motor_low, at.bell);
+  }
+  if (model != 6) return out;
+  const ArrayXd opposite = (at.external * at.motor < 0).cast<double>() * at.bell;
+  out.col(At::external_quad) = opposite * (at.external.abs() < at.motor.abs()).cast<double>() * at.external.square();
+  out.col(At::motor_quad) = opposite * (at.external.abs() > at.motor.abs()).cast<double>() * at.motor.square();
+  return out;
+}
+
+/// Least squares with 0 <= x <= most, one unknown after another (Hildreth 1957).
+VectorXd bounded(const MatrixXd& columns, const VectorXd& right, const VectorXd& most) {
+  const MatrixXd gram = columns.transpose() * columns;
+  const VectorXd projection = columns.transpose() * right;
+  VectorXd x = VectorXd::Zero(columns.cols());
+  for (int round = 0; round < 20000; ++round) {
+    double moved = 0;
+    for (Index i = 0; i < x.size(); ++i) {
+      if (!(gram(i, i) > 0)) continue;
+      const double to = std::clamp(x[i] + (projection[i] - gram.row(i).dot(x)) / gram(i, i), 0.0, most[i]);
+      moved = std::max(moved, std::fabs(to - x[i]) * std::sqrt(gram(i, i)));
+      x[i] = to;
+    }
+    if (moved <= 1e-12 * right.norm()) break;
+  }
+  return x;
+}
+
+struct BamFit {
+  int model = 0;
+  VectorXd x;
+  double left = 0;  ///< squares
+};
+
+BamFit fit_bam(const Sliding& at, int model, const LoadFrictionOptions& options) {
+  VectorXd most = VectorXd::Constant(At::all, HUGE_VAL);
+  most[At::motor] = most[At::motor_low] = options.most;
+  if (model < 5) most[At::external] = most[At::external_low] = options.most;
+  for (Index i = 0; i < At::all; ++i) {
+    if (!is_in(model, i)) most[i] = 0;
+  }
+  BamFit out{model, VectorXd::Constant(At::all, options.most), 0};
+  for (int round = 0; round < 20; ++round) {  // the signs within |..| settle
+    const MatrixXd columns = columns_of(at, model, out.x);
+    const VectorXd before = out.x;
+    out.x = bounded(columns, at.friction.matrix(), most);
+    out.left = (at.friction.matrix() - columns * out.x).squaredNorm();
+    if (model < 5 || (out.x - before).norm() <= 1e-9 * out.x.norm()) break;
+  }
+  return out;
+}
+
+void say(const BamFit& fit, const EffectFit* effect, SimpleJoint& said) {
+  const VectorXd& x = fit.x;
+  said.friction = x[At::base];
+  said.damping = x[At::viscous];
+  said.stribeck = x[At::stribeck];
+  said.stribeck_velocity = effect == nullptr ? 0 : effect->shape.at(0);
+  const bool one = fit.model < 5;  // coefficient for both
+  said.load = {fit.model,           x[one ? At::external : At::motor],
+               x[At::external],     x[one ? At::external_low : At::motor_low],
+               x[At::external_low], x[At::motor_quad],
+               x[At::external_quad]};
+}
+
+Sliding sliding_rows(const SimpleRobot& simple, const IdentifiedModel& model, const std::vector<ProcessedLog>& train,
+                     std::size_t joint, double least) {
+  SimpleRobot frictionless = simple;
+  for (SimpleJoint& said : frictionless.joints) said = {0, 0, said.armature, 0};
+  IdentifiedModel whole = model;
+  whole.filter.torque_lead_s = 0;  // friction belongs to the velocity of its own sample
+  std::vector<std::array<double, 4>> rows;
+  const auto j = static_cast<Index>(joint);
+  for (const ProcessedLog& log : train) {
+    const MotionRows motion = log.motion();
+    const MatrixXd full = predict(whole, log), bodies = torque_of(frictionless, model, motion, log.step_s),
+                   external = external_torque(simple, model, motion, log.step_s);
+    for (Index k = log.first; k < log.last; ++k) {
+      const double dq = motion.dq(k, j);
+      if (std::fabs(dq) > least)
+        rows.push_back({dq, full(k, j), external(k, j), (full(k, j) - bodies(k, j)) * (dq > 0 ? 1 : -1)});
+    }
+  }
+  const auto column = [&](std::size_t c) {
+    ArrayXd out(static_cast<Index>(rows.size()));
+    for (std::size_t r = 0; r < rows.size(); ++r) out[static_cast<Index>(r)] = rows[r][c];
+    return out;
+  };
+  return {column(0), column(1), column(2), column(3), {}};
+}
+
+}  // namespace
+
+MatrixXd torque_of(const SimpleRobot& simple, const IdentifiedModel& model, const MotionRows& motion, double step_s) {
+  MatrixXd out = predict(as_model(simple, model), motion.q, motion.dq, motion.ddq, step_s);
+  if (!any_load(simple)) return out;
+  const MatrixXd external = external_torque(simple, model, motion, step_s);
+  for (Index j = 0; j < out.cols(); ++j) {
+    const SimpleJoint& said = simple.joints[static_cast<std::size_t>(j)];
+    if (said.load.model == 0) continue;
+    for (Index k = 0; k < out.rows(); ++k) out(k, j) = with_load(said, out(k, j), external(k, j), motion.dq(k, j));
+  }
+  return out;
+}
+
+void fit_load_friction(SimpleRobot& simple, const IdentifiedModel& model, const std::vector<ProcessedLog>& train,
+                       const ProjectionOptions& projection, const LoadFrictionOptions& options) {
+  for (std::size_t j = 0; j < simple.joints.size(); ++j) {
+    if (model.joints[j].find("load_friction") == nullptr) continue;
+    const double least = projection.sliding_widths * model.joints[j].sign_width;
+    Sliding rows = sliding_rows(simple, model, train, j, least);
+    if (rows.rows() < At::all) continue;  // m1 or m2, as it is
+    const EffectFit* effect = model.joints[j].find("stribeck");
+    SimpleJoint& said = simple.joints[j];
+    said.stribeck_velocity = effect == nullptr ? 0 : effect->shape.at(0);
+    rows.bell = rows.dq.unaryExpr([&](double dq) { return bell_of(said, dq); });
+    BamFit best = fit_bam(rows, effect == nullptr ? 3 : 4, options);
+    // m6 has more than m5 only at low speed, where the model knows of a Stribeck velocity
+    for (int larger = 5; larger <= (effect == nullptr ? 5 : 6); ++larger) {
+      BamFit other = fit_bam(rows, larger, options);
+      if (std::sqrt(other.left) < options.worth * std::sqrt(best.left)) best = std::move(other);
+    }
+    say(best, effect, said);
+  }
+}
+
+}  // namespace fxdyn

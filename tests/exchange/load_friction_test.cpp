@@ -1,0 +1,188 @@
+#include "host_tools/exchange/load_friction.hpp"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <nlohmann/json.hpp>
+
+#include "host_tools/exchange/certificate.hpp"
+#include "host_tools/support/error.hpp"
+#include "host_tools/support/files.hpp"
+#include "tests/support/files.hpp"
+#include "tests/support/pendulum.hpp"
+
+namespace fxdyn {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+namespace fs = std::filesystem;
+
+/// One arm that swings in a vertical plane.
+const char* const arm = R"(<robot name="arm"><link name="base"/><link name="link">
+<inertial><origin xyz="0.2 0 0"/><mass value="3"/><inertia ixx="0.02" iyy="0.05" izz="0.05" ixy="0" ixz="0" iyz="0"/></inertial>
+</link><joint name="joint" type="continuous"><parent link="base"/><child link="link"/><axis xyz="0 1 0"/></joint></robot>)";
+constexpr double mass = 3, centre = 0.2, inertia = 0.05 + mass * centre * centre, gravity = 9.81;
+
+struct Case {
+  int model;
+  GearFriction load;
+};
+
+class BamLoad : public testing::Test {
+ protected:
+  BamLoad() : urdf(test::write("arm.urdf", arm)), model(test::model_of(read_urdf(urdf))) {
+    model.joints[0].sign_width = 0.01;
+    motion = test::exact_log(model, Role::test, 4, 10);
+  }
+  void set_effects(double load, double stribeck) {
+    std::vector<EffectFit>& effects = model.joints[0].effects;
+    effects = {test::effect_fit("viscous", {}, {0.2}), test::effect_fit("coulomb", {}, {0.4}),
+               test::effect_fit("load_friction", {}, {load})};
+    if (stribeck > 0) effects.push_back(test::effect_fit("stribeck", {0.2}, {stribeck}));
+    train = test::processed({test::exact_log(model, Role::train, 1)});
+    held_out = test::processed({test::exact_log(model, Role::test, 2)});
+  }
+  SimpleRobot simple(SimpleJoint said) const { return {model.robot, {said}, urdf}; }
+  SimpleRobot fitted() const {
+    SimpleRobot out = simple_robot(model, model.robot, true, train, {}, true);
+    out.urdf = urdf;
+    fit_load_friction(out, model, train);
+    return out;
+  }
+  fs::path file() const { return test::folder() / format.file; }
+
+  const ExportFormat& format = export_format("bam");
+  fs::path urdf;
+  IdentifiedModel model;
+  Log motion;
+  std::vector<ProcessedLog> train, held_out;
+};
+
+/// frictionloss and damping of bam/model.py, from the keys of its file.
+double friction(const nlohmann::json& p, double motor, double external, double dq) {
+  const auto value = [&](const char* key) { return p.value(key, 0.0); };
+  const double gear = std::fabs(external - motor);
+  double bell = 0, out = p.at("friction_base");
+  if (p.contains("alpha")) bell = std::exp(-std::pow(std::fabs(dq / value("dtheta_stribeck")), value("alpha")));
+  out += bell * value("friction_stribeck") + value("friction_viscous") * std::fabs(dq);
+  out += (value("load_friction_base") + bell * value("load_friction_stribeck")) * gear;
+  out += std::fabs(external * value("load_friction_external") - motor * value("load_friction_motor"));
+  out += bell *
+         std::fabs(external * value("load_friction_external_stribeck") - motor * value("load_friction_motor_stribeck"));
+  if ((external > 0) == (motor > 0)) return out;
+  const bool drives = std::fabs(external) < std::fabs(motor);
+  return out + bell * (drives ? value("load_friction_external_quad") * external * external
+                              : value("load_friction_motor_quad") * motor * motor);
+}
+
+/// The motor's torque of one arm, by bisection.
+double motor_torque(const nlohmann::json& p, double q, double dq, double ddq) {
+  const double external = mass * gravity * centre * std::cos(q);
+  const double wanted = (inertia + p.at("armature").get<double>()) * ddq - external;
+  double low = -1000, high = 1000;
+  for (int i = 0; i < 100; ++i) {
+    const double m = 0.5 * (low + high);
+    (m - wanted - (dq > 0 ? 1 : -1) * friction(p, m, external, dq) < 0 ? low : high) = m;
+  }
+  return low;
+}
+
+TEST_F(BamLoad, FileSaysWhatBamMakesOfIt) {
+  for (const Case& one : {Case{3, {3, 0.1, 0.1}}, Case{4, {4, 0.1, 0.1, 0.2, 0.2}}, Case{5, {5, 0.3, 0.1, 0.05, 0.2}},
+                          Case{6, {6, 0.2, 0.3, 0.1, 0.05, 0.004, 0.006}}}) {
+    format.write(simple({0.2, 0.4, 0.03, 0, one.model == 3 ? 0 : 0.3, one.model == 3 ? 0 : 0.8, one.load}), file());
+    const nlohmann::json p = nlohmann::json::parse(read_file(file())).at("joint");
+    EXPECT_EQ(p.at("model"), fmt::format("m{}", one.model));
+    const MotionRows rows{motion.q, motion.dq, motion.ddq};
+    const MatrixXd replayed = format.replay(file(), model, rows, motion.step_s).tau;
+    double off = 0, largest = 0;
+    for (Index k = 0; k < replayed.rows(); ++k) {
+      if (motion.dq(k, 0) == 0) continue;  // it sticks
+      const double expected = motor_torque(p, motion.q(k, 0), motion.dq(k, 0), motion.ddq(k, 0));
+      off = std::max(off, std::fabs(replayed(k, 0) - expected));
+      largest = std::max(largest, std::fabs(expected));
+    }
+    EXPECT_LT(off, 1e-8 * largest) << one.model;
+  }
+}
+
+TEST_F(BamLoad, ErrorsInTheFileAreFound) {
+  set_effects(0.15, 0.5);
+  const SimpleRobot robot = simple({0.2, 0.4, 0.03, 0, 0.3, 0.8, {6, 0.2, 0.3, 0.1, 0.05, 0.004, 0.006}});
+  format.write(robot, file());
+  ASSERT_TRUE(certify(format, file(), robot, model, held_out).as_meant());
+  const std::string right = read_file(file());
+  constexpr double degrees = 57.29577951308232, gear = 50;
+  const std::vector<std::function<double(double)>> wrong{[](double x) { return x * degrees; },
+                                                         [](double x) { return x / degrees; },
+                                                         [](double x) { return x / gear; }, [](double) { return 0.0; }};
+  for (const char* key :
+       {"load_friction_motor", "load_friction_external", "load_friction_motor_stribeck",
+        "load_friction_external_stribeck", "load_friction_motor_quad", "load_friction_external_quad"}) {
+    for (const auto& how : wrong) {
+      nlohmann::json text = nlohmann::json::parse(right);
+      text["joint"][key] = how(text["joint"][key].get<double>());
+      write_file(file(), text.dump(1));
+      EXPECT_FALSE(certify(format, file(), robot, model, held_out).as_meant()) << key;
+    }
+  }
+  // |external e - motor m| with the motor's torque on the wrong side
+  nlohmann::json text = nlohmann::json::parse(right);
+  text["joint"]["load_friction_motor"] = -0.2;
+  write_file(file(), text.dump(1));
+  EXPECT_FALSE(certify(format, file(), robot, model, held_out).as_meant());
+}
+
+TEST_F(BamLoad, AModelsLoadFrictionIsWritten) {
+  for (const double stribeck : {0.0, 0.5}) {
+    set_effects(0.15, stribeck);
+    SimpleRobot without = simple_robot(model, model.robot, true, train, {}, true);
+    without.urdf = urdf;
+    format.write(without, file());
+    const JointCertificate lost = certify(format, file(), without, model, held_out).joints[0];
+    const SimpleRobot robot = fitted();
+    EXPECT_GE(robot.joints[0].load.model, stribeck > 0 ? 4 : 3);
+    format.write(robot, file());
+    const JointCertificate said = certify(format, file(), robot, model, held_out).joints[0];
+    EXPECT_TRUE(said.as_meant);
+    EXPECT_TRUE(said.left_out.empty());
+    // What is left is the load that accelerating the arm makes, up to a third of gravity's: BAM's external torque has
+    // none of it.
+    EXPECT_LT(said.cannot_say, 0.8 * lost.cannot_say) << "m" << robot.joints[0].load.model;
+  }
+}
+
+TEST_F(BamLoad, NothingIsLostAtConstantSpeed) {
+  set_effects(0.15, 0.5);
+  const SimpleRobot robot = simple({0.2, 0.4, 0, 0, 0.5, 0.2, {5, 0, 0.15}});
+  const MotionRows rows{motion.q, motion.dq, MatrixXd::Zero(motion.q.rows(), 1)};
+  model.joints[0].sign_width = 1e-9;
+  const MatrixXd off =
+      torque_of(robot, model, rows, motion.step_s) - predict(model, rows.q, rows.dq, rows.ddq, motion.step_s);
+  EXPECT_LT(off.cwiseAbs().maxCoeff(), 1e-9);
+}
+
+TEST_F(BamLoad, JointsWithoutItStayAsTheyAre) {
+  set_effects(0, 0);
+  model.joints[0].effects.pop_back();
+  EXPECT_EQ(fitted().joints[0].load.model, 0);
+}
+
+TEST_F(BamLoad, UnknownModelIsRefused) {
+  format.write(simple({0.2, 0.4, 0.03, 0}), file());
+  const std::string text = read_file(file());
+  const MotionRows rows{motion.q, motion.dq, motion.ddq};
+  for (const char* name : {"m0", "m7", "n3", "m12", ""}) {
+    nlohmann::json other = nlohmann::json::parse(text);
+    other["joint"]["model"] = name;
+    write_file(file(), other.dump());
+    EXPECT_THROW(format.replay(file(), model, rows, motion.step_s), DataError) << name;
+  }
+}
+
+}  // namespace
+}  // namespace fxdyn
