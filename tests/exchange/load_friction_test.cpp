@@ -166,6 +166,34 @@ TEST_F(BamLoad, NothingIsLostAtConstantSpeed) {
   EXPECT_LT(off.cwiseAbs().maxCoeff(), 1e-9);
 }
 
+/// Gravity is the whole load of a motion that is slow enough: 0.3 rad/s^2 here.
+Log slow_log(const IdentifiedModel& model) {
+  Log log = test::exact_log(model, Role::train, 1, 25);
+  for (Index k = 0; k < log.samples(); ++k) {
+    const double t = log.t[k];
+    log.q(k, 0) = 1.2 * std::sin(0.5 * t) + 0.2 * std::cos(0.3 * t);
+    log.dq(k, 0) = 0.6 * std::cos(0.5 * t) - 0.06 * std::sin(0.3 * t);
+    log.ddq(k, 0) = -0.3 * std::sin(0.5 * t) - 0.018 * std::cos(0.3 * t);
+  }
+  log.tau = predict(model, log.q, log.dq, log.ddq, log.step_s);
+  return log;
+}
+
+TEST_F(BamLoad, TheModelsOwnCoefficientIsFound) {
+  constexpr double lost = 0.15 * inertia * 0.32, fastest = 0.66;  // N*m that acceleration makes, rad/s
+  for (const double stribeck : {0.0, 0.5}) {
+    set_effects(0.15, stribeck);
+    train = test::processed({slow_log(model)});
+    const SimpleJoint said = fitted().joints[0];
+    EXPECT_EQ(said.load.model, 5);
+    EXPECT_NEAR(said.load.external, 0.15, 0.15 * 0.05);
+    EXPECT_NEAR(said.load.motor, 0, 0.15 * 0.05);
+    EXPECT_NEAR(said.friction, 0.4, 0.4 * 0.05);
+    EXPECT_NEAR(said.damping, 0.2, lost / fastest);
+    EXPECT_NEAR(said.stribeck, stribeck, 0.5 * 0.05);
+  }
+}
+
 TEST_F(BamLoad, JointsWithoutItStayAsTheyAre) {
   set_effects(0, 0);
   model.joints[0].effects.pop_back();
