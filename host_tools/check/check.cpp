@@ -259,9 +259,10 @@ std::vector<CheckFinding> findings_alone(const Project& project, const std::vect
 /// The lines to paste, within a sentence.
 std::string inline_text(const std::string& lines) {
   std::string out;
-  for (const char c : lines) {
-    if (c == '\n') out += out.ends_with(':') ? " " : " and ";
-    if (c != '\n') out += c;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const bool joined = out.ends_with(':') || lines.compare(i, 4, "\nor ") == 0;
+    if (lines[i] == '\n') out += joined ? " " : " and ";
+    if (lines[i] != '\n') out += lines[i];
   }
   const bool several = std::count(lines.begin(), lines.end(), '\n') > 1;
   return several ? out + " (fxdyn check prints the lines)" : out;

@@ -88,13 +88,11 @@ class MoveWords {
       case Mistake::torque_unit:
         return in_signals(torque_gain(now));
       case Mistake::mirrored_joint:
-        return in_signals(position_gain(now) + "\n" + torque_gain(now));
+        return in_signals(position_gain(now) + "\n" + torque_gain(now)) + mirrored_in_urdf(move.joint, now);
       case Mistake::zero:
         return in_signals(fmt::format("position_offset = [{}]", offsets(now)));
       case Mistake::axis:
-        return fmt::format("in the URDF, joint '{}':\n<axis xyz=\"{:g} {:g} {:g}\"/>",
-                           project_.robot.joints[static_cast<std::size_t>(move.joint)].name, move.direction.x() + 0.0,
-                           move.direction.y() + 0.0, move.direction.z() + 0.0);
+        return in_urdf(move.joint, move.direction);
       case Mistake::gravity:
         return "in [robot]:\ngravity = " + vector(move.direction, 2);
     }
@@ -122,6 +120,21 @@ class MoveWords {
   }
 
   std::string in_signals(const std::string& lines) const { return "in " + table_ + ":\n" + lines; }
+
+  static std::string axis_element(const Eigen::Vector3d& axis) {
+    const Eigen::Vector3d a = axis.array() + 0.0;  // no "-0"
+    return fmt::format("<axis xyz=\"{:g} {:g} {:g}\"/>", a.x(), a.y(), a.z());
+  }
+  std::string in_urdf(Index j, const Eigen::Vector3d& axis) const {
+    const Joint& joint = project_.robot.joints[static_cast<std::size_t>(j)];
+    return fmt::format("in the URDF, joint '{}', in place of {}:\n{}", joint.name, axis_element(joint.axis),
+                       axis_element(axis));
+  }
+  /// The other way to put a mirrored joint right. What one log alone has wrong is not the URDF's.
+  std::string mirrored_in_urdf(Index j, const Arrangement& now) const {
+    if (format_ == nullptr || table_ != "[signals]") return "";
+    return "\nor " + in_urdf(j, -now.axis[static_cast<std::size_t>(j)]);
+  }
 
   static std::string quoted(const std::string& name) {
     return name.starts_with('#') ? name.substr(1) : '"' + name + '"';
