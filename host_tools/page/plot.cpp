@@ -90,13 +90,14 @@ std::string quoted(std::string words) {
   return words;
 }
 
+/// The key stands above the plot, which makes room for its rows where no top margin is set.
 constexpr const char* settings =
     R"(set terminal svg size 1000,420 dynamic noenhanced font 'sans-serif,13' background '#ffffff'
 set encoding utf8
 set grid lc rgb '#e4e4e4' lt 1
 set border 3 lc rgb '#888888'
 set tics nomirror textcolor rgb '#333333'
-set key at graph 1,1.1 right horizontal
+set key tmargin right horizontal samplen 2
 set lmargin 11
 set rmargin 2
 )";
@@ -226,8 +227,8 @@ std::string draw(const std::vector<Panel>& panels, const std::vector<std::string
   const TemporaryFolder directory;
   std::string script = settings;
   script += fmt::format(
-      "set terminal svg size 1000,{} dynamic noenhanced font 'sans-serif,13' background '#ffffff'\nset tmargin 2\nset "
-      "output '0.svg'\nset multiplot layout {},1\n",
+      "set terminal svg size 1000,{} dynamic noenhanced font 'sans-serif,13' background '#ffffff'\nset output "
+      "'0.svg'\nset multiplot layout {},1\n",
       panel_height * panels.size(), panels.size());
   for (std::size_t p = 0; p < panels.size(); ++p) {
     const Panel& panel = panels[p];
@@ -289,9 +290,8 @@ std::vector<std::string> draw(const std::vector<std::vector<Chart>>& all, int co
   for (std::size_t p = 0; p < all.size(); ++p) {
     const int rows = (static_cast<int>(all[p].size()) + columns - 1) / columns;
     script += fmt::format(
-        "set terminal svg size 1000,{} dynamic noenhanced font 'sans-serif,12' background '#ffffff'\nset tmargin "
-        "2\nset "
-        "output '{}.svg'\nset multiplot layout {},{}\n",
+        "set terminal svg size 1000,{} dynamic noenhanced font 'sans-serif,12' background '#ffffff'\nset output "
+        "'{}.svg'\nset multiplot layout {},{}\n",
         row_height * rows, p, rows, columns);
     for (std::size_t c = 0; c < all[p].size(); ++c)
       script += chart_commands(all[p][c], directory.path(), fmt::format("{}_{}", p, c));

@@ -24,6 +24,7 @@ p { margin: .4em 0; max-width: 52em; } .quiet { color: var(--quiet); font-size: 
 nav ul { list-style: none; margin: .3em 0; padding: 0; display: flex; flex-wrap: wrap; gap: .1em 1.1em; font-size: .9em; }
 nav a { display: inline-block; padding: .15em 0; }
 .overview { display: grid; grid-template-columns: 340px minmax(0, 1fr); gap: 1em; align-items: start; }
+.overview.one { grid-template-columns: minmax(0, 1fr); gap: 0; } .overview.one .plot { max-height: 380px; }
 figure { margin: .6em 0; } figcaption { font-weight: 600; font-size: .95em; margin: .2em 0; }
 ol.joints { list-style: none; margin: 0; padding: 0; } ol.joints li { display: flex; gap: .7em; padding: .2em 0; }
 .mark { flex: none; width: 1.8em; height: 1.8em; line-height: 1.8em; border-radius: 50%; text-align: center; font-weight: 600;
@@ -68,6 +69,7 @@ td.bad { background: var(--bad); } td.good { background: var(--good); } td.amber
   th, td { padding: .12em .35em; min-width: 3.4em; } tbody th { min-width: 4.6em; } td.n { white-space: normal; } thead th { overflow-wrap: anywhere; }
   tr, figure, ol.joints li { break-inside: avoid; } thead { display: table-header-group; }
   .overview { grid-template-columns: 58mm minmax(0, 1fr); } .mark, td, thead th, .disc { print-color-adjust: exact; }
+  .overview:has(#joint-9) { display: block; columns: 2; }
   .live.on > svg.plot { display: block; } .live-plot { display: none; }
   .figures { display: grid; grid-template-columns: 1fr 1fr; gap: 1mm 4mm; } .figures figure { margin: 0; }
 }

@@ -75,7 +75,7 @@ std::vector<Chart> charts_of(const FindingPicture& of, const std::string& unit, 
   Chart before{of.over.label, fmt::format("residual without it [{}]", unit), {cloud(of.over.x, of.without, points)}};
   if (of.band.size() > 0)
     before.curves.push_back(
-        {of.torque.x, of.torque.y - of.band, effect_band, 0, "its 95 % band", false, of.torque.y + of.band});
+        {of.torque.x, of.torque.y - of.band, effect_band, 0, "95 % band", false, of.torque.y + of.band});
   before.curves.push_back(mean(of, of.without, "data"));
   before.curves.push_back({of.torque.x, of.torque.y, effect_colour, 1.6, "effect"});
   Chart after{of.over.label, left, {cloud(of.over.x, of.with, points), mean(of, of.with, "mean")}};

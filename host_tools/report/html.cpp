@@ -19,11 +19,12 @@ std::string header(const IdentifiedModel& model, const MetricsResult& metrics) {
   const Robot& robot = robot_of(model);
   const Eigen::Vector3d& gravity = robot.gravity;
   return fmt::format(
-      "<header><h1>{}</h1>\n<p class=\"quiet\">project {}, {} moving joints, gravity [{:.4g} {:.4g} {:.4g}] m/s², tick "
+      "<header><h1>{}</h1>\n<p class=\"quiet\">project {}, {} moving joint{}, gravity [{:.4g} {:.4g} {:.4g}] m/s², "
+      "tick "
       "{:.4g} ms, {} base parameters, fxdyn {}. Torque is on the joint side of the gearbox, positive along the axis of "
       "the joint.</p></header>\n",
-      escape(robot.name), escape(project_of(model)), robot.size(), gravity[0], gravity[1], gravity[2],
-      1000 * tick_of(model), metrics.base_parameters, version);
+      escape(robot.name), escape(project_of(model)), robot.size(), robot.size() == 1 ? "" : "s", gravity[0], gravity[1],
+      gravity[2], 1000 * tick_of(model), metrics.base_parameters, version);
 }
 
 /// What stands between the first <h2 ..> and its end; "" where there is none.

@@ -4,11 +4,13 @@
 
 #include "host_tools/effects/model_parts.hpp"
 #include "host_tools/page/page.hpp"
+#include "host_tools/page/plot.hpp"
 #include "host_tools/report/diagnosis_words.hpp"
 #include "host_tools/report/drive_line.hpp"
 #include "host_tools/report/joint_answer.hpp"
 #include "host_tools/report/robot_sketch.hpp"
 #include "host_tools/report/section.hpp"
+#include "host_tools/report/shown_log.hpp"
 
 namespace fxdyn {
 
@@ -33,6 +35,7 @@ std::string headline(const std::vector<JointAnswer>& answers, double good_enough
     return fmt::format("{} good: at most {} torque is left",
                        all == 1 ? "The joint is" : fmt::format("All {} joints are", all), of_rated(most));
   }
+  if (all == 1) return fmt::format("The joint: {}", in_words(answers.front().mood));
   std::string out = fmt::format("{} of {} joints are good (up to {:.3g} % of rated torque left, or noise alone)",
                                 count(Mood::calm), all, 100 * good_enough);
   for (const Mood mood : {Mood::red, Mood::amber, Mood::unknown}) {
@@ -71,6 +74,20 @@ std::string robot_effects(const json& diagnosed) {
   return out.empty() ? "" : "<p><strong>On the robot as a whole:</strong> " + escape(out) + ".</p>\n";
 }
 
+/// The torque of a robot's only joint in the log that leaves most of it; empty: no log has torque.
+std::string torque_of_one(const ReportInput& input) {
+  const std::vector<ShownLog>& logs = shown_logs(input);
+  if (logs.empty()) return "";
+  const auto left = [](const ShownLog& log) { return log.residual.squaredNorm() / static_cast<double>(log.t.size()); };
+  const ShownLog& worst = *std::max_element(logs.begin(), logs.end(),
+                                            [&](const ShownLog& a, const ShownLog& b) { return left(a) < left(b); });
+  const Joint& joint = robot_of(input.fitted).joints.front();
+  const TorquePlot plot{worst.t, worst.measured.col(0), worst.predicted.col(0), joint.torque_unit()};
+  const std::string which = logs.size() > 1 ? ", of its logs the one that leaves most" : "";
+  return figure(draw(std::vector<TorquePlot>{plot}).front(),
+                fmt::format("Torque of {} in {}{}", joint.name, worst.log->name, which));
+}
+
 }  // namespace
 
 std::string overview_section(const ReportInput& input, const json&) {
@@ -80,13 +97,15 @@ std::string overview_section(const ReportInput& input, const json&) {
   if (input.results.role != to_string(Role::test))
     out += paragraph("There is no test log: these figures are on the " + input.results.role +
                      " logs, which decided something, and so optimistic.");
-  out += "<div class=\"overview\">\n<figure>" + robot_sketch(robot_of(input.fitted), answers) +
-         "</figure>\n<div class=\"answers\">\n" + joint_list(answers) + robot_effects(diagnosed);
+  std::string lines = "<div class=\"answers\">\n" + joint_list(answers) + robot_effects(diagnosed);
   const std::string next =
       diagnosed.is_null() ? "" : experiments_for_the_robot(diagnosis_of(diagnosed).next_experiment);
-  if (!next.empty()) out += "<p><strong>To learn more:</strong> " + escape(next) + ".</p>\n";
-  return out + "<p id=\"drive\"><strong>The drive:</strong> " + escape(drive_line(input.results)) +
-         ".</p>\n</div></div>\n";
+  if (!next.empty()) lines += "<p><strong>To learn more:</strong> " + escape(next) + ".</p>\n";
+  lines += "<p id=\"drive\"><strong>The drive:</strong> " + escape(drive_line(input.results)) + ".</p>\n</div>";
+  // The sketch of one joint is a dot.
+  if (answers.size() == 1) return out + "<div class=\"overview one\">\n" + lines + torque_of_one(input) + "</div>\n";
+  return out + "<div class=\"overview\">\n<figure>" + robot_sketch(robot_of(input.fitted), answers) + "</figure>\n" +
+         lines + "</div>\n";
 }
 
 }  // namespace fxdyn

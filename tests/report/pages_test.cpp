@@ -236,11 +236,18 @@ TEST(Pages, OneJointAndFortyJointsAreDrawn) {
     forty.joints.back().name = fmt::format("joint_{}", forty.joints.size());
   }
   for (const auto& [name, robot] : {std::pair{"one", one}, {"forty", forty}}) {
-    const Case some(name, robot);
+    Case some(name, robot);
+    // The sketch of one joint would be a dot: its torque stands there.
+    const bool single = robot.size() == 1;
+    if (single) some.logs = {test::small_log(some.model, Role::test, 1)};
     const std::string page = some.page(), last = fmt::format("id=\"joint-{}\"", robot.size());
     EXPECT_NE(page.find(last), std::string::npos);
     EXPECT_EQ(page.find(fmt::format("id=\"joint-{}\"", robot.size() + 1)), std::string::npos);
-    some.hand_over(page, robot.size() == 1);
+    EXPECT_EQ(page.find("<svg class=\"sketch\"") == std::string::npos, single);
+    EXPECT_EQ(page.find("<h2 class=\"first\">The joint: test logs disagree<") != std::string::npos, single);
+    const std::size_t first = page.find("<figcaption>Torque of ");
+    EXPECT_EQ(first < page.find("<section id=\"error\">"), single);
+    some.hand_over(page, single, single);
   }
 }
 

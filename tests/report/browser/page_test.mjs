@@ -155,7 +155,7 @@ async function checkWithoutScripts(browser, url, name) {
 
 async function checkFirstScreen(page, name, joints) {
   await page.setViewport(desktop);
-  const answers = [...Array(joints).keys()].map((j) => `#joint-${j + 1}`).concat('h1', 'h2.first', '.sketch', '#drive');
+  const answers = [...Array(joints).keys()].map((j) => `#joint-${j + 1}`).concat('h1', 'h2.first', '#drive', joints > 1 ? '.sketch' : '.overview figure');
   for (const answer of answers) {
     const at = await page.$eval(answer, (e) => ({bottom: e.getBoundingClientRect().bottom, words: e.textContent.trim()})).catch(() => null);
     check(at && at.words.length > 3, `${name}: ${answer} is not there or empty`);
