@@ -30,6 +30,21 @@ Index viscous_column() { return own_column(viscous_friction_effect().name); }
 Index rotor_column() { return own_column(rotor_effect().name); }
 Index coulomb_column() { return own_column(dry_friction_effect().name); }
 
+/// Times as sure as the prior that a column is zero, where there is none.
+constexpr double none = 1e8;
+
+/// What a spring or a gravity compensator at the joint makes of its position: the effects `spring`, whose offset is the
+/// joint's, and, where it turns, `gravity_compensator`.
+constexpr Index spring_columns = 3;
+MatrixXd spring_of(const VectorXd& q, JointType type) {
+  MatrixXd out = MatrixXd::Zero(q.size(), spring_columns);
+  out.col(0) = q.array() - q.mean();
+  if (type != JointType::revolute) return out;
+  out.col(1) = q.array().cos();
+  out.col(2) = q.array().sin();
+  return out;
+}
+
 /// How far a joint may go: the URDF's range and as far again, or `widest` where it has none.
 double longest_way(const Joint& joint, const ArrangementOptions& options) {
   const auto& limits = joint.limits;
@@ -74,6 +89,7 @@ Arrangement as_given(const Robot& robot) {
   out.motion_offset = VectorXd::Zero(n);
   for (const Joint& joint : robot.joints) out.axis.push_back(joint.axis);
   out.gravity = robot.gravity;
+  out.sprung.resize(robot.size(), false);
   return out;
 }
 
@@ -108,15 +124,13 @@ ArrangementEvidence::ArrangementEvidence(Robot robot, TorqueSamples samples, con
   known_ = std::move(bodies);
 }
 
-Index ArrangementEvidence::own_columns() const {
-  return nominal_columns() + (memory_.empty() ? 0 : memory_.front().cols());
-}
+Index ArrangementEvidence::own_columns() const { return nominal_columns() + memory_columns() + spring_columns; }
 
 /// Sum of dq times the friction of a joint's own columns; x: bodies, then those.
 double ArrangementEvidence::friction_power(const MatrixXd& gram, const VectorXd& x) const {
   const Index bodies = x.size() - own_columns(), dq = bodies + viscous_column(), sign = bodies + coulomb_column();
   double power = x[dq] * gram(dq, dq) + x[sign] * gram(sign, dq);
-  for (Index i = bodies + nominal_columns(); i < x.size(); ++i) power += x[i] * gram(i, dq);
+  for (Index i = bodies + nominal_columns(); i < x.size() - spring_columns; ++i) power += x[i] * gram(i, dq);
   return power;
 }
 
@@ -127,7 +141,7 @@ double ArrangementEvidence::excess(const Arrangement& arrangement, Index joint) 
   return std::log(std::max(1.0, way / longest_way(robot_.joints[j], options_)));
 }
 
-bool ArrangementEvidence::enough() const { return samples_.size() >= 2 * (ten + own_columns()); }
+bool ArrangementEvidence::enough() const { return samples_.size() >= 2 * (ten + nominal_columns() + memory_columns()); }
 
 ArrangementEvidence::Design ArrangementEvidence::design(const Arrangement& arrangement) const {
   const auto n = static_cast<Index>(robot_.size());
@@ -163,8 +177,10 @@ ArrangementEvidence::Design ArrangementEvidence::design(const Arrangement& arran
       x[j].col(bodies + i) = effect_columns(nominal_effects()[static_cast<std::size_t>(i)], {}, width, series).col(0);
     if (!memory_.empty()) {
       const auto from = static_cast<std::size_t>(arrangement.motion_from[j]);
-      x[j].rightCols(own - nominal_columns()) = std::copysign(1.0, arrangement.motion_gain[joint]) * memory_[from];
+      x[j].middleCols(bodies + nominal_columns(), memory_columns()) =
+          std::copysign(1.0, arrangement.motion_gain[joint]) * memory_[from];
     }
+    x[j].rightCols(spring_columns) = spring_of(series.q, robot.joints[j].type);
     out.own_square[j] =
         (x[j].rightCols(own).colwise().squaredNorm().transpose() / static_cast<double>(rows)).cwiseMax(1e-12);
     // Bodies before the joint do not load it: their columns are zero.
@@ -214,21 +230,21 @@ KnownBodies ArrangementEvidence::bodies(const Arrangement& arrangement) const {
 /// @param taken own columns of all joints that are out @return whether one more is
 bool ArrangementEvidence::take_out_impossible(Index joint, const MatrixXd& gram, const VectorXd& x,
                                               std::vector<bool>& taken, MatrixXd& prior) const {
-  const Index own = own_columns(), bodies = x.size() - own;
+  const Index own = own_columns(), bodies = x.size() - own, memory_end = own - spring_columns;
   bool more = false;
   const auto take_out = [&](Index i) {
     const Index at = own * joint + i;
     if (taken[static_cast<std::size_t>(at)]) return;
     taken[static_cast<std::size_t>(at)] = more = true;
-    prior(bodies + at, bodies + at) *= 1e8;
+    prior(bodies + at, bodies + at) *= none;
   };
-  for (Index i = nominal_columns(); i < own; ++i) {
+  for (Index i = nominal_columns(); i < memory_end; ++i) {
     if (x[bodies + i] < 0) take_out(i);
   }
   if (friction_power(gram, x) < 0) {
     take_out(viscous_column());
     take_out(coulomb_column());
-    for (Index i = nominal_columns(); i < own; ++i) take_out(i);
+    for (Index i = nominal_columns(); i < memory_end; ++i) take_out(i);
   }
   if (x[bodies + rotor_column()] < 0) take_out(rotor_column());
   return more;
@@ -252,6 +268,8 @@ ArrangementEvidence::Fit ArrangementEvidence::fit(const Design& design, const Ar
     whole[j] = std::max(gain[j] * gain[j] * torque_square_[from[joint]], 1e-300);
     prior.diagonal().segment(bodies + own * j, own) =
         design.own_square[joint] / (options_.own_share * options_.own_share * whole[j]);
+    if (!arrangement.sprung[joint])
+      prior.diagonal().segment(bodies + own * (j + 1) - spring_columns, spring_columns) *= none;
   }
   variance = whole;
 

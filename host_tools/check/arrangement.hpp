@@ -19,6 +19,7 @@ struct Arrangement {
   Eigen::VectorXd torque_gain;                         ///< tau = gain * column
   std::vector<Eigen::Vector3d> axis;                   ///< of each joint, in its URDF frame
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();   ///< base frame [m/s^2]
+  std::vector<bool> sprung;                            ///< joints with a spring or a gravity compensator
 };
 Arrangement as_given(const Robot& robot);
 /// The samples as an arrangement has them: a column a joint.
@@ -41,12 +42,13 @@ struct KnownBodies {
 };
 
 /// The evidence of arrangements of one robot's samples. Model: tau_j = Y_j(q, dq, ddq) pi + nominal friction, rotor and
-/// offset of the joint, and friction with a memory where it is given. pi is normal about the URDF's bodies
-/// (pseudo-inertia metric, see barrier_hessian()), with that of options.mass_errors that has the most evidence; where a
-/// link has no body about a sphere, options.vague times as wide. The residual's deviation is each joint's own, found by
-/// iteration. What it consists of is structure more than noise, so only `options.independent` rows of a joint count.
-/// The way that a joint goes counts as well: one that leaves twice the URDF's range needs limits that are wrong, r
-/// times too narrow in a share r^-options.beyond of all URDFs.
+/// offset of the joint, friction with a memory where it is given, and a torque over the joint's own position where the
+/// arrangement has a spring there. pi is normal about the URDF's bodies (pseudo-inertia metric, see barrier_hessian()),
+/// with that of options.mass_errors that has the most evidence; where a link has no body about a sphere, options.vague
+/// times as wide. The residual's deviation is each joint's own, found by iteration. What it consists of is structure
+/// more than noise, so only `options.independent` rows of a joint count. The way that a joint goes counts as well: one
+/// that leaves twice the URDF's range needs limits that are wrong, r times too narrow in a share r^-options.beyond of
+/// all URDFs.
 class ArrangementEvidence {
  public:
   ArrangementEvidence(Robot robot, TorqueSamples samples, const ArrangementOptions& options,
@@ -94,6 +96,7 @@ class ArrangementEvidence {
   };
   Fit fit(const Design& design, const Arrangement& arrangement, double mass_error) const;
   Fit best_fit(const Design& design, const Arrangement& arrangement) const;
+  Eigen::Index memory_columns() const { return memory_.empty() ? 0 : memory_.front().cols(); }
   Eigen::Index own_columns() const;
   double friction_power(const Eigen::MatrixXd& gram, const Eigen::VectorXd& x) const;
   bool take_out_impossible(Eigen::Index joint, const Eigen::MatrixXd& gram, const Eigen::VectorXd& x,

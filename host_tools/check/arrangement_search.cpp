@@ -38,6 +38,8 @@ std::string to_string(Mistake mistake) {
       return "torque_unit";
     case Mistake::position_unit:
       return "position_unit";
+    case Mistake::spring:
+      return "spring";
   }
   return "";
 }
@@ -54,7 +56,8 @@ bool has_all_masses(const Robot& robot) {
 }
 
 bool changes_motion(Mistake mistake) {
-  return mistake != Mistake::swapped_torques && mistake != Mistake::mirrored_torque && !is_gain(mistake);
+  return mistake != Mistake::swapped_torques && mistake != Mistake::mirrored_torque && mistake != Mistake::spring &&
+         !is_gain(mistake);
 }
 
 /// All single changes of an arrangement, continuous ones on a grid.
@@ -66,7 +69,10 @@ class Moves {
     const auto n = static_cast<Index>(evidence.robot().size());
     for (Index j = 0; j < n; ++j) {
       for (Index other = j + 1; other < n; ++other) swap(j, other);
-      if (evidence.moves(now.motion_from[static_cast<std::size_t>(j)])) signs_and_gains(j);
+      if (evidence.moves(now.motion_from[static_cast<std::size_t>(j)])) {
+        signs_and_gains(j);
+        spring(j);
+      }
       zeros(j);
       if (!columns_only) axes(j);
       units(j);
@@ -121,6 +127,11 @@ class Moves {
       move.value = gain;
       move.result.torque_gain[j] *= gain;
     }
+  }
+
+  void spring(Index j) {
+    if (!now_.sprung[static_cast<std::size_t>(j)])
+      add(Mistake::spring, j).result.sprung[static_cast<std::size_t>(j)] = true;
   }
 
   void zeros(Index j) {
@@ -301,24 +312,27 @@ std::vector<ArrangementFinding> find_mistakes(const ArrangementEvidence& evidenc
   if (!evidence.enough()) return out;
   Arrangement now = as_given(evidence.robot());
   ArrangementScore score = evidence(now);
-  for (int found = 0; found < options.most; ++found) {
+  for (int found = 0; found < options.most;) {
     std::vector<Scored> best = best_of_each(evidence, now, score.nats, options, columns_only);
     if (best.empty() || best.front().score.nats > score.nats - options.gain) break;
     ArrangementFinding finding;
+    finding.from = now;
     finding.nats = score.nats - best.front().score.nats;
     (best.front().score.rms.array() / score.rms.array()).minCoeff(&finding.felt);
     finding.before = score.rms[finding.felt];
     finding.after = best.front().score.rms[finding.felt];
     for (std::size_t i = 1; i < best.size() && best[i].score.nats < best.front().score.nats + options.as_good; ++i)
       finding.as_good.push_back(best[i].move);
+    const bool spring = best.front().move.mistake == Mistake::spring;
     // A URDF without masses explains next to any torque a little better in some other way.
     const bool doubtful = !has_all_masses(evidence.robot()) && finding.after > options.vague_leaves * finding.before;
-    if (doubtful) break;
-    const bool small = is_small(best.front().move, now, options);
+    if (doubtful && !spring) break;
+    const bool is_none = spring || is_small(best.front().move, now, options);
+    if (!spring) ++found;
     now = best.front().move.result;
     score = best.front().score;
     finding.move = std::move(best.front().move);
-    if (!small) out.push_back(std::move(finding));
+    if (!is_none) out.push_back(std::move(finding));
   }
   return out;
 }

@@ -22,7 +22,8 @@ enum class Mistake {
   gravity,          ///< its direction
   torque_gain,
   torque_unit,  ///< one gain for all joints: currents, or the URDF's masses are placeholders
-  position_unit
+  position_unit,
+  spring  ///< no mistake, but a torque over the joint's position that may look like one
 };
 std::string to_string(Mistake mistake);
 
@@ -36,6 +37,7 @@ struct ArrangementMove {
 };
 
 struct ArrangementFinding {
+  Arrangement from;  ///< what it was compared with: all moves before it, and springs
   ArrangementMove move;
   double nats = 0;                       ///< gained
   Eigen::Index felt = 0;                 ///< the joint whose error falls most
@@ -44,7 +46,9 @@ struct ArrangementFinding {
 };
 
 /// The changes that explain the torques better than what the project says, each beside those before it, one by one
-/// while that gains `options.gain`. Empty where nothing is wrong, or where there are too few samples.
+/// while that gains `options.gain`. A joint may have a spring or a gravity compensator: where that explains most it is
+/// taken in, and only what another change explains beyond it counts. Empty where nothing is wrong, or where there are
+/// too few samples.
 /// @param columns_only of one log of several: axes and gravity are the robot's
 std::vector<ArrangementFinding> find_mistakes(const ArrangementEvidence& evidence, const ArrangementOptions& options,
                                               bool columns_only = false);

@@ -25,12 +25,12 @@ namespace {
 
 /// Whether each train log alone speaks for the change. What one log shows and another does not, such as a load, is no
 /// mistake of columns or URDF.
-bool is_in_each_log(const Robot& robot, const std::vector<ProcessedLog>& logs, double lead_s, const Arrangement& before,
-                    const Arrangement& after, const ArrangementOptions& options) {
+bool is_in_each_log(const Robot& robot, const std::vector<ProcessedLog>& logs, double lead_s,
+                    const ArrangementFinding& finding, const ArrangementOptions& options) {
   return std::all_of(logs.begin(), logs.end(), [&](const ProcessedLog& log) {
     if (log.role != Role::train) return true;
     const ArrangementEvidence evidence(robot, sample_torque({&log, 1}, options.samples, lead_s), options);
-    return !evidence.enough() || evidence(after).nats < evidence(before).nats;
+    return !evidence.enough() || evidence(finding.move.result).nats < evidence(finding.from).nats;
   });
 }
 
@@ -131,25 +131,26 @@ std::vector<CheckFinding> check_columns(const Project& project, const std::vecto
   const double lead_s = lead ? lead->seconds : project.signals.torque_lead_s.value_or(0);
   const TorqueSamples samples = sample_torque(logs, options.samples, lead_s);
   const ArrangementEvidence evidence(project.robot, samples, options);
-  Arrangement before = as_given(project.robot);
+  Arrangement all = as_given(project.robot);
   std::optional<ArrangementEvidence> of_same_robot;
   if (others != nullptr)
     of_same_robot.emplace(project.robot, samples, options,
-                          ArrangementEvidence(project.robot, *others, options).bodies(before));
+                          ArrangementEvidence(project.robot, *others, options).bodies(all));
   // Slow motion alone hardly shows the bodies: friction that the model lacks makes other ones of them.
-  const auto holds_for_robot = [&](const Arrangement& after) {
-    return !of_same_robot || (*of_same_robot)(after).nats < (*of_same_robot)(before).nats - options.gain;
+  const auto holds_for_robot = [&](const ArrangementFinding& finding) {
+    return !of_same_robot ||
+           (*of_same_robot)(finding.move.result).nats < (*of_same_robot)(finding.from).nats - options.gain;
   };
   std::vector<ArrangementFinding> found;
   for (ArrangementFinding& finding : find_mistakes(evidence, options, others != nullptr)) {
-    if (!is_in_each_log(project.robot, logs, lead_s, before, finding.move.result, options)) break;
-    if (!holds_for_robot(finding.move.result)) break;
-    before = finding.move.result;
+    if (!is_in_each_log(project.robot, logs, lead_s, finding, options)) break;
+    if (!holds_for_robot(finding)) break;
+    all = finding.move.result;
     found.push_back(std::move(finding));
   }
-  if (others != nullptr && !settles(project.robot, *others, samples, before, options)) found.clear();
+  if (others != nullptr && !settles(project.robot, *others, samples, all, options)) found.clear();
   const std::vector<std::string> signals = signals_in(logs);
-  for (const ArrangementFinding& finding : found) out.push_back(in_words(finding, before, project, signals, options));
+  for (const ArrangementFinding& finding : found) out.push_back(in_words(finding, all, project, signals, options));
   return out;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -66,6 +67,8 @@ class MoveWords {
             times(move.value), move.value < 1 ? "large" : "small");
       case Mistake::position_unit:
         return unit(move);
+      case Mistake::spring:
+        return fmt::format("{} has a spring or a gravity compensator", joint(j));
     }
     return "";
   }
@@ -95,6 +98,8 @@ class MoveWords {
         return in_urdf(move.joint, move.direction);
       case Mistake::gravity:
         return "in [robot]:\ngravity = " + vector(move.direction, 2);
+      case Mistake::spring:
+        break;  // diagnosis names it
     }
     return "";
   }
@@ -218,8 +223,13 @@ class MoveWords {
   std::string table_ = "[signals]";
 };
 
-/// A gain of other units; a smaller one may be masses that the URDF has wrong.
-bool is_sure(const ArrangementMove& move) {
+/// A gain of other units; a smaller one may be masses that the URDF has wrong. A spring that explains the torque as
+/// well is no mistake.
+bool is_sure(const ArrangementFinding& finding) {
+  const ArrangementMove& move = finding.move;
+  if (std::any_of(finding.as_good.begin(), finding.as_good.end(),
+                  [](const ArrangementMove& other) { return other.mistake == Mistake::spring; }))
+    return false;
   if (move.mistake == Mistake::torque_unit) return false;
   return move.mistake != Mistake::torque_gain || move.value > 3 || move.value < 1.0 / 3;
 }
@@ -230,7 +240,7 @@ CheckFinding in_words(const ArrangementFinding& finding, const Arrangement& all,
                       const std::vector<std::string>& signals, const ArrangementOptions& options) {
   const MoveWords words(project, signals);
   CheckFinding out;
-  out.error = is_sure(finding.move) && finding.after < options.sure * finding.before;
+  out.error = is_sure(finding) && finding.after < options.sure * finding.before;
   out.kind = to_string(finding.move.mistake);
   if (finding.move.mistake != Mistake::gravity && finding.move.mistake != Mistake::torque_unit)
     out.joint = static_cast<std::size_t>(finding.move.joint);

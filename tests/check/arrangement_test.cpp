@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 #include <numbers>
 
 #include "host_tools/check/arrangement_search.hpp"
+#include "host_tools/check/column_words.hpp"
 #include "host_tools/support/random.hpp"
 #include "tests/support/chains.hpp"
 #include "tests/support/kdl.hpp"
@@ -190,6 +192,78 @@ TEST(Arrangement, CurrentsInPlaceOfTorquesAreFound) {
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(to_string(found[0].move.mistake), "torque_unit");
   EXPECT_NEAR(std::log(found[0].move.value), std::log(9), 0.4);
+}
+
+/// A return spring whose torque is as large as that of its joint.
+void add_return_spring(Recorded& recorded, Index joint) {
+  const VectorXd bent = recorded.samples.q.col(joint).array() - 0.4;
+  recorded.samples.tau.col(joint) += recorded.samples.tau.col(joint).norm() / bent.norm() * bent;
+}
+
+// A SCARA feels gravity on its slide alone: gravity that lies, and another axis, seemed to explain such a spring.
+TEST(Arrangement, AReturnSpringIsNoMistake) {
+  for (Index joint = 0; joint < 4; ++joint) {
+    Recorded recorded(-1, std::filesystem::path(FXDYN_SOURCE_DIR) / "tests/campaign/scara.urdf");
+    add_return_spring(recorded, joint);
+    for (const ArrangementFinding& finding : recorded.check())
+      ADD_FAILURE() << "spring at joint " << joint + 1 << ": " << to_string(finding.move.mistake);
+  }
+}
+
+// A coil spring between the link and the one before it: neither straight nor a sine over the joint's position.
+TEST(Arrangement, ABalancerIsNoMistake) {
+  Recorded recorded;
+  const auto q = recorded.samples.q.col(1).array();
+  const double lever = 0.3, free = 0.4;  // of the way to the spring's other end
+  const Eigen::ArrayXd length = (1 + lever * lever - 2 * lever * (q + 1.2).cos()).sqrt();
+  recorded.samples.tau.col(1).array() += 400 * (1 - free / length) * lever * (q + 1.2).sin();
+  EXPECT_TRUE(recorded.check().empty());
+}
+
+TEST(Arrangement, BesideASpringMistakesAreFoundAllTheSame) {
+  const auto with_spring = [](Index joint) {
+    Recorded recorded;
+    add_return_spring(recorded, joint);
+    return recorded;
+  };
+  const Robot sound = read_urdf(test::puma560);
+  for (const Index joint : {1, 4}) {
+    SCOPED_TRACE(fmt::format("spring at joint {}", joint + 1));
+    Recorded axis = with_spring(joint);
+    axis.robot.joints[1].axis = Eigen::Vector3d::UnitX();
+    const auto found = axis.check();
+    expect_alone(found, Mistake::axis, 1);
+    EXPECT_GT(found[0].move.direction.dot(sound.joints[1].axis), 0.9);
+    Recorded mirrored = with_spring(joint);
+    mirrored.samples.tau.col(2) *= -1;
+    expect_alone(mirrored.check(), Mistake::mirrored_torque, 2);
+    Recorded gravity = with_spring(joint);
+    gravity.robot.gravity = Eigen::Vector3d(9.81, 0, 0);
+    expect_alone(gravity.check(), Mistake::gravity, 0);
+  }
+}
+
+// The data can't tell the two: a warning, which names both.
+TEST(Arrangement, AMistakeThatASpringExplainsAsWellIsNotSure) {
+  Project project;
+  project.robot = read_urdf(test::puma560);
+  ArrangementFinding finding;
+  finding.from = finding.move.result = as_given(project.robot);
+  finding.move.mistake = Mistake::axis;
+  finding.move.joint = finding.felt = 1;
+  finding.move.direction = Eigen::Vector3d::UnitX();
+  finding.before = 10;
+  finding.after = 1;
+  finding.nats = 100;
+  const auto said = [&] { return in_words(finding, finding.from, project, {"t", "q", "tau"}, {}); };
+  EXPECT_TRUE(said().error);
+  ArrangementMove spring = finding.move;
+  spring.mistake = Mistake::spring;
+  finding.as_good = {spring};
+  EXPECT_FALSE(said().error);
+  EXPECT_EQ(said().kind, "axis");
+  EXPECT_NE(said().text.find("; or joint 2 (joint_2) has a spring or a gravity compensator"), std::string::npos)
+      << said().text;
 }
 
 // Two mistakes at once, as where a driver counts both from another end.
