@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/support/byte_file.hpp"
+#include "host_tools/bytes/byte_file.hpp"
 
 namespace fxdyn {
 

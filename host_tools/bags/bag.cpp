@@ -6,7 +6,7 @@
 #include <array>
 #include <fstream>
 
-#include "host_tools/bags/unpack.hpp"
+#include "host_tools/bytes/unpack.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/pipes.hpp"
 #include "host_tools/support/temporary_folder.hpp"

@@ -8,8 +8,8 @@
 #include <memory>
 
 #include "host_tools/bags/bag.hpp"
-#include "host_tools/bags/unpack.hpp"
-#include "host_tools/support/byte_file.hpp"
+#include "host_tools/bytes/byte_file.hpp"
+#include "host_tools/bytes/unpack.hpp"
 #include "host_tools/support/error.hpp"
 
 // MCAP, https://mcap.dev/spec: magic bytes, then records of an opcode, a length of 8 bytes and the content, all little

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "host_tools/bags/bag.hpp"
-#include "host_tools/bags/unpack.hpp"
+#include "host_tools/bytes/unpack.hpp"
 #include "host_tools/support/error.hpp"
 
 // rosbag2_storage_sqlite3: topics(id, name, type, serialization_format, ..), messages(id, topic_id, timestamp [ns],

@@ -10,9 +10,9 @@
 #include <limits>
 #include <optional>
 
-#include "host_tools/signals/foreign_format.hpp"
-#include "host_tools/signals/text_file.hpp"
-#include "host_tools/signals/time_unit.hpp"
+#include "host_tools/bytes/foreign_format.hpp"
+#include "host_tools/bytes/text_file.hpp"
+#include "host_tools/logs/time_unit.hpp"
 #include "host_tools/support/error.hpp"
 
 namespace fxdyn {

@@ -23,7 +23,7 @@
 #include "host_tools/identify/structure.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
 #include "host_tools/project/provenance.hpp"
-#include "host_tools/signals/truth.hpp"
+#include "host_tools/readers/truth.hpp"
 #include "host_tools/simulate/recordings.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "host_tools/diagnose/models.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn::diagnosis {

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "host_tools/signals/log.hpp"
+#include "host_tools/logs/log.hpp"
+#include "host_tools/signals/filter.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {

@@ -11,6 +11,7 @@
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/regression/encoder_noise.hpp"
 #include "host_tools/regression/row_ranges.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/random.hpp"
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "host_tools/signals/log.hpp"
+#include "host_tools/signals/filter.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {

@@ -13,9 +13,9 @@
 #include "host_tools/effects/lineage.hpp"
 #include "host_tools/effects/log_reference.hpp"
 #include "host_tools/effects/model_parts.hpp"
+#include "host_tools/logs/log.hpp"
 #include "host_tools/numbers/formats.hpp"
 #include "host_tools/robot/robot.hpp"
-#include "host_tools/signals/log.hpp"
 
 namespace fxdyn {
 

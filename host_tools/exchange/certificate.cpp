@@ -10,6 +10,7 @@
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/exchange/load_friction.hpp"
 #include "host_tools/regression/metrics.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/support/error.hpp"
 
 namespace fxdyn {

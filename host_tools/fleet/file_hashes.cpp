@@ -6,8 +6,8 @@
 #include <ctime>
 #include <nlohmann/json.hpp>
 
+#include "host_tools/fleet/sha256.hpp"
 #include "host_tools/support/files.hpp"
-#include "host_tools/support/sha256.hpp"
 
 namespace fxdyn::fleet {
 namespace {

@@ -7,10 +7,10 @@
 
 #include "host_tools/effects/effect_library.hpp"
 #include "host_tools/fleet/file_hashes.hpp"
+#include "host_tools/fleet/sha256.hpp"
 #include "host_tools/project/project.hpp"
 #include "host_tools/support/files.hpp"
 #include "host_tools/support/pipes.hpp"
-#include "host_tools/support/sha256.hpp"
 #include "host_tools/support/toml.hpp"
 #include "model/version.hpp"
 

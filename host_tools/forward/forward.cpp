@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/simulate/closed_loop.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/parallel.hpp"

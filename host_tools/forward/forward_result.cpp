@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/forward/forward.hpp"
-#include "host_tools/signals/log.hpp"
+#include "host_tools/logs/log.hpp"
 #include "host_tools/support/json_number.hpp"
 
 namespace fxdyn {

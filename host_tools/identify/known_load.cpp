@@ -10,6 +10,7 @@
 #include "host_tools/identify/payload.hpp"
 #include "host_tools/regression/fit_data.hpp"
 #include "host_tools/regression/sandwich.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/support/error.hpp"
 
 namespace fxdyn {

@@ -4,8 +4,8 @@
 
 #include "host_tools/effects/forward.hpp"
 #include "host_tools/identify/options.hpp"
+#include "host_tools/logs/log.hpp"
 #include "host_tools/regression/dataset.hpp"
-#include "host_tools/signals/log.hpp"
 
 namespace fxdyn {
 

@@ -13,6 +13,7 @@
 #include "host_tools/regression/physical.hpp"
 #include "host_tools/regression/sandwich.hpp"
 #include "host_tools/regression/solver.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/support/error.hpp"
 
 namespace fxdyn {

@@ -14,7 +14,9 @@
 #include "host_tools/pipeline/joint_trajectory.hpp"
 #include "host_tools/pipeline/log_check.hpp"
 #include "host_tools/project/log_entries.hpp"
+#include "host_tools/readers/log_reader.hpp"
 #include "host_tools/regression/metrics_result.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
 

@@ -6,8 +6,8 @@
 #include <string>
 
 #include "host_tools/effects/forward.hpp"
+#include "host_tools/logs/log.hpp"
 #include "host_tools/regression/dataset.hpp"
-#include "host_tools/signals/log.hpp"
 
 namespace fxdyn {
 

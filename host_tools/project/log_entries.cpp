@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "host_tools/signals/log_reader.hpp"
+#include "host_tools/readers/log_reader.hpp"
 #include "host_tools/support/files.hpp"
 
 namespace fxdyn {

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "host_tools/project/project.hpp"
+#include "host_tools/readers/log_reader.hpp"
 #include "host_tools/support/error.hpp"
 
 namespace fxdyn {

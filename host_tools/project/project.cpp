@@ -12,9 +12,9 @@
 
 #include "host_tools/effects/effect_library.hpp"
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/logs/time_unit.hpp"
 #include "host_tools/project/log_entries.hpp"
-#include "host_tools/signals/log_reader.hpp"
-#include "host_tools/signals/time_unit.hpp"
+#include "host_tools/readers/log_reader.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
 #include "host_tools/support/pipes.hpp"

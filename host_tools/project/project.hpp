@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/logs/log.hpp"
 #include "host_tools/robot/robot.hpp"
-#include "host_tools/signals/log.hpp"
 
 namespace fxdyn {
 

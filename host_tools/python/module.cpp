@@ -13,10 +13,10 @@
 #include <vector>
 
 #include "host_tools/effects/effects_json.hpp"
+#include "host_tools/logs/log.hpp"
 #include "host_tools/pipeline/one_log.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
-#include "host_tools/signals/log.hpp"
-#include "host_tools/signals/log_reader.hpp"
+#include "host_tools/readers/log_reader.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/progress_listener.hpp"

@@ -12,6 +12,7 @@
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/noise_cutoff.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/signals/spectrum.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/parallel.hpp"

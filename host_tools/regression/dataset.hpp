@@ -9,7 +9,7 @@
 
 #include "host_tools/effects/filter_fit.hpp"
 #include "host_tools/effects/forward.hpp"
-#include "host_tools/signals/log.hpp"
+#include "host_tools/logs/log.hpp"
 #include "host_tools/signals/motion.hpp"
 #include "host_tools/signals/whole.hpp"
 

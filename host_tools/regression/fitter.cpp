@@ -15,6 +15,7 @@
 #include "host_tools/regression/own_columns.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/regression/tie.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numbers>
 
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/signals/spectrum.hpp"
 #include "host_tools/support/parallel.hpp"
 

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "host_tools/signals/log.hpp"
+#include "host_tools/logs/log.hpp"
 
 namespace fxdyn {
 

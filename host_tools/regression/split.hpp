@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/logs/log.hpp"
 #include "host_tools/regression/row_ranges.hpp"
-#include "host_tools/signals/log.hpp"
 
 namespace fxdyn {
 

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "host_tools/report/diagnosis_result.hpp"
-#include "host_tools/support/terminal.hpp"
+#include "host_tools/report/terminal.hpp"
 
 namespace fxdyn {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/signals/log.hpp"
+#include "host_tools/logs/log.hpp"
 
 namespace fxdyn {
 

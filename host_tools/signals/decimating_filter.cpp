@@ -4,7 +4,7 @@
 #include <complex>
 #include <vector>
 
-#include "host_tools/signals/log.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/support/vectors.hpp"
 
 namespace fxdyn {

@@ -1,3 +1,5 @@
+#include "host_tools/signals/filter.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -5,7 +7,6 @@
 #include <numbers>
 #include <vector>
 
-#include "host_tools/signals/log.hpp"
 #include "host_tools/support/vectors.hpp"
 
 namespace fxdyn {

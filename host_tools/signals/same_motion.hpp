@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "host_tools/signals/log.hpp"
+#include "host_tools/logs/log.hpp"
 
 namespace fxdyn {
 

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "host_tools/effects/model_parts.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/simulate/mujoco_forces.hpp"
 #include "host_tools/simulate/mujoco_model.hpp"
 #include "host_tools/support/error.hpp"

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "host_tools/project/log_entries.hpp"
+#include "host_tools/readers/log_reader.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"

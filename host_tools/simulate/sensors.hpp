@@ -1,6 +1,6 @@
 #pragma once
 
-#include "host_tools/signals/log.hpp"
+#include "host_tools/logs/log.hpp"
 #include "host_tools/signals/motion.hpp"
 
 namespace fxdyn {

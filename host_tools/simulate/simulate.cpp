@@ -7,6 +7,7 @@
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/signals/fourier.hpp"
 #include "host_tools/simulate/closed_loop.hpp"
 #include "host_tools/simulate/lugre_plant.hpp"

@@ -7,6 +7,7 @@
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/regressor.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {

@@ -3,7 +3,7 @@
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
-#include "host_tools/signals/log.hpp"
+#include "host_tools/signals/filter.hpp"
 
 namespace fxdyn {
 namespace {

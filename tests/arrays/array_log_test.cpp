@@ -1,7 +1,7 @@
 // Files that SciPy and h5py wrote (writers/write_arrays.py), against the CSV of the same motion.
 #include <gtest/gtest.h>
 
-#include "host_tools/signals/log_reader.hpp"
+#include "host_tools/readers/log_reader.hpp"
 #include "tests/support/files.hpp"
 
 namespace fxdyn {

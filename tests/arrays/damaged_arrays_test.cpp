@@ -6,7 +6,7 @@
 #include <random>
 #include <sstream>
 
-#include "host_tools/signals/log_reader.hpp"
+#include "host_tools/readers/log_reader.hpp"
 #include "tests/support/files.hpp"
 
 namespace fxdyn {

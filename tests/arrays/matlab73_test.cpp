@@ -5,7 +5,7 @@
 #include <cmath>
 #include <memory>
 
-#include "host_tools/signals/log_reader.hpp"
+#include "host_tools/readers/log_reader.hpp"
 #include "tests/support/files.hpp"
 
 namespace fxdyn {

@@ -5,7 +5,7 @@
 #include <cstdlib>
 
 #include "host_tools/arrays/arrays.hpp"
-#include "host_tools/signals/log_reader.hpp"
+#include "host_tools/readers/log_reader.hpp"
 #include "tests/arrays/small_parquet.hpp"
 #include "tests/support/files.hpp"
 

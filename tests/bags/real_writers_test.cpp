@@ -3,7 +3,7 @@
 
 #include <cstdlib>
 
-#include "host_tools/signals/log_reader.hpp"
+#include "host_tools/readers/log_reader.hpp"
 
 namespace fxdyn {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <chrono>
 
-#include "host_tools/signals/log_reader.hpp"
+#include "host_tools/readers/log_reader.hpp"
 
 int main(int count, char** arguments) {
   if (count != 2) return 2;

@@ -3,6 +3,7 @@
 
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "tests/campaign/score.hpp"
 #include "tests/campaign/truth.hpp"
 

@@ -7,7 +7,7 @@
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
-#include "host_tools/signals/log.hpp"
+#include "host_tools/logs/log.hpp"
 #include "host_tools/simulate/scenario.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/support/files.hpp"

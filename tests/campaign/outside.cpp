@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "host_tools/signals/log.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/random.hpp"
 

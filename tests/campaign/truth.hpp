@@ -2,9 +2,10 @@
 
 #include <filesystem>
 
+#include "host_tools/logs/log.hpp"
+#include "host_tools/readers/log_reader.hpp"
+#include "host_tools/readers/truth.hpp"
 #include "host_tools/robot/robot.hpp"
-#include "host_tools/signals/log.hpp"
-#include "host_tools/signals/truth.hpp"
 
 namespace fxdyn::campaign {
 

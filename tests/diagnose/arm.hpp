@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/readers/log_reader.hpp"
 #include "host_tools/regression/dataset.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "tests/support/files.hpp"

@@ -8,8 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "host_tools/logs/log.hpp"
 #include "host_tools/pipeline/pipeline.hpp"
-#include "host_tools/signals/log.hpp"
+#include "host_tools/readers/log_reader.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/support/files.hpp"
 #include "tests/support/files.hpp"

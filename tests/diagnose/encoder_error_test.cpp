@@ -8,6 +8,7 @@
 
 #include "host_tools/diagnose/features.hpp"
 #include "host_tools/diagnose/lack_of_fit.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "tests/diagnose/small_problem.hpp"
 
 namespace fxdyn::diagnosis {

@@ -8,7 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/excite/excite.hpp"
-#include "host_tools/signals/log.hpp"
+#include "host_tools/logs/log.hpp"
+#include "host_tools/readers/log_reader.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
 #include "tests/support/files.hpp"

@@ -13,11 +13,11 @@
 #include "host_tools/fleet/inputs.hpp"
 #include "host_tools/fleet/robot_folder.hpp"
 #include "host_tools/fleet/run.hpp"
+#include "host_tools/fleet/sha256.hpp"
 #include "host_tools/fleet/slurm.hpp"
 #include "host_tools/fleet/summary.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
-#include "host_tools/support/sha256.hpp"
 #include "host_tools/support/temporary_folder.hpp"
 
 namespace fxdyn {

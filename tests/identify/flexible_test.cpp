@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/readers/log_reader.hpp"
 #include "host_tools/regression/fitter.hpp"
 #include "host_tools/simulate/simulate.hpp"
 #include "host_tools/support/parallel.hpp"

@@ -11,6 +11,7 @@
 #include "host_tools/identify/identify.hpp"
 #include "host_tools/regression/essential.hpp"
 #include "host_tools/regression/solver.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/signals/fourier.hpp"
 #include "host_tools/support/parallel.hpp"
 #include "host_tools/support/random.hpp"

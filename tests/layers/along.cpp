@@ -1,2 +1,2 @@
-#include "host_tools/signals/log.hpp"
+#include "host_tools/logs/log.hpp"
 #include "host_tools/support/error.hpp"

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "host_tools/regression/dataset.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/support/random.hpp"
 
 namespace fxdyn {

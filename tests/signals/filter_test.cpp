@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "host_tools/signals/log.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/signals/spectrum.hpp"
 
 namespace fxdyn {

@@ -6,6 +6,7 @@
 #include <chrono>
 
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/simulate/mujoco_plant.hpp"
 #include "tests/simulate/support.hpp"
 #include "tests/support/sanitizers.hpp"

@@ -3,6 +3,7 @@
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/simulate/mujoco_forces.hpp"
 #include "host_tools/simulate/mujoco_plant.hpp"
 #include "host_tools/support/error.hpp"

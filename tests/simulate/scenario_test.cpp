@@ -9,6 +9,7 @@
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/project/project.hpp"
+#include "host_tools/readers/log_reader.hpp"
 #include "host_tools/signals/fourier.hpp"
 #include "host_tools/simulate/scenario.hpp"
 #include "host_tools/simulate/simulate.hpp"
