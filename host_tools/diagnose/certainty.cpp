@@ -6,6 +6,7 @@
 #include "host_tools/diagnose/deviations.hpp"
 #include "host_tools/diagnose/harmless.hpp"
 #include "host_tools/diagnose/refit.hpp"
+#include "host_tools/effects/model_parts.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
@@ -22,7 +23,7 @@ double gain_of(const Gate& gate, const Group& group, std::size_t i) {
 }
 
 const EffectFit& fit_of(const IdentifiedModel& model, const EffectId& id) {
-  return id.body ? model.body[id.effect] : model.joints[id.joint].effects[id.effect];
+  return id.body ? body_of(model)[id.effect] : joints_of(model)[id.joint].effects[id.effect];
 }
 
 std::vector<std::size_t> felt_at(const Gate& gate, std::size_t i, double least) {

@@ -7,7 +7,7 @@
 #include "host_tools/diagnose/deflection_fit.hpp"
 #include "host_tools/diagnose/deflection_polish.hpp"
 #include "host_tools/effects/effects.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn::diagnosis {
@@ -241,9 +241,9 @@ class JointDeflection {
 Deflections find_deflections(const IdentifiedModel& model, const MatrixXd& base_covariance,
                              const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before,
                              std::vector<DeflectionEffect>& background, const DeflectionOptions& options) {
-  const std::size_t n = model.joints.size();
-  IdentifiedModel healthy_model = model;  // without today's load
-  std::erase_if(healthy_model.body, [](const EffectFit& fit) { return fit.named; });
+  const std::size_t n = joints_of(model).size();
+  ModelValue healthy_model = model;  // without today's load
+  std::erase_if(body_of(healthy_model), [](const EffectFit& fit) { return fit.named; });
   const std::vector<MatrixXd> load_now = rigid_loads(model, now), load_before = rigid_loads(healthy_model, before);
   std::vector<Deflections> found(n);
   std::vector<std::vector<DeflectionEffect>> learned(n);

@@ -4,7 +4,7 @@
 
 #include "host_tools/diagnose/autoregression.hpp"
 #include "host_tools/diagnose/models.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/parallel.hpp"
@@ -26,9 +26,9 @@ Index stride_of(const ProcessedLog& log, Rows rows) {
 }  // namespace
 
 std::vector<MatrixXd> rigid_loads(const IdentifiedModel& model, const std::vector<ProcessedLog>& logs) {
-  IdentifiedModel rigid = model;
-  for (JointFit& fit : rigid.joints) fit.effects.clear();
-  rigid.filter.torque_lead_s = 0;
+  ModelValue rigid = model;
+  for (JointFit& fit : joints_of(rigid)) fit.effects.clear();
+  filter_of(rigid).torque_lead_s = 0;
   std::vector<MatrixXd> out(logs.size());
   parallel_for(logs.size(), [&](std::size_t l) {
     if (logs[l].qlink.size() > 0) out[l] = predict(rigid, logs[l]);
@@ -38,7 +38,7 @@ std::vector<MatrixXd> rigid_loads(const IdentifiedModel& model, const std::vecto
 
 DeflectionRows::DeflectionRows(const IdentifiedModel& model, const std::vector<LinkedLog>& logs, std::size_t joint,
                                Rows rows)
-    : joint_(joint), width_(model.joints[joint].sign_width) {
+    : joint_(joint), width_(joints_of(model)[joint].sign_width) {
   const auto j = static_cast<Index>(joint);
   Index total = 0;
   for (const auto& [log, load] : logs) {
@@ -121,7 +121,7 @@ double DeflectionRows::half_of_hidden_rotor(const IdentifiedModel& model) const 
 }
 
 MatrixXd DeflectionRows::slopes_of(std::size_t log, const IdentifiedModel& model, const LoadUncertainty& u) const {
-  Regressor regressor(to_dh(model.robot));
+  Regressor regressor(to_dh(robot_of(model)));
   const MotionRows m = logs_[log]->motion();
   MatrixXd own(logs_[log]->samples(), static_cast<Index>(u.columns.size()));
   for (Index k = 0; k < own.rows(); ++k) {
@@ -152,8 +152,8 @@ LoadUncertainty DeflectionRows::add_uncertainty(const IdentifiedModel& model, co
   LoadUncertainty u;
   const auto j = static_cast<Index>(joint_);
   std::vector<Index> mine;  // those of links from the joint on
-  for (std::size_t k = 0; k < model.base.size(); ++k) {
-    const auto column = static_cast<Index>(model.base[k].column);
+  for (std::size_t k = 0; k < base_of(model).size(); ++k) {
+    const auto column = static_cast<Index>(base_of(model)[k].column);
     if (column < j * static_cast<Index>(parameters_per_link)) continue;
     mine.push_back(static_cast<Index>(k));
     u.columns.push_back(column);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "host_tools/diagnose/models.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/signals/filter.hpp"
 #include "host_tools/support/parallel.hpp"
 
@@ -73,12 +74,12 @@ class Derivatives {
   VectorXd of_width(std::size_t joint) const {
     const Motion& motion = columns_.motion(log_);
     const auto j = static_cast<Index>(joint);
-    const double width = model_.joints[joint].sign_width;
+    const double width = joints_of(model_)[joint].sign_width;
     const double wide = width * (1 + difference), narrow = width * (1 - difference);
     const JointSeries series{motion.q.col(j), motion.dq.col(j), motion.ddq.col(j),
                              columns_.robot(log_).structural().col(j), motion.step_s};
     VectorXd sum = VectorXd::Zero(motion.q.rows());
-    for (const EffectFit& fit : model_.joints[joint].effects) {
+    for (const EffectFit& fit : joints_of(model_)[joint].effects) {
       const EffectInfo& info = *find_effect(fit.effect);
       if (!info.uses_sign || info.needs_total || info.needs_peers || info.acts_on != ActsOn::torque) continue;
       const VectorXd theta = coefficients(fit);
@@ -101,7 +102,7 @@ class Derivatives {
   /// One-sided: half the work. Away from the bound of a shape.
   void of_difference(const Unknown& u, std::vector<MatrixXd>& out) const {
     const EffectFit& fit = effect_of(model_, u);
-    IdentifiedModel more = model_;
+    ModelValue more = model_;
     double value = u.kind == Unknown::Kind::shape ? 1.0 : std::max(std::fabs(u.value), 1e-6);
     if (u.kind == Unknown::Kind::rotor) value = std::max(value, u.prior_std);
     double step = difference * value;
@@ -229,7 +230,7 @@ class RowsOfJoints {
     JointRows& rows = rows_[joint];
     rows.x.block(b.first, 0, b.count, base_columns(joint)) = columns_.base_rows(log, joint);
     MatrixXd tau = l.filter_columns(l.tau.col(static_cast<Index>(joint)));
-    if (const double lead = columns_.model(log).filter.torque_lead_s / l.step_s; lead != 0)
+    if (const double lead = filter_of(columns_.model(log)).torque_lead_s / l.step_s; lead != 0)
       tau = at_other_times(tau, -lead);
     auto y = rows.y.segment(b.first, b.count);
     y = l.decimate(tau) - y;

@@ -7,7 +7,7 @@
 #include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/signals/whole.hpp"
 
@@ -58,8 +58,8 @@ bool same_unknowns(const IdentifiedModel& a, const IdentifiedModel& b) {
     return std::equal(of_a.begin(), of_a.end(), of_b.begin(), of_b.end(),
                       [](const EffectFit& x, const EffectFit& y) { return x.effect == y.effect; });
   };
-  return same(a.body, b.body) &&
-         std::equal(a.joints.begin(), a.joints.end(), b.joints.begin(), b.joints.end(),
+  return same(body_of(a), body_of(b)) &&
+         std::equal(joints_of(a).begin(), joints_of(a).end(), joints_of(b).begin(), joints_of(b).end(),
                     [&](const JointFit& x, const JointFit& y) { return same(x.effects, y.effects); });
 }
 
@@ -82,7 +82,7 @@ void add_deviations(Models& models, const Linearised& problem) {
   const LinearFit fit = problem.solver().solve(problem.unknown_columns());
   const MatrixXd covariance = SymmetricSolver(fit.information).inverse();
   IdentifiedModel& model = models.current;
-  for (JointFit& joint : model.joints) {
+  for (JointFit& joint : joints_of(model)) {
     for (EffectFit& effect : joint.effects) {
       if (find_effect(effect.effect)->acts_on == ActsOn::position && !effect.linear_std.empty())
         continue;  // from a link encoder
@@ -90,17 +90,17 @@ void add_deviations(Models& models, const Linearised& problem) {
       effect.shape_std.assign(effect.shape.size(), 0.0);
     }
   }
-  for (EffectFit& effect : model.body) effect.linear_std.assign(effect.linear.size(), 0.0);
+  for (EffectFit& effect : body_of(model)) effect.linear_std.assign(effect.linear.size(), 0.0);
   for (std::size_t c = 0; c < problem.unknowns().size(); ++c) {
     const Unknown& u = problem.unknowns()[c];
     const double variance = covariance(static_cast<Index>(c), static_cast<Index>(c));
     const double std = std::sqrt(std::max(variance, 0.0));
     if (u.kind == Unknown::Kind::base) {
-      model.base[u.index].std = std;
+      base_of(model)[u.index].std = std;
     } else if (u.kind == Unknown::Kind::width) {
-      model.joints[u.joint].sign_width_std = std * model.joints[u.joint].sign_width;
+      joints_of(model)[u.joint].sign_width_std = std * joints_of(model)[u.joint].sign_width;
     } else {
-      EffectFit& effect = u.body ? model.body.at(u.effect) : model.joints[u.joint].effects.at(u.effect);
+      EffectFit& effect = u.body ? body_of(model).at(u.effect) : joints_of(model)[u.joint].effects.at(u.effect);
       if (u.kind == Unknown::Kind::shape) {
         effect.shape_std[u.index] = std * effect.shape[u.index];
       } else {

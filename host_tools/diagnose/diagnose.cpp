@@ -79,7 +79,7 @@ class Diagnoser {
       mute(logs_, models_.current, still_, options().session);
       look_at_links(models_.current, logs_);
     }
-    models_.current.session = session_;
+    models_.current->session = session_;
     models_.largest_load = largest_loads(models_, logs_);
     Diagnosis result;
     result.still = still_;
@@ -100,7 +100,7 @@ class Diagnoser {
       models_ = before;
     } else {
       for (const DeflectionEffect& effect : deflections_.found) {
-        models_.current.joints[effect.joint].effects.push_back(effect.fit);
+        models_.current->joints[effect.joint].effects.push_back(effect.fit);
         add_rotor(models_, effect, options().prior.link_rotor);
       }
       refit(models_, logs_, plain(), 8);
@@ -244,7 +244,7 @@ class Diagnoser {
   /// The rotor that a link encoder separates from the link.
   /// @param share standard deviation of what is known of it, of itself
   static void add_rotor(Models& models, const DeflectionEffect& effect, double share) {
-    if (effect.rotor <= 0 || rotor_of(models.current.joints[effect.joint]) != nullptr) return;
+    if (effect.rotor <= 0 || rotor_of(models.current->joints[effect.joint]) != nullptr) return;
     const IdentifiedModel& model = models.current;
     Rotor rotor{effect.joint, rotor_in_base(to_dh(model.robot), base_set_of(model), static_cast<Index>(effect.joint)),
                 effect.rotor, share * effect.rotor};
@@ -340,7 +340,7 @@ class Diagnoser {
     }
     Models models = without_rotors(outcome.models, replaced, ids);
     for (const DeflectionEffect& effect : taken.found) {
-      for (EffectFit& fit : models.current.joints[effect.joint].effects) {
+      for (EffectFit& fit : models.current->joints[effect.joint].effects) {
         if (fit.effect == effect.fit.effect) fit = effect.fit;
       }
       for (EffectCandidate& fixed : models.fixed) {
@@ -398,7 +398,7 @@ class Diagnoser {
     }
     look_at_links(models_.healthy, before);
     HealthySession learned = learn_healthy(bent(models_.healthy, before), before, task_, progress_);
-    const double lead = models_.healthy.filter.torque_lead_s;
+    const double lead = models_.healthy->filter.torque_lead_s;
     if (lead != 0 && !project_.signals.torque_lead_s) {
       // Friction with memory looks like a torque column of other times until it is in the model.
       Project aligned = project_;

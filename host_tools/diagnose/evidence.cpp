@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "host_tools/diagnose/forward.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/export/export.hpp"
 #include "host_tools/regression/metrics.hpp"
 #include "host_tools/signals/filter.hpp"
@@ -47,12 +47,12 @@ class Firmware {
   explicit Firmware(const IdentifiedModel& model) : model_(model) {}
   /// @throws DataError where no formats can be chosen for the model.
   Eigen::MatrixXd operator()(const ProcessedLog& log) {
-    const IdentifiedModel model = with_load_of(log, model_);
+    const ModelValue model = with_load_of(log, model_);
     if (!log.load && !unloaded_) unloaded_ = choose_formats(model);
     const Formats formats = log.load ? choose_formats(model) : *unloaded_;
-    const TickStates ticks = at_ticks(log, model.tick_s, true);
+    const TickStates ticks = at_ticks(log, tick_of(model), true);
     return at_other_times(interpolate(predict_fixed(model, formats, ticks, age_of(model, log)), ticks.t, log.t),
-                          model.filter.torque_lead_s / log.step_s);
+                          filter_of(model).torque_lead_s / log.step_s);
   }
 
  private:
@@ -65,14 +65,14 @@ class Firmware {
 class Clamped {
  public:
   explicit Clamped(const IdentifiedModel& model)
-      : model_(model), beyond_(Eigen::MatrixXd::Zero(static_cast<Index>(model.joints.size()), 4)) {}
+      : model_(model), beyond_(Eigen::MatrixXd::Zero(static_cast<Index>(joints_of(model).size()), 4)) {}
 
   /// @param torque of the model, samples x joints [N*m | N]
   void add(const ProcessedLog& log, const Eigen::MatrixXd& torque) {
     const Index count = log.last - log.first;
     const MotionRows motion = log.motion(log.first, count);
     for (Index k = 0; k < beyond_.rows(); ++k) {
-      const JointFit& joint = model_.joints[static_cast<std::size_t>(k)];
+      const JointFit& joint = joints_of(model_)[static_cast<std::size_t>(k)];
       const auto q = motion.q.col(k).array();
       const auto outside = [](const auto& values, double limit) { return (values.abs() > limit).count(); };
       const Index found[] = {(q < joint.q_lower || q > joint.q_upper).count(),
@@ -95,7 +95,7 @@ class Clamped {
         out.push_back(
             fmt::format("{}: in {:.2g} % of the held-out samples the {} is beyond its limit, where the firmware "
                         "clamps; [limits] sets wider ones",
-                        model_.robot.joints[static_cast<std::size_t>(k)].name, 100 * share, names[i]));
+                        robot_of(model_).joints[static_cast<std::size_t>(k)].name, 100 * share, names[i]));
       }
     }
     return out;
@@ -142,13 +142,13 @@ HeldOutEvidence held_out_evidence(const IdentifiedModel& nominal, const Identifi
     out.fixed_point.why_not = "no log was held out";
     return out;
   }
-  for (std::size_t j = 0; j < diagnosed.robot.size(); ++j) {
+  for (std::size_t j = 0; j < robot_of(diagnosed).size(); ++j) {
     // Of what stands still these logs tell nothing.
     const auto figure = [&](const Pooled& of) {
       return j < still.size() && still[j] ? std::nullopt : of.rms(j, judged.size());
     };
-    out.joints.push_back({diagnosed.robot.joints[j].name, diagnosed.robot.joints[j].torque_unit(), figure(before),
-                          figure(after), figure(fixed), figure(noise)});
+    out.joints.push_back({robot_of(diagnosed).joints[j].name, robot_of(diagnosed).joints[j].torque_unit(),
+                          figure(before), figure(after), figure(fixed), figure(noise)});
   }
   out.fixed_point = {!why_not_fixed, why_not_fixed.value_or(""), clamped.notes()};
   out.forward = play_forward(nominal, diagnosed, judged);

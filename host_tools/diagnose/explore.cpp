@@ -6,6 +6,7 @@
 
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn::diagnosis {
@@ -38,7 +39,7 @@ std::vector<std::vector<std::string>> blind_spots(const Linearised& problem, con
 /// gap would be whitened away. So only where the residual is not much more than the noise above the torque's band.
 std::vector<VectorXd> colours(const Models& models, const std::vector<SessionLog>& logs) {
   if (models.has_baseline) return {};
-  const std::size_t n = models.current.joints.size();
+  const std::size_t n = joints_of(models.current).size();
   const std::vector<VectorXd> white(n, VectorXd::Zero(1));
   const Linearised in_band(models, logs, white), coloured(models, logs);
   std::vector<VectorXd> out = coloured.noise().whitening();
@@ -55,8 +56,8 @@ std::vector<VectorXd> colours(const Models& models, const std::vector<SessionLog
 /// What is held (Models::held) has changed by more than sessions differ: there the second one is the change.
 std::vector<EffectCandidate> friction_of_background(const Models& models) {
   std::vector<EffectCandidate> out;
-  for (std::size_t j = 0; j < models.current.joints.size(); ++j) {
-    for (const EffectFit& fit : models.current.joints[j].effects) {
+  for (std::size_t j = 0; j < joints_of(models.current).size(); ++j) {
+    for (const EffectFit& fit : joints_of(models.current)[j].effects) {
       const EffectInfo& info = *find_effect(fit.effect);
       const bool held = std::any_of(models.held.begin(), models.held.end(), [&](const EffectCandidate& one) {
         return one.effect == fit.effect && one.joint == j;
@@ -93,8 +94,8 @@ std::vector<EffectId> follow(const Choice& choice, const Linearised& problem, Mo
 /// A rotor that does not show is none. @returns whether there was one
 bool forget_lost_rotors(Models& models, std::vector<EffectId>& ids) {
   bool lost = false;
-  for (std::size_t j = 0; j < models.current.joints.size(); ++j) {
-    const EffectFit* rotor = rotor_of(models.current.joints[j]);
+  for (std::size_t j = 0; j < joints_of(models.current).size(); ++j) {
+    const EffectFit* rotor = rotor_of(joints_of(models.current)[j]);
     if (rotor != nullptr && rotor->linear[0] <= 0) lost |= forget_rotor(models, ids, j);
   }
   return lost;

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/forward/forward.hpp"
 #include "host_tools/simulate/closed_loop.hpp"
 #include "host_tools/support/error.hpp"
@@ -71,8 +71,8 @@ PlayedForward play_forward(const IdentifiedModel& nominal, const IdentifiedModel
   });
   const auto& [before, after] = runs;
   PlayedForward out{log.name, log.t[log.first], static_cast<double>(count) * log.step_s, {}, why[0], why[1]};
-  for (std::size_t j = 0; j < diagnosed.robot.size(); ++j) {
-    const Joint& joint = diagnosed.robot.joints[j];
+  for (std::size_t j = 0; j < robot_of(diagnosed).size(); ++j) {
+    const Joint& joint = robot_of(diagnosed).joints[j];
     const auto k = static_cast<Index>(j);
     out.joints.push_back({joint.name, joint.position_unit(), joint.torque_unit(), at(before.tracking, k),
                           at(after.tracking, k), at(before.torque, k), at(after.torque, k)});

@@ -13,6 +13,7 @@
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/diagnose/where_words.hpp"
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/parallel.hpp"
 #include "model/effects/curve.hpp"
@@ -181,7 +182,7 @@ EffectId put(Models& models, const EffectCandidate& effect) {
 }
 
 bool is_flat(const Models& models, const FreeCurve& curve) {
-  const std::vector<double>& heights = models.current.joints[curve.id.joint].effects[curve.id.effect].linear;
+  const std::vector<double>& heights = joints_of(models.current)[curve.id.joint].effects[curve.id.effect].linear;
   return std::all_of(heights.begin(), heights.end(), [](double h) { return h == 0 || !std::isfinite(h); });
 }
 
@@ -338,7 +339,7 @@ std::string sentence_of(const CurveResult& curve, const Bump& bump, const Robot&
 
 std::vector<FreeCurve> add_free_curves(Models& models, const std::vector<SessionLog>& logs,
                                        const std::vector<bool>& without) {
-  const std::size_t n = models.current.joints.size();
+  const std::size_t n = joints_of(models.current).size();
   std::vector<FreeCurve> found;
   const Models before = models;
   if (std::find(without.begin(), without.end(), false) == without.end()) return found;
@@ -377,8 +378,8 @@ std::vector<FreeCurve> add_free_curves(Models& models, const std::vector<Session
 CurveResult drawn(const Models& models, const FreeCurve& curve, const std::vector<SessionLog>& logs) {
   const EffectInfo& info = *find_effect(curve.effect.effect);
   const std::size_t of_joint = joint_of_variable(curve.effect);
-  const Joint& of = models.current.robot.joints[of_joint];
-  Linearised problem(models, logs, white(models.current.joints.size()));
+  const Joint& of = robot_of(models.current).joints[of_joint];
+  Linearised problem(models, logs, white(joints_of(models.current).size()));
   problem.solver().set_weights(diluted_weights(problem));
   const LinearFit fit = problem.solver().solve(problem.unknown_columns());
   const MatrixXd covariance = SymmetricSolver(fit.information).inverse();
@@ -401,10 +402,10 @@ CurveResult drawn(const Models& models, const FreeCurve& curve, const std::vecto
   out.closes = curve.closes;
   const Knots knots(curve.effect);
   const VectorXd x = VectorXd::LinSpaced(drawn_points, knots.from, knots.from + knots.span);
-  const double width = models.current.joints[curve.effect.joint].sign_width;
+  const double width = joints_of(models.current)[curve.effect.joint].sign_width;
   const MatrixXd factors =
       bumps(knots, x) - nominal_functions(out.signal, x, width) * nominal_part(problem, curve, out.signal, width);
-  const std::vector<double>& linear = models.current.joints[curve.effect.joint].effects[curve.id.effect].linear;
+  const std::vector<double>& linear = joints_of(models.current)[curve.effect.joint].effects[curve.id.effect].linear;
   const VectorXd y = factors * Eigen::Map<const VectorXd>(linear.data(), heights);
   const MatrixXd spread = factors * covariance.block(first, first, heights, heights) * factors.transpose();
   const double more = misfit(problem, curve, out, problem.solver().residual(curve.effect.joint, fit));
@@ -413,7 +414,7 @@ CurveResult drawn(const Models& models, const FreeCurve& curve, const std::vecto
   const Bump bump = bump_of(out.points);
   out.from = bump.from;
   out.to = bump.to;
-  out.sentence = sentence_of(out, bump, models.current.robot, curve.effect.joint, logs);
+  out.sentence = sentence_of(out, bump, robot_of(models.current), curve.effect.joint, logs);
   return out;
 }
 

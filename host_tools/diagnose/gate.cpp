@@ -11,7 +11,7 @@
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/parallel.hpp"
 
@@ -174,7 +174,7 @@ bool holds(const Outcome& outcome, const Group& group, const HeldOut& held, std:
   const double brings = held.alone[i].sum();
   if (brings <= options.least_gain) return false;
   // At its bound a load is what would weigh less than nothing.
-  if (is_load(group.candidate.effect) && outcome.models.current.body[group.id.effect].linear[0] <= least_mass)
+  if (is_load(group.candidate.effect) && body_of(outcome.models.current)[group.id.effect].linear[0] <= least_mass)
     return false;
   if (group.on_body) return true;
   const std::size_t j = group.candidate.joint;
@@ -186,8 +186,8 @@ bool holds(const Outcome& outcome, const Group& group, const HeldOut& held, std:
 /// How fast drift comes to its end shows on the data that follow.
 void choose_time_constants(Outcome& outcome, const std::vector<SessionLog>& logs) {
   bool drifted = false;
-  for (std::size_t j = 0; j < outcome.models.current.joints.size(); ++j) {
-    for (EffectFit& fit : outcome.models.current.joints[j].effects) {
+  for (std::size_t j = 0; j < joints_of(outcome.models.current).size(); ++j) {
+    for (EffectFit& fit : joints_of(outcome.models.current)[j].effects) {
       if (!drifts(fit.effect) || !fit.named) continue;
       const double found = fit.shape[0];
       double best = found, least = 1e300;
@@ -446,8 +446,8 @@ std::optional<EffectId> harmful_finding(const Outcome& outcome, const Identified
 VectorXd judged_error(const Models& models, const std::vector<SessionLog>& logs) {
   VectorXd out = plain_error(models.current, logs);
   if (out.size() > 0) return out;
-  const Linearised problem(models, logs, whole_band(models.current.joints.size()));
-  out = VectorXd::Zero(static_cast<Index>(models.current.joints.size()));
+  const Linearised problem(models, logs, whole_band(joints_of(models.current).size()));
+  out = VectorXd::Zero(static_cast<Index>(joints_of(models.current).size()));
   for (const Fold& fold : problem.blocks().folds) out += judged(problem, fold);
   return out;
 }

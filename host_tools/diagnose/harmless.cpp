@@ -7,7 +7,7 @@
 #include "host_tools/diagnose/plain_error.hpp"
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/effects/effects.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
@@ -15,12 +15,12 @@ namespace {
 using Eigen::VectorXd;
 
 std::vector<VectorXd> whole_band(const Models& models) {
-  return std::vector<VectorXd>(models.current.joints.size(), VectorXd::Zero(1));
+  return std::vector<VectorXd>(joints_of(models.current).size(), VectorXd::Zero(1));
 }
 
 /// By joint: whether something was found there.
 std::vector<bool> found_at(const Outcome& outcome) {
-  std::vector<bool> out(outcome.models.current.joints.size(), false);
+  std::vector<bool> out(joints_of(outcome.models.current).size(), false);
   for (const Finding& finding : outcome.found) out[finding.id.joint] = true;
   return out;
 }
@@ -41,14 +41,15 @@ bool take_values(JointFit& to, const JointFit& from) {
 /// robot, or a rotor that the base parameters are without.
 std::optional<Models> around(Models models, const IdentifiedModel& nominal) {
   IdentifiedModel& current = models.current;
-  if (!current.body.empty() || current.base.size() != nominal.base.size()) return {};
-  for (std::size_t j = 0; j < current.joints.size(); ++j) {
-    const bool has = rotor_of(nominal.joints[j]) != nullptr;
-    if (has != (rotor_of(current.joints[j]) != nullptr) || !take_values(current.joints[j], nominal.joints[j]))
+  if (!body_of(current).empty() || base_of(current).size() != base_of(nominal).size()) return {};
+  for (std::size_t j = 0; j < joints_of(current).size(); ++j) {
+    const bool has = rotor_of(joints_of(nominal)[j]) != nullptr;
+    if (has != (rotor_of(joints_of(current)[j]) != nullptr) ||
+        !take_values(joints_of(current)[j], joints_of(nominal)[j]))
       return {};
   }
-  for (std::size_t c = 0; c < current.base.size(); ++c) {
-    const double step = nominal.base[c].value - current.base[c].value;
+  for (std::size_t c = 0; c < base_of(current).size(); ++c) {
+    const double step = base_of(nominal)[c].value - base_of(current)[c].value;
     add_to_base(current, c, step);
     if (models.has_baseline) add_to_base(models.healthy, c, step);
   }

@@ -5,6 +5,7 @@
 
 #include "host_tools/diagnose/gate.hpp"
 #include "host_tools/diagnose/refit.hpp"
+#include "host_tools/effects/model_parts.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
@@ -22,7 +23,7 @@ double mean_logarithm(const Eigen::VectorXd& squares) { return squares.array().m
 
 HealthySession learn_healthy(Models nominal, const std::vector<SessionLog>& logs, const SearchTask& task,
                              Progress& progress) {
-  const std::size_t joints = nominal.current.joints.size();
+  const std::size_t joints = joints_of(nominal.current).size();
   refit(nominal, logs, std::vector<Eigen::VectorXd>(joints, Eigen::VectorXd::Zero(1)), 8);
   HealthySession out{std::move(nominal), {}};
   Outcome outcome;
@@ -35,13 +36,13 @@ HealthySession learn_healthy(Models nominal, const std::vector<SessionLog>& logs
     outcome = explore(out.models, logs, modest, 2, progress);
     out.models = outcome.models;
     for (std::size_t j = 0; j < joints; ++j) {
-      for (EffectFit& fit : out.models.current.joints[j].effects) {
+      for (EffectFit& fit : joints_of(out.models.current)[j].effects) {
         if (fit.named) out.effects.push_back({fit.effect, j, fit.shape});
         fit.named = false;
       }
       if (outcome.structured(j)) out.structured.push_back(j);
     }
-    for (EffectFit& fit : out.models.current.body) fit.named = false;
+    for (EffectFit& fit : body_of(out.models.current)) fit.named = false;
   }
   out.error = judged_error(out.models, logs);
   return out;

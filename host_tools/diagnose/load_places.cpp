@@ -5,6 +5,7 @@
 
 #include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/effect_roles.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/regression/solver.hpp"
 
 namespace fxdyn::diagnosis {
@@ -94,11 +95,11 @@ PointLoads::PointLoads(const LogColumns& columns, std::size_t log)
 
 MatrixXd PointLoads::torque(Index place) const {
   const Vector3d& c = places()[static_cast<std::size_t>(place)];
-  IdentifiedModel model = columns_.model(log_);
+  ModelValue model = columns_.model(log_);
   EffectFit load;
   load.effect = load_effect().name;
   load.linear = {small_mass, c.x(), c.y(), c.z()};
-  model.body.push_back(std::move(load));
+  body_of(model).push_back(std::move(load));
   return (columns_.torque_of(log_, std::move(model)) - without_) / small_mass;
 }
 

@@ -8,6 +8,7 @@
 #include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/signals/filter.hpp"
 #include "host_tools/support/parallel.hpp"
 
@@ -43,7 +44,7 @@ MatrixXd torque_of_both(const IdentifiedModel& model, const Motion& all, const M
 LogColumns::LogColumns(const Models& models, const std::vector<SessionLog>& logs)
     : models_(std::make_shared<const Models>(models)),
       logs_(&logs),
-      chain_(to_dh(models.current.robot)),
+      chain_(to_dh(robot_of(models.current))),
       base_(base_set_of(models.current)),
       motions_(logs.size()),
       slow_(logs.size()),
@@ -60,14 +61,14 @@ LogColumns::LogColumns(const Models& models, const std::vector<SessionLog>& logs
 }
 
 const Options& LogColumns::options() const { return models_->options; }
-std::size_t LogColumns::joints() const { return models_->current.joints.size(); }
+std::size_t LogColumns::joints() const { return joints_of(models_->current).size(); }
 bool LogColumns::has_baseline() const { return models_->has_baseline; }
 const std::vector<std::size_t>& LogColumns::background() const { return models_->background; }
 const IdentifiedModel& LogColumns::current() const { return models_->current; }
-const Joint& LogColumns::joint_of_robot(std::size_t joint) const { return current().robot.joints[joint]; }
-const JointFit& LogColumns::joint(std::size_t joint) const { return current().joints[joint]; }
+const Joint& LogColumns::joint_of_robot(std::size_t joint) const { return robot_of(current()).joints[joint]; }
+const JointFit& LogColumns::joint(std::size_t joint) const { return joints_of(current())[joint]; }
 const IdentifiedModel& LogColumns::model(std::size_t log) const { return models_->of((*logs_)[log].healthy); }
-const JointFit& LogColumns::joint(std::size_t log, std::size_t joint) const { return model(log).joints[joint]; }
+const JointFit& LogColumns::joint(std::size_t log, std::size_t joint) const { return joints_of(model(log))[joint]; }
 bool LogColumns::bends_slowly(std::size_t log) const { return slow_[log] && stiffened(model(log)); }
 
 Index LogColumns::first_base(std::size_t joint) const {
@@ -115,13 +116,13 @@ MatrixXd LogColumns::base_rows(std::size_t log, std::size_t joint) const {
     }
     cache.features.resize(joints());
   });
-  if (in_order(model(log).joints[joint], true).empty()) return cache.base[joint];
+  if (in_order(joints_of(model(log))[joint], true).empty()) return cache.base[joint];
   const MatrixXd columns = follow(log, joint, base_columns(log, {joint}, 0, entry.log.samples()));
   return entry.log.decimate(entry.log.filter_columns(columns));
 }
 
 MatrixXd LogColumns::follow(std::size_t log, std::size_t joint, MatrixXd columns) const {
-  for (const EffectFit* effect : in_order(model(log).joints[joint], true)) {
+  for (const EffectFit* effect : in_order(joints_of(model(log))[joint], true)) {
     const double share = effect->linear[0];
     if (find_effect(effect->effect)->of_total == OfTotal::clips) {
       const auto torque = robot_[log]->torque().col(static_cast<Index>(joint)).array().abs();
@@ -172,12 +173,12 @@ std::shared_ptr<const RobotColumns> LogColumns::robot_with(std::size_t log, cons
     const std::lock_guard lock(for_group_mutex_);
     if (const auto known = for_group_.find(key); known != for_group_.end()) return known->second;
   }
-  IdentifiedModel model = models_->current;
+  ModelValue model = models_->current;
   if (rotor) {
     EffectFit fit;
     fit.effect = rotor_effect().name;
     fit.linear = {group.rotor_inertia};
-    model.joints[group.candidate.joint].effects.push_back(std::move(fit));
+    joints_of(model)[group.candidate.joint].effects.push_back(std::move(fit));
     take_from_base(model, group.rotor->in_base, group.rotor_inertia);
   }
   auto made = std::make_shared<const RobotColumns>(with_load_of((*logs_)[log].log, std::move(model)),
@@ -189,7 +190,7 @@ std::shared_ptr<const RobotColumns> LogColumns::robot_with(std::size_t log, cons
   return for_group_.emplace(key, std::move(made)).first->second;
 }
 
-MatrixXd LogColumns::torque_of(std::size_t log, IdentifiedModel model) const {
+MatrixXd LogColumns::torque_of(std::size_t log, ModelValue model) const {
   return torque_of_both(with_load_of((*logs_)[log].log, std::move(model)), *motions_[log], slow_[log].get());
 }
 

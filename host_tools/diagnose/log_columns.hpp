@@ -10,6 +10,7 @@
 #include "host_tools/diagnose/options.hpp"
 #include "host_tools/diagnose/session_log.hpp"
 #include "host_tools/diagnose/unknowns.hpp"
+#include "host_tools/effects/model_value.hpp"
 #include "host_tools/effects/robot_columns.hpp"
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/signals/motion.hpp"
@@ -54,7 +55,7 @@ class LogColumns {
   /// Columns as the torque shows them: through what follows them in the torque's path.
   Eigen::MatrixXd follow(std::size_t log, std::size_t joint, Eigen::MatrixXd columns) const;
   /// What a model says of a log's motion [N*m | N]; its gears bend by what is not noise.
-  Eigen::MatrixXd torque_of(std::size_t log, IdentifiedModel model) const;
+  Eigen::MatrixXd torque_of(std::size_t log, ModelValue model) const;
   /// .. of another motion that is sampled like the log's, for the model of the log's session.
   Eigen::MatrixXd torque_along(std::size_t log, const MotionRows& motion) const;
   /// Whether torque_of() differs from RobotColumns::torque() for that.

@@ -4,7 +4,7 @@
 
 #include "host_tools/diagnose/base_parameters.hpp"
 #include "host_tools/diagnose/options.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_value.hpp"
 #include "host_tools/effects/robot_columns.hpp"
 
 namespace fxdyn::diagnosis {
@@ -15,7 +15,7 @@ inline constexpr double least_mass = 1e-6;
 /// Two states of one robot: before (the baseline, a session known to be healthy) and now. Base parameters are the same;
 /// friction may differ a little, named effects are in `current` only. Without a baseline `healthy` is not used.
 struct Models {
-  IdentifiedModel healthy, current;
+  ModelValue healthy, current;
   bool has_baseline = false;
   std::vector<EffectCandidate> fixed;   ///< from a link encoder: the torque does not change it
   std::vector<std::size_t> background;  ///< joints whose healthy session has structure that no effect explains

@@ -9,6 +9,7 @@
 #include "host_tools/diagnose/features.hpp"
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/regression/solver.hpp"
 
 namespace fxdyn::diagnosis {
@@ -148,7 +149,7 @@ class FaultFits {
   /// something is worth further rounds.
   void fit_zero(std::size_t joint) {
     constexpr int most_rounds = 10;
-    const JointFit& limits = model().joints[joint];
+    const JointFit& limits = joints_of(model())[joint];
     double shift = options_.first_shift;
     for (int round = 0; round < most_rounds; ++round) {
       std::vector<MatrixXd> rows = no_rows(1);
@@ -162,7 +163,7 @@ class FaultFits {
       if (likelihood(problem_, fit) - sound_likelihood_ < options_.least_score) return;
       if (std::fabs(shift - before) > 0.05 * std::fabs(shift)) continue;
       if (std::fabs(shift) < options_.deviations * deviation(fit, at)) return;
-      const Joint& j = model().robot.joints[joint];
+      const Joint& j = robot_of(model()).joints[joint];
       weigh(fit, 1,
             fmt::format("{}: its encoder slipped since the baseline: these logs fit best with {:+.4g} {} added to its "
                         "position; correct that, or record the baseline again",
@@ -275,7 +276,7 @@ class FaultFits {
         fit, 1,
         fmt::format("{}: its torque of {} is {:.3g} times that of the other logs: another unit or gain? Correct it or "
                     "leave the log out",
-                    name(today_[i]), model().robot.joints[joint].name, 1 + fit.x[at]));
+                    name(today_[i]), robot_of(model()).joints[joint].name, 1 + fit.x[at]));
     faults_.back().sound_score =
         std::max(score_of(fit_with(gain_rows(all, joint)), 1), score_of(fit_with(friction_rows(i, joint)), 3));
   }

@@ -10,7 +10,7 @@
 #include "host_tools/effects/braking.hpp"
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/regression/gauss_newton.hpp"
 #include "host_tools/regression/solver.hpp"
 
@@ -151,17 +151,17 @@ void refit(Models& models, const std::vector<SessionLog>& all, const std::vector
   for (const SessionLog& log : all) {
     if (log.fits) logs.push_back(log);
   }
-  models = Refit(std::move(logs), given, only, models.current.joints.size()).run(models, rounds);
+  models = Refit(std::move(logs), given, only, joints_of(models.current).size()).run(models, rounds);
 }
 
 void bring_rotor(Models& models, const Rotor& rotor, double inertia) {
   EffectFit fit;
   fit.effect = rotor_effect().name;
   fit.linear = {inertia};
-  std::vector<IdentifiedModel*> of{&models.current};
+  std::vector<ModelValue*> of{&models.current};
   if (models.has_baseline) of.push_back(&models.healthy);
-  for (IdentifiedModel* model : of) {
-    model->joints[rotor.joint].effects.push_back(fit);
+  for (ModelValue* model : of) {
+    joints_of(*model)[rotor.joint].effects.push_back(fit);
     take_from_base(*model, rotor.in_base, inertia);
   }
   models.rotors.push_back(rotor);
@@ -185,10 +185,10 @@ EffectId name(Models& models, const Group& group, const VectorXd& theta) {
       fit.linear[i] = std::clamp(fit.linear[i] / fit.linear[0], -10.0, 10.0);
   }
   const std::size_t joint = group.candidate.joint;
-  auto& effects = group.on_body ? models.current.body : models.current.joints[joint].effects;
+  auto& effects = group.on_body ? body_of(models.current) : joints_of(models.current)[joint].effects;
   effects.push_back(std::move(fit));
   const EffectId id{group.on_body, joint, effects.size() - 1};
-  const JointFit& of = models.current.joints[joint];
+  const JointFit& of = joints_of(models.current)[joint];
   if (group.rotor && rotor_of(of) == nullptr) {
     bring_rotor(models, *group.rotor, group.rotor_inertia);
   }
@@ -198,7 +198,7 @@ EffectId name(Models& models, const Group& group, const VectorXd& theta) {
 namespace {
 
 void remove(Models& models, std::vector<EffectId>& ids, const EffectId& id) {
-  auto& effects = id.body ? models.current.body : models.current.joints[id.joint].effects;
+  auto& effects = id.body ? body_of(models.current) : joints_of(models.current)[id.joint].effects;
   effects.erase(effects.begin() + static_cast<std::ptrdiff_t>(id.effect));
   for (EffectId& other : ids) {
     if (other.body == id.body && other.joint == id.joint && other.effect > id.effect) --other.effect;
@@ -211,8 +211,8 @@ void take_back(Models& models, std::vector<EffectId>& ids, const EffectId& id) {
   remove(models, ids, id);
   if (id.body) return;
   // Beside less friction bristles may have less damping.
-  let_it_brake(models.current.joints[id.joint]);
-  const auto& left = models.current.joints[id.joint].effects;
+  let_it_brake(joints_of(models.current)[id.joint]);
+  const auto& left = joints_of(models.current)[id.joint].effects;
   if (std::none_of(left.begin(), left.end(), [](const EffectFit& fit) { return separates_rotor(fit.effect); }))
     forget_rotor(models, ids, id.joint);
 }
@@ -222,13 +222,12 @@ bool forget_rotor(Models& models, std::vector<EffectId>& ids, std::size_t joint)
       std::find_if(models.rotors.begin(), models.rotors.end(), [&](const Rotor& r) { return r.joint == joint; });
   if (it == models.rotors.end()) return false;
   const auto is_rotor = [](const EffectFit& fit) { return in_base(fit.effect); };
-  const auto& effects = models.current.joints[joint].effects;
+  const auto& effects = joints_of(models.current)[joint].effects;
   const auto fit = std::find_if(effects.begin(), effects.end(), is_rotor);
   // The base parameters have it back.
-  for (IdentifiedModel* model : {&models.current, &models.healthy})
-    take_from_base(*model, it->in_base, -fit->linear[0]);
+  for (ModelValue* model : {&models.current, &models.healthy}) take_from_base(*model, it->in_base, -fit->linear[0]);
   remove(models, ids, {false, joint, static_cast<std::size_t>(fit - effects.begin())});
-  if (models.has_baseline) std::erase_if(models.healthy.joints[joint].effects, is_rotor);
+  if (models.has_baseline) std::erase_if(joints_of(models.healthy)[joint].effects, is_rotor);
   models.rotors.erase(it);
   return true;
 }

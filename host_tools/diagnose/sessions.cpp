@@ -9,6 +9,7 @@
 #include "host_tools/diagnose/models.hpp"
 #include "host_tools/diagnose/thinning.hpp"
 #include "host_tools/effects/effects.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/regression/encoder_noise.hpp"
 #include "host_tools/regression/row_ranges.hpp"
 #include "host_tools/signals/filter.hpp"
@@ -167,13 +168,13 @@ void mute(std::vector<SessionLog>& logs, const IdentifiedModel& model, const std
       if (!joints[j]) continue;
       const auto k = static_cast<Index>(j);
       for (Index i = 0; i < log.samples(); ++i)
-        log.tau(i, k) = torque(i, k) + options.mute_noise * model.joints[j].rated_torque * random.normal();
+        log.tau(i, k) = torque(i, k) + options.mute_noise * joints_of(model)[j].rated_torque * random.normal();
     }
   }
 }
 
 std::vector<double> largest_loads(const Models& models, const std::vector<SessionLog>& logs) {
-  std::vector<double> out(models.current.joints.size(), 0);
+  std::vector<double> out(joints_of(models.current).size(), 0);
   const LogColumns columns(models, logs);
   for (std::size_t l = 0; l < logs.size(); ++l) {
     const ProcessedLog& log = logs[l].log;
@@ -188,7 +189,7 @@ std::vector<std::string> check_same_robot(Models models, const std::vector<Sessi
                                           const std::vector<bool>& still) {
   const SessionOptions options = models.options.session;
   models.background.clear();  // explains anything
-  Linearised problem(models, logs, std::vector<VectorXd>(models.current.joints.size(), VectorXd::Zero(1)));
+  Linearised problem(models, logs, std::vector<VectorXd>(joints_of(models.current).size(), VectorXd::Zero(1)));
   const auto first = static_cast<Index>(problem.nuisance().size());
   for (const EffectInfo& info : effect_infos()) {
     if (info.acts_on != ActsOn::body) continue;
@@ -222,11 +223,11 @@ std::vector<std::string> check_same_robot(Models models, const std::vector<Sessi
     ++judged;
     if (!strange[j]) continue;
     ++count;
-    names.push_back(models.current.robot.joints[j].name);
+    names.push_back(robot_of(models.current).joints[j].name);
     notes.push_back(
         fmt::format("{}: nothing explains the baseline and these logs together: another unit, gain or column in one of "
                     "them? What is found there may be that",
-                    models.current.robot.joints[j].name));
+                    robot_of(models.current).joints[j].name));
   }
   if (2 * count >= judged && count > 0) {
     throw DataError(fmt::format(
@@ -261,7 +262,7 @@ std::vector<std::string> check_judges(const IdentifiedModel& model, const std::v
       notes.push_back(
           fmt::format("{}: its torque of {} is {:.3g} times that of the train logs' motion: other units, "
                       "gain or sign?",
-                      log.name, model.robot.joints[j].name, times));
+                      log.name, robot_of(model).joints[j].name, times));
     }
     if (judged == 0 || odd < judged) continue;
     throw DataError(fmt::format(

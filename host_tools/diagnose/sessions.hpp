@@ -7,6 +7,7 @@
 #include "host_tools/diagnose/linearised.hpp"
 #include "host_tools/diagnose/options.hpp"
 #include "host_tools/effects/forward.hpp"
+#include "host_tools/effects/session.hpp"
 #include "host_tools/identify/identify.hpp"
 
 namespace fxdyn::diagnosis {

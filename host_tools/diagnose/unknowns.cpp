@@ -3,6 +3,7 @@
 #include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/braking.hpp"
 #include "host_tools/effects/effect_roles.hpp"
+#include "host_tools/effects/model_parts.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -19,7 +20,7 @@ bool is_shape_free(const EffectInfo& info, std::size_t i) {
 }
 
 EffectFit& effect_of(IdentifiedModel& model, const Unknown& u) {
-  return u.body ? model.body[u.effect] : model.joints[u.joint].effects[u.effect];
+  return u.body ? body_of(model)[u.effect] : joints_of(model)[u.joint].effects[u.effect];
 }
 
 double& value_of(IdentifiedModel& model, const Unknown& u) {
@@ -45,19 +46,19 @@ class Builder {
 
   Unknowns build() {
     add_base();
-    for (std::size_t j = 0; j < now_.joints.size(); ++j) {
+    for (std::size_t j = 0; j < joints_of(now_).size(); ++j) {
       add_width(j);
       add_nominal_effects(j);
     }
     for (Index i = 0; i < size(); ++i) out_.nuisance.push_back(i);
-    for (std::size_t j = 0; j < now_.joints.size(); ++j) {
-      const std::vector<EffectFit>& effects = now_.joints[j].effects;
+    for (std::size_t j = 0; j < joints_of(now_).size(); ++j) {
+      const std::vector<EffectFit>& effects = joints_of(now_)[j].effects;
       for (std::size_t e = 0; e < effects.size(); ++e) {
         if (effects[e].named && !is_in(models_.fixed, j, effects[e])) add_named(effects[e], {false, j, e});
       }
     }
-    for (std::size_t e = 0; e < now_.body.size(); ++e) {
-      if (now_.body[e].named) add_named(now_.body[e], {true, 0, e});
+    for (std::size_t e = 0; e < body_of(now_).size(); ++e) {
+      if (body_of(now_)[e].named) add_named(body_of(now_)[e], {true, 0, e});
     }
     return std::move(out_);
   }
@@ -70,16 +71,16 @@ class Builder {
   Index size() const { return static_cast<Index>(out_.all.size()); }
 
   void add_base() {
-    for (std::size_t k = 0; k < now_.base.size(); ++k) {
+    for (std::size_t k = 0; k < base_of(now_).size(); ++k) {
       Unknown u;
       u.index = k;
-      u.value = now_.base[k].value;
+      u.value = base_of(now_)[k].value;
       out_.all.push_back(u);
     }
   }
 
   void add_width(std::size_t joint) {
-    const std::vector<EffectFit>& effects = now_.joints[joint].effects;
+    const std::vector<EffectFit>& effects = joints_of(now_)[joint].effects;
     const bool signs = std::any_of(effects.begin(), effects.end(), [](const EffectFit& fit) {
       return !fit.named && find_effect(fit.effect)->uses_sign;
     });
@@ -91,7 +92,7 @@ class Builder {
   }
 
   void add_nominal_effects(std::size_t joint) {
-    const std::vector<EffectFit>& effects = now_.joints[joint].effects;
+    const std::vector<EffectFit>& effects = joints_of(now_)[joint].effects;
     std::size_t unnamed = 0;  // both models have the unnamed ones in one order
     for (std::size_t e = 0; e < effects.size(); ++e) {
       if (effects[e].named) continue;
@@ -106,13 +107,13 @@ class Builder {
   }
 
   void add_coefficients(Unknown u) {
-    const JointFit& joint = now_.joints[u.joint];
+    const JointFit& joint = joints_of(now_)[u.joint];
     const EffectFit& fit = joint.effects[u.effect];
     const EffectInfo& info = *find_effect(fit.effect);
     for (u.index = 0; u.index < info.linear.size(); ++u.index) {
       Unknown shared = u;
       shared.kind = Unknown::Kind::linear;
-      shared.value = common_.joints[u.joint].effects[u.healthy_effect].linear[u.index];
+      shared.value = joints_of(common_)[u.joint].effects[u.healthy_effect].linear[u.index];
       if (in_base(fit.effect)) make_rotor(shared);
       out_.all.push_back(shared);
       if (!models_.has_baseline || in_base(fit.effect)) continue;
@@ -130,7 +131,7 @@ class Builder {
     const auto rotor =
         std::find_if(models_.rotors.begin(), models_.rotors.end(), [&](const Rotor& r) { return r.joint == u.joint; });
     if (rotor == models_.rotors.end()) return;
-    const JointFit& joint = now_.joints[u.joint];
+    const JointFit& joint = joints_of(now_)[u.joint];
     u.kind = Unknown::Kind::rotor;
     u.in_base = rotor->in_base;
     u.prior = rotor->inertia;
@@ -140,8 +141,8 @@ class Builder {
 
   /// Standard deviation of a coefficient from one healthy session to the next.
   double usual_change(const Unknown& shared, const ParameterInfo& parameter) const {
-    const JointFit& joint = now_.joints[shared.joint];
-    const EffectFit* friction = dry_friction_of(common_.joints[shared.joint]);
+    const JointFit& joint = joints_of(now_)[shared.joint];
+    const EffectFit* friction = dry_friction_of(joints_of(common_)[shared.joint]);
     // Of motions of unit size: a coefficient's own scale.
     const PriorOptions& prior = models_.options.prior;
     const bool in_proportion = parameter.quantity == Quantity::velocity;
@@ -219,13 +220,13 @@ Unknowns make_unknowns(const Models& models) { return Builder(models).build(); }
 
 std::pair<double, double> shape_limits(const Models& models, std::size_t joint, const EffectInfo& info,
                                        const ParameterInfo& shape) {
-  const FilterFit& filter = models.current.filter;
+  const FilterFit& filter = filter_of(models.current);
   if (shape.values.seen_by_encoder && joint < filter.position_noise.size()) {
     const double step = std::max(filter.encoder_step[joint], std::sqrt(12.0) * filter.position_noise[joint]);
     return {std::clamp(step, shape.lower, 0.1 * shape.upper), shape.upper};
   }
   if (shape.values.least_of_sign > 0) {
-    const double width = shape.values.least_of_sign * models.current.joints[joint].sign_width;
+    const double width = shape.values.least_of_sign * joints_of(models.current)[joint].sign_width;
     return {std::clamp(width, shape.lower, 0.1 * shape.upper), shape.upper};
   }
   if (shape.values.most_of_load > 0 && joint < models.largest_load.size())
@@ -234,7 +235,7 @@ std::pair<double, double> shape_limits(const Models& models, std::size_t joint, 
 }
 
 const EffectFit& effect_of(const IdentifiedModel& model, const Unknown& u) {
-  return u.body ? model.body[u.effect] : model.joints[u.joint].effects[u.effect];
+  return u.body ? body_of(model)[u.effect] : joints_of(model)[u.joint].effects[u.effect];
 }
 
 Unknown in_healthy(Unknown u) {
@@ -252,7 +253,7 @@ void add_to(IdentifiedModel& model, const Unknown& u, double step) {
       take_from_base(model, u.in_base, step);
       return;
     case Unknown::Kind::width:
-      model.joints[u.joint].sign_width *= std::exp(step);
+      joints_of(model)[u.joint].sign_width *= std::exp(step);
       return;
     case Unknown::Kind::shape: {
       const ParameterInfo& info = find_effect(effect_of(model, u).effect)->shape[u.index];
@@ -276,7 +277,7 @@ namespace {
 
 /// Bristles whose damping drives the joint are no friction, however well they fit.
 void keep_friction(IdentifiedModel& model) {
-  for (JointFit& joint : model.joints) let_it_brake(joint);
+  for (JointFit& joint : joints_of(model)) let_it_brake(joint);
 }
 
 }  // namespace
@@ -292,7 +293,7 @@ void update(Models& models, const std::vector<Unknown>& unknowns, const LinearFi
     // Payload's mass first: its centre is first moment over mass.
     if (!u.change && u.kind == Unknown::Kind::linear && u.body && u.index == 0 &&
         is_load(effect_of(models.current, u).effect)) {
-      EffectFit& load = models.current.body[u.effect];
+      EffectFit& load = body_of(models.current)[u.effect];
       const double mass = std::max(least_mass, load.linear[0] + step);
       for (std::size_t k = 1; k < load.linear.size(); ++k) load.linear[k] *= load.linear[0] / mass;
       load.linear[0] = mass;

@@ -14,7 +14,7 @@
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn::diagnosis {
@@ -52,7 +52,7 @@ class ReportWriter {
 
   DiagnosisResult all() {
     DiagnosisResult out;
-    for (std::size_t j = 0; j < conclusion_.model.joints.size(); ++j)
+    for (std::size_t j = 0; j < joints_of(conclusion_.model).size(); ++j)
       out.joints.push_back(conclusion_.still[j] ? still(j) : moving(j));
     out.robot_effects = of_robot(out.undecided);
     // A joint whose gap a load closes is explained by it.
@@ -84,7 +84,7 @@ class ReportWriter {
   }
 
  private:
-  const Joint& joint_of(std::size_t j) const { return conclusion_.model.robot.joints[j]; }
+  const Joint& joint_of(std::size_t j) const { return robot_of(conclusion_.model).joints[j]; }
 
   void advise(const std::string& text) {
     if (!text.empty() && next_.find(text) == std::string::npos) next_ += (next_.empty() ? "" : "; ") + text;
@@ -92,8 +92,8 @@ class ReportWriter {
 
   /// Share of the model's torque that an effect has.
   double model_share(std::size_t j, std::size_t e) const {
-    IdentifiedModel less = conclusion_.model;
-    less.joints[j].effects.erase(less.joints[j].effects.begin() + static_cast<std::ptrdiff_t>(e));
+    ModelValue less = conclusion_.model;
+    joints_of(less)[j].effects.erase(joints_of(less)[j].effects.begin() + static_cast<std::ptrdiff_t>(e));
     const MatrixXd& after = errors_.first_after();
     const MatrixXd without = predict(less, errors_.first_shown());
     const auto k = static_cast<Index>(j);
@@ -102,8 +102,8 @@ class ReportWriter {
 
   /// .. an effect on the robot, at the joint where it is largest.
   double body_share(std::size_t e) const {
-    IdentifiedModel less = conclusion_.model;
-    less.body.erase(less.body.begin() + static_cast<std::ptrdiff_t>(e));
+    ModelValue less = conclusion_.model;
+    body_of(less).erase(body_of(less).begin() + static_cast<std::ptrdiff_t>(e));
     const MatrixXd& after = errors_.first_after();
     const MatrixXd change = after - predict(less, errors_.first_shown());
     double most = 0;
@@ -116,10 +116,10 @@ class ReportWriter {
   /// tilt they are its own.
   bool part_of_tilt(std::size_t j, const EffectFit& fit) const {
     if (j != 0 || !find_effect(fit.effect)->as_masses_about_axis) return false;
-    const Robot& robot = conclusion_.model.robot;
+    const Robot& robot = robot_of(conclusion_.model);
     const Eigen::Vector3d axis = robot.joints[0].origin.linear() * robot.joints[0].axis;
     const bool upright = axis.cross(robot.gravity).norm() < report_.upright * robot.gravity.norm();
-    return upright && std::any_of(conclusion_.model.body.begin(), conclusion_.model.body.end(),
+    return upright && std::any_of(body_of(conclusion_.model).begin(), body_of(conclusion_.model).end(),
                                   [](const EffectFit& body) { return body.named && turns_gravity(body.effect); });
   }
 
@@ -135,7 +135,7 @@ class ReportWriter {
       advise_between(fit.effect, id, a.candidate);
     }
     out.effect = fit.effect;
-    out.parameters = parameters_of(fit, joint_of(id.joint), conclusion_.model.joints[id.joint].rated_torque);
+    out.parameters = parameters_of(fit, joint_of(id.joint), joints_of(conclusion_.model)[id.joint].rated_torque);
     out.score = finding.score;
     out.held_out_closure = finding.evidence.closure;
     out.established = finding.evidence.certainty == Certainty::established;
@@ -180,7 +180,7 @@ class ReportWriter {
   /// Effects that were found at a joint. @param open those that are undecided
   std::vector<NamedEffect> effects_of(std::size_t j, std::vector<std::vector<std::string>>& open) {
     std::vector<NamedEffect> out;
-    const auto& fits = conclusion_.model.joints[j].effects;
+    const auto& fits = joints_of(conclusion_.model)[j].effects;
     for (std::size_t e = 0; e < fits.size(); ++e) {
       const Finding* finding = finding_of({false, j, e});
       if (finding == nullptr) continue;  // nominal, or a link encoder's
@@ -206,7 +206,7 @@ class ReportWriter {
   }
 
   NamedEffect named(const DeflectionEffect& seen) const {
-    const JointFit& joint = conclusion_.model.joints[seen.joint];
+    const JointFit& joint = joints_of(conclusion_.model)[seen.joint];
     const auto place = std::find_if(joint.effects.begin(), joint.effects.end(),
                                     [&](const EffectFit& fit) { return fit.named && fit.effect == seen.fit.effect; });
     NamedEffect out;
@@ -272,7 +272,7 @@ class ReportWriter {
     std::string which;
     // Nobody can record more of a time, or of a frequency.
     if (!regions.empty() && regions[0].signal != "t" && regions[0].signal != "frequency")
-      which = ", " + words_of(regions[0], conclusion_.nominal.robot, j, logs);
+      which = ", " + words_of(regions[0], robot_of(conclusion_.nominal), j, logs);
     advise(fmt::format("record more of joint {}{}", j + 1, which));
   }
 
@@ -362,8 +362,8 @@ class ReportWriter {
   GapPlace place_of_gap(std::size_t j, double noise, const std::optional<CurveResult>& curve) const {
     std::vector<const ProcessedLog*> logs;
     std::vector<VectorXd> loads, errors;
-    IdentifiedModel rigid = conclusion_.nominal;
-    for (JointFit& fit : rigid.joints) {
+    ModelValue rigid = conclusion_.nominal;
+    for (JointFit& fit : joints_of(rigid)) {
       fit.effects.clear();
       fit.bls.reset();
     }
@@ -374,14 +374,14 @@ class ReportWriter {
     }
     std::optional<GapRegion> of_curve;
     if (curve) of_curve = place_of(*curve);
-    return where(conclusion_.nominal.robot, j, logs, loads, errors, noise, report_, of_curve);
+    return where(robot_of(conclusion_.nominal), j, logs, loads, errors, noise, report_, of_curve);
   }
 
   /// Whether a named effect on the robot is felt at a joint.
   bool robot_reaches(Index joint) const {
     for (std::size_t i = 0; i < conclusion_.gate.groups.size(); ++i) {
       const Group& group = problem_.groups()[conclusion_.gate.groups[i]];
-      if (group.on_body && conclusion_.model.body[group.id.effect].named &&
+      if (group.on_body && body_of(conclusion_.model)[group.id.effect].named &&
           conclusion_.gate.held.alone[i][joint] > problem_.options().gate.least_gain)
         return true;
     }
@@ -391,16 +391,16 @@ class ReportWriter {
   std::vector<NamedEffect> of_robot(std::vector<std::vector<std::string>>& open) {
     std::vector<NamedEffect> robot;
     const Gate& gate = conclusion_.gate;
-    for (std::size_t e = 0; e < conclusion_.model.body.size(); ++e) {
+    for (std::size_t e = 0; e < body_of(conclusion_.model).size(); ++e) {
       const EffectId id{true, 0, e};
       const Finding* finding = finding_of(id);
       if (finding == nullptr) continue;
-      if (finding->evidence.undecided) open.push_back(undecided(conclusion_.model.body[e], *finding));
+      if (finding->evidence.undecided) open.push_back(undecided(body_of(conclusion_.model)[e], *finding));
       if (finding->evidence.certainty == Certainty::unlisted) continue;
-      NamedEffect one = named(conclusion_.model.body[e], *finding);
+      NamedEffect one = named(body_of(conclusion_.model)[e], *finding);
       const std::size_t i = gate.place(problem_, id);
       one.joints.emplace();
-      for (std::size_t j = 0; j < conclusion_.model.joints.size(); ++j) {
+      for (std::size_t j = 0; j < joints_of(conclusion_.model).size(); ++j) {
         if (gate.held.alone[i][static_cast<Index>(j)] > problem_.options().gate.least_gain)
           one.joints->push_back(j + 1);
       }

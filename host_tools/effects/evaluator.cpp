@@ -29,7 +29,7 @@ std::uint32_t all_joints(const IdentifiedModel& model) {
   return model.joints.size() >= 32 ? ~0U : (1U << model.joints.size()) - 1;
 }
 
-IdentifiedModel with_stored_limits(const IdentifiedModel& model, const Formats& formats) {
+ModelValue with_stored_limits(const IdentifiedModel& model, const Formats& formats) {
   IdentifiedModel out = model;
   const auto stored = [&](double& limit, Quantity quantity) {
     limit = from_raw(to_raw(limit, formats[quantity]), formats[quantity]);
@@ -388,8 +388,8 @@ template class Evaluator<Real>;
 template class Evaluator<BoundedNumbers>;
 template class Evaluator<RunTimeNumbers>;
 
-IdentifiedModel unlimited(IdentifiedModel model) {
-  for (JointFit& joint : model.joints) {
+ModelValue unlimited(ModelValue model) {
+  for (JointFit& joint : model->joints) {
     joint.q_upper = joint.dq_limit = joint.ddq_limit = joint.tau_limit = unbounded;
     joint.q_lower = -unbounded;
   }

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "host_tools/effects/forward.hpp"
+#include "host_tools/effects/model_value.hpp"
 #include "host_tools/effects/rigid_torques.hpp"
 #include "host_tools/numbers/bounded.hpp"
 #include "host_tools/numbers/run_time_fixed.hpp"
@@ -61,7 +61,7 @@ std::uint32_t all_joints(const IdentifiedModel& model);
 
 /// The model with the setpoints' limits as the tables hold them, rounded to their formats: what fixed point is compared
 /// with, so that both cut alike.
-IdentifiedModel with_stored_limits(const IdentifiedModel& model, const Formats& formats);
+ModelValue with_stored_limits(const IdentifiedModel& model, const Formats& formats);
 
 /// A double as a number of quantity Q in number system N.
 template <class N, Quantity quantity>
@@ -167,7 +167,7 @@ class Predictor {
 };
 
 /// The model without its drives' limits: they are not the robot's.
-IdentifiedModel unlimited(IdentifiedModel model);
+ModelValue unlimited(ModelValue model);
 
 /// Over a whole motion at once.
 Eigen::MatrixXd predict(const IdentifiedModel& model, const Eigen::MatrixXd& q, const Eigen::MatrixXd& dq,

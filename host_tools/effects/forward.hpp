@@ -7,6 +7,7 @@ namespace fxdyn {
 
 struct BroadLearningFit;
 struct EffectFit;
+struct Formats;
 struct IdentifiedModel;
 struct JointFit;
 struct Session;

@@ -368,8 +368,14 @@ const std::vector<EffectFit>& body_of(const IdentifiedModel& model) { return mod
 const std::vector<BaseParameter>& base_of(const IdentifiedModel& model) { return model.base; }
 const std::vector<LinkInertia<Real>>& inertia_of(const IdentifiedModel& model) { return model.inertia; }
 const FilterFit& filter_of(const IdentifiedModel& model) { return model.filter; }
+const Formats& formats_of(const IdentifiedModel& model) { return model.formats.value(); }
 const std::string& project_of(const IdentifiedModel& model) { return model.project; }
 double tick_of(const IdentifiedModel& model) { return model.tick_s; }
+std::vector<JointFit>& joints_of(IdentifiedModel& model) { return model.joints; }
+std::vector<EffectFit>& body_of(IdentifiedModel& model) { return model.body; }
+std::vector<BaseParameter>& base_of(IdentifiedModel& model) { return model.base; }
+FilterFit& filter_of(IdentifiedModel& model) { return model.filter; }
+std::vector<LinkInertia<Real>>& inertia_of(IdentifiedModel& model) { return model.inertia; }
 
 std::optional<ModelIdentity> read_identity(const std::filesystem::path& file) {
   if (!std::filesystem::exists(file)) return {};

@@ -13,6 +13,7 @@
 #include "host_tools/effects/lineage.hpp"
 #include "host_tools/effects/log_reference.hpp"
 #include "host_tools/effects/model_parts.hpp"
+#include "host_tools/effects/session.hpp"
 #include "host_tools/logs/log.hpp"
 #include "host_tools/numbers/formats.hpp"
 #include "host_tools/robot/robot.hpp"
@@ -24,11 +25,6 @@ namespace fxdyn {
 struct TableLayout {
   std::vector<unsigned> parameters;  ///< per link, bit k: inertial parameter k is computed, else it is zero
   std::vector<int> node_bits;        ///< per joint: fractional bits of the BLS's node coefficients; 0 without one
-};
-
-/// When the robot ran, by the logs' own time stamps: what drifts has done so since the start.
-struct Session {
-  double start_s = 0, end_s = 0;
 };
 
 /// Everything that predict, export and simulate need: the content of model.json.

@@ -4,7 +4,7 @@
 
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/numbers/side_by_side.hpp"
 #include "host_tools/robot/robot.hpp"
 #include "model/catalogue.hpp"
@@ -93,8 +93,8 @@ FXDYN_EIGHT_AT_ONCE [[gnu::flatten]] void torques_eight(const RigidBody& body, c
 }  // namespace
 
 RigidBody rigid_body_of(const IdentifiedModel& model) {
-  Robot robot = model.robot;
-  for (const EffectFit& fit : model.body) {
+  Robot robot = robot_of(model);
+  for (const EffectFit& fit : body_of(model)) {
     BodyEffects::for_each([&]<class E>() {
       if constexpr (requires { &E::turn; }) {
         if (E::name != fit.effect) return;
@@ -106,9 +106,9 @@ RigidBody rigid_body_of(const IdentifiedModel& model) {
   }
   const DhChain chain = to_dh(robot);
   RigidBody out{{chain.links.begin(), chain.links.end()},
-                {model.inertia.begin(), model.inertia.end()},
+                {inertia_of(model).begin(), inertia_of(model).end()},
                 {chain.up.x(), chain.up.y(), chain.up.z()}};
-  for (const EffectFit& fit : model.body) {
+  for (const EffectFit& fit : body_of(model)) {
     if (!is_load(fit.effect)) continue;
     out.inertia.back() =
         with_load(out.inertia.back(), fit.linear[0], {fit.linear[1], fit.linear[2], fit.linear[3]}, chain);

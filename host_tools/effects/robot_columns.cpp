@@ -6,7 +6,7 @@
 
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/evaluator.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/effects/rigid_torques.hpp"
 #include "host_tools/support/error.hpp"
 
@@ -53,26 +53,24 @@ std::vector<ColumnName> column_names(std::string_view effect, JointType type) {
 }
 
 RobotColumns::RobotColumns(const IdentifiedModel& model, const Motion& motion)
-    : model_(std::make_shared<const IdentifiedModel>(model)),
-      motion_(&motion),
-      torque_(motion.q.rows(), motion.q.cols()) {
+    : model_(model), motion_(&motion), torque_(motion.q.rows(), motion.q.cols()) {
   Predictor(model, motion.step_s)(motion.q, motion.dq, motion.ddq, torque_, nullptr, &structural_);
-  const bool plain = std::all_of(model.joints.begin(), model.joints.end(), [](const JointFit& joint) {
+  const bool plain = std::all_of(joints_of(model).begin(), joints_of(model).end(), [](const JointFit& joint) {
     return !joint.bls && std::all_of(joint.effects.begin(), joint.effects.end(), [](const EffectFit& fit) {
       const EffectInfo& info = info_of(fit.effect);
       return info.acts_on == ActsOn::torque && !info.needs_structural && !info.needs_total;
     });
   });
-  for (std::size_t j = 0; j < model.joints.size(); ++j) sign_.push_back(std::make_unique<Sign>());
-  const auto joints = static_cast<double>(model.joints.size());
+  for (std::size_t j = 0; j < joints_of(model).size(); ++j) sign_.push_back(std::make_unique<Sign>());
+  const auto joints = static_cast<double>(joints_of(model).size());
   if (!plain || 3 * sizeof(double) * joints * joints * static_cast<double>(motion.q.rows()) > most_kept) return;
-  for (std::size_t j = 0; j < model.joints.size(); ++j) by_state_.push_back(std::make_unique<ByState>());
+  for (std::size_t j = 0; j < joints_of(model).size(); ++j) by_state_.push_back(std::make_unique<ByState>());
 }
 
 const Eigen::VectorXd& RobotColumns::sign(std::size_t joint) const {
   Sign& out = *sign_[joint];
   std::call_once(out.made, [&] {
-    const double width = model_->joints[joint].sign_width;
+    const double width = joints_of(model_)[joint].sign_width;
     const auto tanh = [=](double dq) { return tanh_of(dq / width); };
     out.values = motion_->dq.col(static_cast<Index>(joint)).unaryExpr(tanh);
   });
@@ -83,7 +81,7 @@ const RobotColumns::ByState& RobotColumns::by_state(std::size_t joint) const {
   ByState& out = *by_state_[joint];
   std::call_once(out.made, [&] {
     const Motion& m = *motion_;
-    const RigidBody body = rigid_body_of(*model_);
+    const RigidBody body = rigid_body_of(model_);
     MatrixXd moved;
     const auto slope = [&](MatrixXd& to, const MatrixXd& of, double step) {
       moved = of;
@@ -127,7 +125,7 @@ MatrixXd RobotColumns::phi(const EffectCandidate& candidate) const {
     series.peers_sign.resize(motion_->dq.rows(), motion_->dq.cols());
     for (Index i = 0; i < series.peers_sign.cols(); ++i) series.peers_sign.col(i) = sign(static_cast<std::size_t>(i));
   }
-  return effect_columns(candidate.effect, candidate.shape, model_->joints[candidate.joint].sign_width, series);
+  return effect_columns(candidate.effect, candidate.shape, joints_of(model_)[candidate.joint].sign_width, series);
 }
 
 MatrixXd RobotColumns::slope(const IdentifiedModel& changed, double theta) const {
@@ -144,18 +142,18 @@ Eigen::VectorXd RobotColumns::own_slope(const IdentifiedModel& changed, std::siz
 EffectColumns RobotColumns::operator()(const EffectCandidate& candidate) const {
   const EffectInfo& info = info_of(candidate.effect);
   const bool on_body = info.acts_on == ActsOn::body;
-  if (!on_body && candidate.joint >= model_->joints.size()) {
+  if (!on_body && candidate.joint >= joints_of(model_).size()) {
     throw InputError(fmt::format("effect '{}' at joint {}: the robot has {}", info.name, candidate.joint + 1,
-                                 model_->joints.size()));
+                                 joints_of(model_).size()));
   }
   if (candidate.shape.size() != info.shape.size()) {
     throw InputError(fmt::format("effect '{}' has {} shape parameters, not {}", info.name, info.shape.size(),
                                  candidate.shape.size()));
   }
   EffectColumns out;
-  out.joints.resize(model_->joints.size());
+  out.joints.resize(joints_of(model_).size());
   const bool of_total_follow =
-      !on_body && !info.needs_total && !in_order(model_->joints[candidate.joint], true).empty();
+      !on_body && !info.needs_total && !in_order(joints_of(model_)[candidate.joint], true).empty();
   if (info.acts_on == ActsOn::torque && !of_total_follow) {
     out.joints[candidate.joint] = phi(candidate);
     return out;
@@ -163,12 +161,12 @@ EffectColumns RobotColumns::operator()(const EffectCandidate& candidate) const {
 
   std::vector<MatrixXd> slopes;  // one a column, samples x joints
   const auto with = [&](std::vector<double> linear) {
-    IdentifiedModel changed = *model_;
+    ModelValue changed = model_;
     EffectFit fit;
     fit.effect = candidate.effect;
     fit.shape = candidate.shape;
     fit.linear = std::move(linear);
-    (on_body ? changed.body : changed.joints[candidate.joint].effects).push_back(std::move(fit));
+    (on_body ? body_of(changed) : joints_of(changed)[candidate.joint].effects).push_back(std::move(fit));
     return changed;
   };
   if (is_load(candidate.effect)) {

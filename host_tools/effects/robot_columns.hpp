@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "host_tools/effects/forward.hpp"
+#include "host_tools/effects/model_value.hpp"
 #include "host_tools/signals/motion.hpp"
 #include "model/rigid_body.hpp"
 
@@ -78,7 +78,7 @@ class RobotColumns {
   /// Torques for a deflection [rad | m per unit] of a joint, by its state's slopes.
   Eigen::MatrixXd of_deflection(std::size_t joint, const Eigen::VectorXd& delta) const;
 
-  std::shared_ptr<const IdentifiedModel> model_;
+  ModelValue model_;
   const Motion* motion_;
   Eigen::MatrixXd torque_, structural_;
   mutable std::vector<std::unique_ptr<Sign>> sign_;  ///< by joint

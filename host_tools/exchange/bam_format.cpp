@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/exchange/formats.hpp"
 #include "host_tools/exchange/own_reading.hpp"
 #include "host_tools/support/error.hpp"
@@ -102,7 +102,7 @@ ReplayedTorque replay_bam(const std::filesystem::path& file, const IdentifiedMod
                           double step_s) {
   const nlohmann::json all = nlohmann::json::parse(read_file(file), nullptr, false);
   std::vector<SimpleJoint> said;
-  for (const Joint& joint : expected.robot.joints) {
+  for (const Joint& joint : robot_of(expected).joints) {
     if (!all.is_object() || !all.contains(joint.name) || !all.at(joint.name).is_object())
       throw DataError(fmt::format("{}: has no joint '{}'", file.string(), joint.name));
     said.push_back(read_entry(all.at(joint.name), joint.name, file));

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host_tools/effects/evaluator.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/exchange/load_friction.hpp"
 #include "host_tools/regression/metrics.hpp"
 #include "host_tools/signals/filter.hpp"
@@ -31,7 +31,7 @@ struct Totals {
 
 /// At the times at which the log's torque column shows it, as predict() has it.
 Eigen::MatrixXd as_recorded(const Eigen::MatrixXd& tau, const IdentifiedModel& model, const ProcessedLog& log) {
-  return model.filter.torque_lead_s == 0 ? tau : at_other_times(tau, model.filter.torque_lead_s / log.step_s);
+  return filter_of(model).torque_lead_s == 0 ? tau : at_other_times(tau, filter_of(model).torque_lead_s / log.step_s);
 }
 
 void add_log(Totals& sum, const ExportFormat& format, const std::filesystem::path& file, const SimpleRobot& meant,
@@ -72,7 +72,7 @@ Certificate certify(const ExportFormat& format, const std::filesystem::path& fil
                     const CertificateOptions& options) {
   Certificate out{format.name, file.filename().string(), format.reader, to_string(logs.at(0).role), {}, {}};
   Totals sum(static_cast<Eigen::Index>(meant.joints.size()));
-  const IdentifiedModel simple = format.whole_model ? model : as_model(meant, model);
+  const ModelValue simple = format.whole_model ? ModelValue(model) : as_model(meant, model);
   for (const ProcessedLog& log : logs) {
     add_log(sum, format, file, meant, simple, model, log);
     out.logs.push_back(log.name);

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/exchange/formats.hpp"
 #include "host_tools/exchange/own_reading.hpp"
 #include "host_tools/exchange/posterior.hpp"
@@ -197,7 +197,7 @@ ReplayedTorque replay_isaaclab(const std::filesystem::path& file, const Identifi
   const nlohmann::json armature = table_of(text, "ARMATURE", file), friction = table_of(text, "FRICTION", file),
                        viscous = table_of(text, "VISCOUS_FRICTION", file);
   std::vector<SimpleJoint> said;
-  for (const Joint& joint : expected.robot.joints) {
+  for (const Joint& joint : robot_of(expected).joints) {
     said.push_back({number_of(viscous, joint.name, file), number_of(friction, joint.name, file),
                     number_of(armature, joint.name, file), 0});
   }

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <memory>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/exchange/formats.hpp"
 #include "host_tools/exchange/xml_text.hpp"
 #include "host_tools/support/error.hpp"
@@ -106,7 +106,7 @@ void write_mjcf(const SimpleRobot& robot, const std::filesystem::path& file) {
 ReplayedTorque replay_mjcf(const std::filesystem::path& file, const IdentifiedModel& expected, const MotionRows& motion,
                            double /*step_s*/) {
   const ModelPointer model = load(file);
-  const std::vector<int> dofs = dofs_of(*model, expected.robot, file);
+  const std::vector<int> dofs = dofs_of(*model, robot_of(expected), file);
   model->opt.disableflags |= mjDSBL_LIMIT;  // a log that touches a stop says nothing of friction
   const DataPointer data(mj_makeData(model.get()), mj_deleteData);
   const Eigen::Index n = motion.q.cols();

@@ -4,7 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/evaluator.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/exchange/load_friction.hpp"
 #include "host_tools/support/error.hpp"
 
@@ -24,9 +25,9 @@ ReplayedTorque replay_joints(const std::filesystem::path& file, std::vector<Simp
                              const IdentifiedModel& expected, const MotionRows& motion, double step_s) {
   const std::filesystem::path bodies = bodies_of(file);
   SimpleRobot found{read_urdf(bodies), std::move(said), {}};
-  for (std::size_t j = 0; j < expected.robot.size(); ++j) {
-    const std::string& name = expected.robot.joints[j].name;
-    if (found.robot.size() != expected.robot.size() || found.robot.joints[j].name != name)
+  for (std::size_t j = 0; j < robot_of(expected).size(); ++j) {
+    const std::string& name = robot_of(expected).joints[j].name;
+    if (found.robot.size() != robot_of(expected).size() || found.robot.joints[j].name != name)
       throw DataError(fmt::format("{}: joint {} is not '{}'", bodies.string(), j + 1, name));
   }
   ReplayedTorque out;

@@ -5,7 +5,7 @@
 #include <set>
 
 #include "host_tools/effects/evaluator.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/exchange/formats.hpp"
 #include "host_tools/exchange/sdf_reader.hpp"
 #include "host_tools/exchange/xml_text.hpp"
@@ -105,7 +105,7 @@ void write_sdf(const SimpleRobot& robot, const std::filesystem::path& file) {
 ReplayedTorque replay_sdf(const std::filesystem::path& file, const IdentifiedModel& expected, const MotionRows& motion,
                           double step_s) {
   std::vector<std::string> names;
-  for (const Joint& joint : expected.robot.joints) names.push_back(joint.name);
+  for (const Joint& joint : robot_of(expected).joints) names.push_back(joint.name);
   std::string why;
   ReadSdf* const reader = sdf_reader(why);
   if (reader == nullptr)
@@ -113,7 +113,7 @@ ReplayedTorque replay_sdf(const std::filesystem::path& file, const IdentifiedMod
   SdfRobot read;
   reader(file, names, read);
   SimpleRobot found;
-  found.robot = expected.robot;  // its gravity: that of a world is not in a model
+  found.robot = robot_of(expected);  // its gravity: that of a world is not in a model
   found.robot.joints = read.joints;
   found.joints = read.said;
   ReplayedTorque out;

@@ -97,15 +97,15 @@ void add_samples(Sums& sums, const ProcessedLog& log, Eigen::Index joint, const 
 
 }  // namespace
 
-IdentifiedModel as_model(const SimpleRobot& simple, IdentifiedModel model) {
-  const Eigen::Vector3d gravity = model.robot.gravity;
-  model.robot = simple.robot;
-  model.robot.gravity = gravity;
-  model.inertia = inertia_of(simple.robot);
-  model.base.clear();
-  model.body.clear();
-  for (std::size_t j = 0; j < model.joints.size(); ++j) {
-    JointFit& joint = model.joints[j];
+ModelValue as_model(const SimpleRobot& simple, ModelValue model) {
+  const Eigen::Vector3d gravity = model->robot.gravity;
+  model->robot = simple.robot;
+  model->robot.gravity = gravity;
+  model->inertia = inertia_of(simple.robot);
+  model->base.clear();
+  model->body.clear();
+  for (std::size_t j = 0; j < model->joints.size(); ++j) {
+    JointFit& joint = model->joints[j];
     const SimpleJoint& said = simple.joints[j];
     joint.sign_width = sharp_sign_width;
     joint.bls.reset();

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "host_tools/effects/forward.hpp"
+#include "host_tools/effects/model_value.hpp"
 #include "host_tools/regression/dataset.hpp"
 #include "host_tools/robot/robot.hpp"
 
@@ -89,7 +89,7 @@ SimpleRobot simple_robot(const IdentifiedModel& model, const Robot& bodies, bool
 
 /// The simple robot as a model of ours with sign(dq) for the direction of friction, so that one formula of each torque
 /// is enough. Filter, log formats and session are the given model's.
-IdentifiedModel as_model(const SimpleRobot& simple, IdentifiedModel model);
+ModelValue as_model(const SimpleRobot& simple, ModelValue model);
 
 /// Effects of a joint, and of the whole body, that a simple robot has no word for. ("bls": the learned part.)
 std::vector<std::string> left_out(const IdentifiedModel& model, std::size_t joint, bool has_armature,

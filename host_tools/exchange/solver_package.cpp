@@ -6,7 +6,7 @@
 
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/exchange/formats.hpp"
 #include "host_tools/exchange/xml_text.hpp"
 #include "host_tools/export/export.hpp"
@@ -184,7 +184,7 @@ void write_solver_package(const SimpleRobot& robot, const fs::path& folder) {
 }
 
 ReplayedTorque replay_tables(const fs::path&, const IdentifiedModel& expected, const MotionRows& motion, double) {
-  const Formats& formats = expected.formats.value();
+  const Formats& formats = formats_of(expected);
   FixedModel fixed(expected, formats);
   const TickStates states("", {}, motion.q, motion.dq, motion.ddq);
   Saturations ignored;
@@ -203,11 +203,11 @@ ReplayedTorque replay_tables(const fs::path&, const IdentifiedModel& expected, c
 }
 
 Eigen::MatrixXd settled(const IdentifiedModel& model, const MotionRows& motion) {
-  Evaluator<Real> evaluator(with_stored_limits(model, model.formats.value()), model.tick_s);
+  Evaluator<Real> evaluator(with_stored_limits(model, formats_of(model)), tick_of(model));
   Saturations ignored;
   const Eigen::Index joints = motion.q.cols();
   return settled_torques(
-      motion.q.rows(), joints, from_raw(1, (*model.formats)[Quantity::torque]), [&] { evaluator.reset(); },
+      motion.q.rows(), joints, from_raw(1, formats_of(model)[Quantity::torque]), [&] { evaluator.reset(); },
       [&](Eigen::Index row) {
         std::vector<JointState<Real>> states(static_cast<std::size_t>(joints));
         for (Eigen::Index j = 0; j < joints; ++j)
@@ -219,10 +219,10 @@ Eigen::MatrixXd settled(const IdentifiedModel& model, const MotionRows& motion) 
 
 std::vector<std::string> settled_effects(const IdentifiedModel& model, std::size_t joint) {
   std::vector<std::string> out;
-  for (const EffectFit& fit : model.joints.at(joint).effects) {
+  for (const EffectFit& fit : joints_of(model).at(joint).effects) {
     if (find_effect(fit.effect)->remembers) out.push_back(fit.effect);
   }
-  const auto& bls = model.joints[joint].bls;
+  const auto& bls = joints_of(model)[joint].bls;
   if (bls && bls->inputs != StateInputs::name) out.emplace_back("bls");
   return out;
 }

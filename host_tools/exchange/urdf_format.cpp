@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "host_tools/effects/evaluator.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/exchange/formats.hpp"
 #include "host_tools/robot/urdf_checks.hpp"
 #include "host_tools/robot/write_urdf.hpp"
@@ -68,9 +68,9 @@ ReplayedTorque replay_urdf(const std::filesystem::path& file, const IdentifiedMo
   found.robot = read_urdf(file);
   const urdf::ModelInterfaceSharedPtr model = urdf::parseURDF(read_file(file));
   if (!model) throw DataError(fmt::format("{}: urdfdom does not read it", file.string()));
-  for (std::size_t j = 0; j < expected.robot.size(); ++j) {
-    const std::string& name = expected.robot.joints[j].name;
-    if (found.robot.size() != expected.robot.size() || found.robot.joints[j].name != name)
+  for (std::size_t j = 0; j < robot_of(expected).size(); ++j) {
+    const std::string& name = robot_of(expected).joints[j].name;
+    if (found.robot.size() != robot_of(expected).size() || found.robot.joints[j].name != name)
       throw DataError(fmt::format("{}: joint {} is not '{}'", file.string(), j + 1, name));
     const auto dynamics = model->getJoint(name)->dynamics;
     found.joints.push_back(dynamics ? SimpleJoint{dynamics->damping, dynamics->friction, 0, 0} : SimpleJoint{});

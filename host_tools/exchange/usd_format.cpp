@@ -5,7 +5,7 @@
 #include <numbers>
 #include <set>
 
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/exchange/formats.hpp"
 #include "host_tools/exchange/own_reading.hpp"
 #include "host_tools/support/error.hpp"
@@ -103,7 +103,7 @@ ReplayedTorque replay_usd(const std::filesystem::path& file, const IdentifiedMod
                           double step_s) {
   const std::string text = read_file(file);
   std::vector<SimpleJoint> said;
-  for (const Joint& joint : expected.robot.joints) {
+  for (const Joint& joint : robot_of(expected).joints) {
     const auto number = [&](const char* name) { return read_attribute(text, joint, name, file); };
     said.push_back({number("viscousFrictionCoefficient") * units_of(joint), number("dynamicFrictionEffort"),
                     number("armature"), 0});

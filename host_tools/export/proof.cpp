@@ -89,7 +89,7 @@ double error_of(Evaluator<BoundedNumbers>& evaluator, std::vector<State> box, st
 }  // namespace
 
 Proof prove(const IdentifiedModel& identified, const Formats* formats) {
-  const IdentifiedModel model = formats != nullptr ? with_stored_limits(identified, *formats) : identified;
+  const IdentifiedModel model = formats != nullptr ? with_stored_limits(identified, *formats) : ModelValue(identified);
   Proof proof;
   const BoundScope scope(proof.ranges, formats);
   Evaluator<BoundedNumbers> evaluator(uncut(model, true), model.tick_s);

@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "host_tools/effects/effects.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/export/export.hpp"
 
 namespace fxdyn {
@@ -16,11 +16,11 @@ constexpr int differences = 2;
 QuantisationError quantisation_error(const IdentifiedModel& model, const Formats& formats,
                                      const std::vector<TickStates>& states) {
   FixedModel fixed(model, formats);
-  Evaluator<Real> exact(with_stored_limits(model, formats), model.tick_s);
-  const auto n = static_cast<Eigen::Index>(model.robot.size());
+  Evaluator<Real> exact(with_stored_limits(model, formats), tick_of(model));
+  const auto n = static_cast<Eigen::Index>(robot_of(model).size());
   const Eigen::VectorXd none = Eigen::VectorXd::Zero(n);
   QuantisationError out{none, none, none};
-  std::vector<JointState<Real>> state(model.robot.size());
+  std::vector<JointState<Real>> state(robot_of(model).size());
   Eigen::Index count = 0;
   Saturations saturations, ignored;
   for (const TickStates& log : states) {

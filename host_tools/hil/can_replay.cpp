@@ -11,7 +11,7 @@
 
 #include "firmware/protocol/object_dictionary.hpp"
 #include "host_tools/can/guard.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/support/error.hpp"
 #include "model/table_page.hpp"
 
@@ -30,8 +30,8 @@ constexpr can::Duration answer_time = 500ms, start_time = 10s;
 }  // namespace
 
 CanDrives::CanDrives(can::Bus& bus, const IdentifiedModel& model, const Settings& settings)
-    : master_(bus), model_(model), fixed_(model, *model.formats), fd_(settings.fd), heartbeat_of_(settings.master) {
-  const std::size_t n = model.robot.size();
+    : master_(bus), model_(model), fixed_(model, formats_of(model)), fd_(settings.fd), heartbeat_of_(settings.master) {
+  const std::size_t n = robot_of(model).size();
   std::vector<std::uint8_t> ids = settings.nodes;
   if (ids.empty()) {
     for (std::size_t id = 1; id <= n; ++id) ids.push_back(static_cast<std::uint8_t>(id));
@@ -66,7 +66,7 @@ CanDrives::CanDrives(can::Bus& bus, const IdentifiedModel& model, const Settings
       throw InputError(
           fmt::format("no node puts out joint {} ({}): is its drive on the bus? `candump {},700:780` shows "
                       "who is; other ids: --nodes",
-                      j + 1, model.robot.joints[j].name, bus.name()));
+                      j + 1, robot_of(model).joints[j].name, bus.name()));
   }
   joints_.resize(n);
   for (std::size_t j = 0; j < n; ++j) {
@@ -76,7 +76,7 @@ CanDrives::CanDrives(can::Bus& bus, const IdentifiedModel& model, const Settings
     joint.velocity = static_cast<std::int32_t>(master_.read(id, 0x2021, sub));
     joint.acceleration = static_cast<std::int32_t>(master_.read(id, 0x2022, sub));
     const Formats& formats = fixed_.formats();
-    joint.highest = to_raw(model.joints[j].tau_limit, formats[Quantity::torque]);
+    joint.highest = to_raw(joints_of(model)[j].tau_limit, formats[Quantity::torque]);
     joint.lowest = -joint.highest;
     joint.per_mille =
         TorqueScale::of(formats[Quantity::torque], static_cast<std::int32_t>(master_.read(id, 0x2040, sub)));
@@ -135,11 +135,11 @@ void CanDrives::check(const Node& node) {
   if (master_.read(node.id, dictionary::tables, 3) == 0)
     throw InputError(fmt::format("node {}: its tables are damaged (CRC): flash them again, {}", node.id, page));
   if (const std::uint32_t joints = master_.read(node.id, dictionary::tables, 4);
-      joints != model_.robot.size() || (node.outputs & ~all) != 0)
+      joints != robot_of(model_).size() || (node.outputs & ~all) != 0)
     throw InputError(fmt::format("node {}: its image is for a robot of {} joints, the model has {}: {}", node.id,
-                                 joints, model_.robot.size(), image));
+                                 joints, robot_of(model_).size(), image));
   // Its page may be that of its own joints, or the whole robot's of which it puts out some (fxdyn_node --joint).
-  const FixedModel own(model_, *model_.formats, node.outputs), whole(model_, *model_.formats, all);
+  const FixedModel own(model_, formats_of(model_), node.outputs), whole(model_, formats_of(model_), all);
   const bool is_own = layout == own.layout_hash();
   if (!is_own && layout != whole.layout_hash())
     throw InputError(fmt::format("node {}: its image was built for another model (layout {:08x}, expected {:08x}): {}",

@@ -10,7 +10,7 @@
 
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/evaluator.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/regression/gauss_newton.hpp"
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/regression/sandwich.hpp"
@@ -50,7 +50,7 @@ class JointData {
  public:
   JointData(const FlexibleInput& input, const std::vector<MotionRows>& motions,
             const std::vector<Eigen::MatrixXd>& loads, Eigen::Index joint, double block_s)
-      : joint_(joint), sign_width_(input.model.joints[static_cast<std::size_t>(joint)].sign_width) {
+      : joint_(joint), sign_width_(joints_of(input.model)[static_cast<std::size_t>(joint)].sign_width) {
     std::vector<Eigen::VectorXd> deltas;
     for (std::size_t l = 0; l < input.logs.size(); ++l) {
       const ProcessedLog& log = input.logs[l];
@@ -88,7 +88,7 @@ class JointData {
   /// What the base parameters' standard deviations make of the coefficients, as a covariance: each of them moves the
   /// load, and so the fit. Their correlations are not known here.
   Eigen::MatrixXd from_load(const LeastSquares& fit, const IdentifiedModel& model, Regressor regressor) const {
-    const auto count = static_cast<Eigen::Index>(model.base.size());
+    const auto count = static_cast<Eigen::Index>(base_of(model).size());
     // A model that was not identified (a simulated plant) has no deviations.
     if (count == 0) return Eigen::MatrixXd::Zero(fit.x.cols(), fit.x.cols());
     Eigen::MatrixXd moved = Eigen::MatrixXd::Zero(fit.x.cols(), count);
@@ -101,7 +101,7 @@ class JointData {
         const Eigen::Index k = log.first + i * log.decimation;
         const Eigen::MatrixXd& y = regressor(m.q.row(k), m.dq.row(k), m.ddq.row(k));
         for (Eigen::Index b = 0; b < count; ++b) {
-          const BaseParameter& parameter = model.base[static_cast<std::size_t>(b)];
+          const BaseParameter& parameter = base_of(model)[static_cast<std::size_t>(b)];
           load[b] = parameter.std * y(joint_, static_cast<Eigen::Index>(parameter.column));
         }
         moved += fit.x.row(row).transpose() * load;
@@ -250,7 +250,7 @@ GearFit without_other_causes(const JointData& data, const IdentifiedModel& model
 
 FlexibleJoint identify_joint(const JointData& data, const IdentifiedModel& model, const Regressor& regressor,
                              std::size_t j, bool rotor_in_load, const FlexibleOptions& options) {
-  const bool revolute = model.robot.joints[j].type == JointType::revolute;
+  const bool revolute = robot_of(model).joints[j].type == JointType::revolute;
   const std::string_view stiffness_unit = revolute ? "N*m/rad" : "N/m", length_unit = revolute ? "mrad" : "mm";
   const Eigen::VectorXd& delta = data.deflection();
   FlexibleJoint out;
@@ -309,7 +309,7 @@ FlexibleJoint identify_joint(const JointData& data, const IdentifiedModel& model
     gradient[0] = -fit.rotor / c;
     gradient[2] = -1 / c;
     out.inertia_std = spread(ls, gradient);
-  } else if (const EffectFit* rotor = rotor_of(model.joints[j])) {
+  } else if (const EffectFit* rotor = rotor_of(joints_of(model)[j])) {
     out.effective_inertia = rotor->linear[0];
     out.inertia_std = rotor->linear_std.empty() ? 0 : rotor->linear_std[0];
   }
@@ -327,8 +327,8 @@ std::vector<FlexibleJoint> identify_flexible(const FlexibleInput& input, const F
     return std::find(log.has_link.begin(), log.has_link.end(), true) != log.has_link.end();
   });
   if (!any) return {};
-  IdentifiedModel rigid = input.model;
-  for (JointFit& joint : rigid.joints) {
+  ModelValue rigid = input.model;
+  for (JointFit& joint : joints_of(rigid)) {
     joint.effects.clear();
     joint.bls.reset();
   }
@@ -340,15 +340,15 @@ std::vector<FlexibleJoint> identify_flexible(const FlexibleInput& input, const F
     const MotionRows& m = motions.back();
     Predictor(with_load_of(log, rigid), log.step_s)(m.q, m.dq, m.ddq, loads.back());
   }
-  const DhChain chain = to_dh(input.model.robot);
+  const DhChain chain = to_dh(robot_of(input.model));
   const BaseSet base = find_base(chain);
-  std::vector<std::optional<FlexibleJoint>> all(input.model.robot.size());
+  std::vector<std::optional<FlexibleJoint>> all(robot_of(input.model).size());
   parallel_for(all.size(), [&](std::size_t j) {
     const auto joint = static_cast<Eigen::Index>(j);
     const JointData data(input, motions, loads, joint, options.block_s);
     if (data.empty()) return;
     const bool rotor_in_load =
-        rotor_of(input.model.joints[j]) == nullptr && rotor_inertia_is_absorbed(chain, base, joint);
+        rotor_of(joints_of(input.model)[j]) == nullptr && rotor_inertia_is_absorbed(chain, base, joint);
     all[j] = identify_joint(data, input.model, Regressor(chain), j, rotor_in_load, options);
   });
   std::vector<FlexibleJoint> found;

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "host_tools/effects/effect_roles.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/identify/payload.hpp"
 #include "host_tools/regression/fit_data.hpp"
 #include "host_tools/regression/sandwich.hpp"
@@ -32,7 +32,7 @@ struct Measured {
 Measured measured(const IdentifiedModel& model, const ProcessedLog& log) {
   Measured out;
   out.missing =
-      at_other_times(log.filter_columns(log.tau - predict(model, log)), -model.filter.torque_lead_s / log.step_s);
+      at_other_times(log.filter_columns(log.tau - predict(model, log)), -filter_of(model).torque_lead_s / log.step_s);
   out.carried = structural_torque(model, {log})[0] + out.missing;
   return out;
 }
@@ -82,8 +82,8 @@ JointRows rows_of(const IdentifiedModel& model, const FitData& data, const std::
   const auto at = static_cast<std::size_t>(j);
   const std::vector<ProcessedLog>& logs = *data.logs;
   const MatrixXd& base = data.base_rows[at];
-  const MatrixXd without = friction_columns(model.joints[at], logs[0], j, measured[0].carried.col(j)),
-                 with = friction_columns(model.joints[at], logs[1], j, measured[1].carried.col(j));
+  const MatrixXd without = friction_columns(joints_of(model)[at], logs[0], j, measured[0].carried.col(j)),
+                 with = friction_columns(joints_of(model)[at], logs[1], j, measured[1].carried.col(j));
   const Index own = without.cols(), loaded = with.rows();
   JointRows out{VectorXd(base.rows()), data.load_rows[at], {}, without.rows()};
   out.missing << logs[0].decimate(measured[0].missing.col(j)), logs[1].decimate(measured[1].missing.col(j));
@@ -270,16 +270,16 @@ std::vector<JointGain> identify_gains(const IdentifiedModel& model, const Load& 
   const std::vector<Measured> torque{measured(model, logs[0]), measured(model, logs[1])};
   for (ProcessedLog& log : logs) log.left_out = rest;
   logs[1].load = load;
-  const FitData data = make_fit_data(model.robot, logs, 0);
+  const FitData data = make_fit_data(robot_of(model), logs, 0);
   std::vector<JointGain> out;
-  for (std::size_t j = 0; j < model.robot.size(); ++j) {
+  for (std::size_t j = 0; j < robot_of(model).size(); ++j) {
     if (rest[j]) {
       out.emplace_back();
       continue;
     }
     out.push_back(gain_of(rows_of(model, data, torque, static_cast<Index>(j)), repeated, options));
   }
-  check_felt(out, model.robot, load, loaded, options);
+  check_felt(out, robot_of(model), load, loaded, options);
   return out;
 }
 

@@ -7,8 +7,8 @@
 
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/evaluator.hpp"
-#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/effects/link_parameters.hpp"
+#include "host_tools/effects/model_parts.hpp"
 #include "host_tools/regression/joint_weight.hpp"
 #include "host_tools/regression/physical.hpp"
 #include "host_tools/regression/sandwich.hpp"
@@ -49,7 +49,7 @@ struct Rows {
 };
 
 Rows build_rows(const IdentifiedModel& model, const DhChain& chain, const ProcessedLog& log) {
-  const auto n = static_cast<Index>(model.robot.size());
+  const auto n = static_cast<Index>(robot_of(model).size());
   const MatrixXd missing = log.decimate(log.filter_columns(log.tau - predict(model, log)));
   const MotionRows motion = log.motion();
   const MatrixXd map = to_dh_frame(chain.urdf_in_dh.back());
@@ -72,10 +72,10 @@ Rows build_rows(const IdentifiedModel& model, const DhChain& chain, const Proces
   for (Index j = 0; j < n; ++j) {
     const auto at = static_cast<std::size_t>(j);
     const JointSeries series{motion.q.col(j), motion.dq.col(j), motion.ddq.col(j), {}, log.step_s};
-    full[at].col(ten) = effect_columns(dry_friction_effect().name, {}, model.joints[at].sign_width, series);
-    full[at].col(ten + 1) = effect_columns(constant_effect().name, {}, model.joints[at].sign_width, series);
+    full[at].col(ten) = effect_columns(dry_friction_effect().name, {}, joints_of(model)[at].sign_width, series);
+    full[at].col(ten + 1) = effect_columns(constant_effect().name, {}, joints_of(model)[at].sign_width, series);
     rows.columns.push_back(
-        log.decimate(log.filter_columns(at_other_times(full[at], model.filter.torque_lead_s / log.step_s))));
+        log.decimate(log.filter_columns(at_other_times(full[at], filter_of(model).torque_lead_s / log.step_s))));
     full[at].resize(0, 0);
     rows.missing.emplace_back(missing.col(j));
   }
@@ -281,7 +281,7 @@ ConsistentFit possible_load(const Fit& fit, const std::array<bool, 10>& apart, I
 }  // namespace
 
 void check_weighable(const IdentifiedModel& model, const ProcessedLog& log) {
-  for (const EffectFit& effect : model.body) {
+  for (const EffectFit& effect : body_of(model)) {
     if (is_load(effect.effect))
       throw InputError("the model has a payload already: take the model that was identified without load");
   }
@@ -290,19 +290,19 @@ void check_weighable(const IdentifiedModel& model, const ProcessedLog& log) {
 
 LoadFit identify_load(const IdentifiedModel& model, const ProcessedLog& log, const LoadOptions& options) {
   check_weighable(model, log);
-  const DhChain chain = to_dh(model.robot);
-  const auto n = static_cast<Index>(model.robot.size());
+  const DhChain chain = to_dh(robot_of(model));
+  const auto n = static_cast<Index>(robot_of(model).size());
   const Rows rows = build_rows(model, chain, log);
   const Fit fit = solve(rows, options.faded);
   const std::array<bool, 10> apart = identifiable(fit, options);
   const double mass = fit.solution[0], mass_std = std::sqrt(std::max(0.0, fit.covariance(0, 0)));
   if (!apart[0]) {
     throw DataError(fmt::format("{}: the mass of the load cannot be identified from this motion: {}", log.name,
-                                what_to_move(model.robot, log, rows, options.least_lift)));
+                                what_to_move(robot_of(model), log, rows, options.least_lift)));
   }
   if (!(mass > 0) || mass_std > options.largest_uncertainty * mass) {
     throw DataError(fmt::format("{}: no load to be seen: mass {:.3g} kg, standard deviation {:.3g} kg; {}", log.name,
-                                mass, mass_std, what_to_move(model.robot, log, rows, options.least_lift)));
+                                mass, mass_std, what_to_move(robot_of(model), log, rows, options.least_lift)));
   }
 
   const ConsistentFit possible = possible_load(fit, apart, n, options.density);

@@ -314,13 +314,13 @@ ProcessedLog process(Log log, const FilterFit& filter, const ProcessSettings& se
   return out;
 }
 
-IdentifiedModel with_load_of(const ProcessedLog& log, IdentifiedModel model) {
+ModelValue with_load_of(const ProcessedLog& log, ModelValue model) {
   if (!log.load) return model;
   const Eigen::Vector3d& com = log.load->com;
   EffectFit payload;
   payload.effect = load_effect().name;
   payload.linear = {log.load->mass, com.x(), com.y(), com.z()};
-  model.body.push_back(payload);
+  model->body.push_back(payload);
   return model;
 }
 
@@ -359,10 +359,10 @@ double bending_hz(const ProcessedLog& log) {
 
 bool bends(std::string_view effect) { return find_effect(effect)->bends(); }
 
-std::optional<IdentifiedModel> stiffened(const IdentifiedModel& model) {
-  IdentifiedModel out = model;
+std::optional<ModelValue> stiffened(const IdentifiedModel& model) {
+  ModelValue out = model;
   std::size_t bent = 0;
-  for (JointFit& joint : out.joints)
+  for (JointFit& joint : out->joints)
     bent += std::erase_if(joint.effects, [](const EffectFit& fit) { return bends(fit.effect); });
   return bent > 0 ? std::optional(std::move(out)) : std::nullopt;
 }

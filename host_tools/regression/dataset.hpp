@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "host_tools/effects/filter_fit.hpp"
-#include "host_tools/effects/forward.hpp"
+#include "host_tools/effects/model_value.hpp"
 #include "host_tools/logs/log.hpp"
 #include "host_tools/signals/motion.hpp"
 #include "host_tools/signals/whole.hpp"
@@ -94,7 +94,7 @@ struct ProcessSettings {
 ProcessedLog process(Log log, const FilterFit& filter, const ProcessSettings& settings = {});
 
 /// The model with the log's known load on the flange.
-IdentifiedModel with_load_of(const ProcessedLog& log, IdentifiedModel model);
+ModelValue with_load_of(const ProcessedLog& log, ModelValue model);
 
 /// How long the robot has run when the log begins: since the start of the model's session, where the log's time stamps
 /// say that it belongs to it (up to three of the drift's time constants after its end) and the model drifts; else 0
@@ -111,7 +111,7 @@ double bending_hz(const ProcessedLog& log);
 /// Whether an effect is such a one.
 bool bends(std::string_view effect);
 /// The model without them; nothing: it has none.
-std::optional<IdentifiedModel> stiffened(const IdentifiedModel& model);
+std::optional<ModelValue> stiffened(const IdentifiedModel& model);
 
 /// Torques of the model over a log, block by block, with the log's known load, as warm as the robot was
 /// (age_of()), and at the times at which the log's torque column shows them (torque_lead_s of the model's filter):

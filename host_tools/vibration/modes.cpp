@@ -8,7 +8,7 @@
 
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/evaluator.hpp"
-#include "host_tools/effects/identified_model.hpp"
+#include "host_tools/effects/model_parts.hpp"
 
 namespace fxdyn {
 namespace {
@@ -21,7 +21,9 @@ using Eigen::VectorXd;
 constexpr double least_rotor = 1e-3;
 constexpr double rounding = 1e-9;  ///< of a mode without damping
 
-const JointFit& joint_of(const IdentifiedModel& model, Index j) { return model.joints[static_cast<std::size_t>(j)]; }
+const JointFit& joint_of(const IdentifiedModel& model, Index j) {
+  return joints_of(model)[static_cast<std::size_t>(j)];
+}
 
 double rotor(const IdentifiedModel& model, Index j) {
   const EffectFit* fit = rotor_of(joint_of(model, j));
@@ -70,7 +72,7 @@ Oscillator oscillator(const IdentifiedModel& model, const VectorXd& q, const Mot
 
 MatrixXd link_mass(const IdentifiedModel& model, const VectorXd& q) {
   const Index n = q.size();
-  Evaluator<Real> evaluator(unlimited(model), model.tick_s);
+  Evaluator<Real> evaluator(unlimited(model), tick_of(model));
   std::vector<JointState<Real>> states(static_cast<std::size_t>(n));
   for (Index j = 0; j < n; ++j) states[static_cast<std::size_t>(j)] = {q[j], 0, 0};
   const auto torque = [&] { return VectorXd(Eigen::Map<const VectorXd>(evaluator.rigid_body(states).data(), n)); };

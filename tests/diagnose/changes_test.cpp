@@ -14,9 +14,9 @@ std::vector<std::string> changed(EffectFit effect, double before, double now) {
   Models models = test::around(test::fitted_puma());
   models.has_baseline = true;
   effect.linear[0] = before;
-  models.current.joints[1].effects.push_back(effect);
+  models.current->joints[1].effects.push_back(effect);
   models.healthy = models.current;
-  models.current.joints[1].effects.back().linear[0] = now;
+  models.current->joints[1].effects.back().linear[0] = now;
   const std::vector<SessionLog> logs{test::small_session_log(models.current, Role::train, 1),
                                      test::small_session_log(models.healthy, Role::baseline, 2)};
   std::vector<std::string> out;
@@ -62,13 +62,13 @@ TEST(Changes, TheOneOnTopIsFound) {
   const std::vector<SessionLog> logs = two_sessions(presliding, 4, 8);
   Models models = test::around(test::fitted_puma());
   models.has_baseline = true;
-  models.current.joints[1].effects.push_back(presliding);
+  models.current->joints[1].effects.push_back(presliding);
   models.healthy = models.current;
   models.held = {{"presliding", 1, {0.01}}};
   Progress progress;
   const Outcome outcome = explore(models, logs, {}, 1, progress);
   ASSERT_EQ(outcome.found.size(), 1U);
-  const EffectFit& found = outcome.models.current.joints[1].effects.at(outcome.found[0].id.effect);
+  const EffectFit& found = outcome.models.current->joints[1].effects.at(outcome.found[0].id.effect);
   EXPECT_EQ(found.effect, "presliding");
   EXPECT_NEAR(found.linear[0], 4, 0.4);
 }
@@ -80,7 +80,7 @@ double speaks_for_a_change(double before) {
   Models models = test::around(test::fitted_puma());
   models.has_baseline = true;
   models.healthy = models.current;
-  models.current.joints[1].effects.push_back(quadratic);
+  models.current->joints[1].effects.push_back(quadratic);
   Linearised problem(models, logs, test::no_whitening());
   return new_since_baseline(problem, in_model(problem), 0);
 }

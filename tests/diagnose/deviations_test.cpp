@@ -45,7 +45,7 @@ TEST_F(BackToStart, AnEffectThatIsLeftWithoutANameIsDroppedWithItsProblem) {
   Outcome right = outcome_of(start_);
   back_to_start(right, start_, logs_);
   Models longer = start_;
-  longer.current.joints[1].effects.push_back(test::effect("stribeck", {0.2}, {0.5}));
+  longer.current->joints[1].effects.push_back(test::effect("stribeck", {0.2}, {0.5}));
   Outcome outcome = outcome_of(longer);
   back_to_start(outcome, start_, logs_);
   expect_same_deviations(outcome.models.current, right.models.current);
@@ -56,7 +56,7 @@ TEST_F(BackToStart, AnotherEffectInItsPlaceIsDropped) {
   Outcome right = outcome_of(start_);
   back_to_start(right, start_, logs_);
   Models other = start_;
-  other.current.joints[1].effects.back() = test::effect("viscous_cubic", {}, {0.1});
+  other.current->joints[1].effects.back() = test::effect("viscous_cubic", {}, {0.1});
   Outcome outcome = outcome_of(other);
   back_to_start(outcome, start_, logs_);
   expect_same_deviations(outcome.models.current, right.models.current);
@@ -71,7 +71,7 @@ TEST_F(BackToStart, TheProblemStaysWhereItIsTheModels) {
 
 TEST_F(BackToStart, DeviationsOfAnotherModelAreRefused) {
   Models longer = start_;
-  longer.current.joints[1].effects.push_back(test::effect("stribeck", {0.2}, {0.5}));
+  longer.current->joints[1].effects.push_back(test::effect("stribeck", {0.2}, {0.5}));
   const Outcome outcome = outcome_of(longer);
   Models models = start_;
   EXPECT_THROW(add_deviations(models, *outcome.problem), std::out_of_range);
@@ -80,7 +80,7 @@ TEST_F(BackToStart, DeviationsOfAnotherModelAreRefused) {
 /// Deviations of a delay on the second joint off none.
 double of_delay(double time) {
   Models models = test::around(test::fitted_puma());
-  models.current.joints[1].effects.push_back(test::named_effect("delay", {time}, {1}));
+  models.current->joints[1].effects.push_back(test::named_effect("delay", {time}, {1}));
   const std::vector<SessionLog> logs{test::small_session_log(models.current, Role::train, 1)};
   return deviations_off_nothing(Linearised(models, logs, test::no_whitening()), {0})[0];
 }

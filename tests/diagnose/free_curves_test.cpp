@@ -130,7 +130,7 @@ TEST(FreeCurves, NoiseGetsNone) {
     return ArrayXd::Zero(q.size());
   });
   EXPECT_TRUE(a.curves.empty());
-  EXPECT_EQ(a.after.current.joints[1].effects.size(), a.before.current.joints[1].effects.size());
+  EXPECT_EQ(a.after.current->joints[1].effects.size(), a.before.current->joints[1].effects.size());
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ class NamesAtTheGate : public testing::Test {
       processed_.push_back(logs_.back().log);
     }
     outcome_.models = test::around(nominal_);
-    auto& joints = outcome_.models.current.joints;
+    auto& joints = outcome_.models.current->joints;
     joints[1].effects.push_back(test::named_effect("ripple", {14}, {0.5, 0.2}));
     joints[2].effects.push_back(test::named_effect("spring", {}, {0.01, 0}));
     outcome_.found = {{{false, 1, joints[1].effects.size() - 1}, 100, {}},
@@ -53,7 +53,7 @@ TEST_F(NamesAtTheGate, OnlyWhatBringsSomethingStays) {
   ASSERT_EQ(gate.groups.size(), 1U);
   ASSERT_EQ(outcome_.found.size(), 1U);
   EXPECT_EQ(outcome_.problem->groups()[gate.groups[0]].candidate.effect, "ripple");
-  EXPECT_EQ(outcome_.models.current.joints[2].find("spring"), nullptr);
+  EXPECT_EQ(outcome_.models.current->joints[2].find("spring"), nullptr);
   EXPECT_GT(gate.closure[1], 0.9);
   EXPECT_TRUE(gate.accepted[1]);
   EXPECT_FALSE(gate.remains[1]);
@@ -158,13 +158,13 @@ TEST_F(NamesAtTheGate, WhatRaisesAJointsErrorGoesEvenIfItPassedBefore) {
   take_out(outcome_, *gone, logs_);
   ASSERT_EQ(outcome_.found.size(), 1U);
   EXPECT_EQ(outcome_.found[0].id.joint, 2U);
-  EXPECT_EQ(outcome_.models.current.joints[1].find("ripple"), nullptr);
+  EXPECT_EQ(outcome_.models.current->joints[1].find("ripple"), nullptr);
 }
 
 TEST_F(NamesAtTheGate, StayWhereAFitInTheWholeBandCuresAJoint) {
   Models nominal = test::around(nominal_);
   refit(nominal, logs_, test::no_whitening(), 8);
-  for (EffectFit& fit : outcome_.models.current.joints[1].effects) {
+  for (EffectFit& fit : outcome_.models.current->joints[1].effects) {
     if (fit.effect == "viscous") fit.linear[0] += 2;  // as whitened rows may have it
   }
   outcome_.look_again(logs_);
@@ -174,7 +174,7 @@ TEST_F(NamesAtTheGate, StayWhereAFitInTheWholeBandCuresAJoint) {
   ASSERT_TRUE(harmed()[1]);
   pass(outcome_, nominal.current, logs_, still_);
   ASSERT_EQ(outcome_.found.size(), 1U);
-  EXPECT_NE(outcome_.models.current.joints[1].find("ripple"), nullptr);
+  EXPECT_NE(outcome_.models.current->joints[1].find("ripple"), nullptr);
   EXPECT_FALSE(harmed()[1]);
 }
 
@@ -217,15 +217,15 @@ class Rivals : public NamesAtTheGate {
 TEST_F(Rivals, TheOneThatErrsLessTakesThePlace) {
   settle(spring_, ripple_);
   ASSERT_EQ(outcome_.found.size(), 1U);
-  EXPECT_NE(outcome_.models.current.joints[1].find("ripple"), nullptr);
-  EXPECT_EQ(outcome_.models.current.joints[1].find("spring"), nullptr);
+  EXPECT_NE(outcome_.models.current->joints[1].find("ripple"), nullptr);
+  EXPECT_EQ(outcome_.models.current->joints[1].find("spring"), nullptr);
   EXPECT_TRUE(outcome_.found[0].evidence.there);
 }
 
 TEST_F(Rivals, TheOneThatErrsMoreDoesNot) {
   settle(ripple_, spring_);
   ASSERT_EQ(outcome_.found.size(), 1U);
-  EXPECT_NE(outcome_.models.current.joints[1].find("ripple"), nullptr);
+  EXPECT_NE(outcome_.models.current->joints[1].find("ripple"), nullptr);
 }
 
 /// The same, of two train logs that judge one another.
@@ -278,7 +278,7 @@ class NamesInThePosition : public NamesAtTheGate {
       ProcessedLog& log = logs_[l].log;
       for (Eigen::Index k = 0; k < log.samples(); ++k) log.tau(k, 1) += torque(log.q(k, 1));
     }
-    auto& joints = outcome_.models.current.joints;
+    auto& joints = outcome_.models.current->joints;
     joints[2].effects.pop_back();
     joints[1].effects.pop_back();
     joints[1].effects.insert(joints[1].effects.end(), names.begin(), names.end());
@@ -316,7 +316,7 @@ class ASmallNameBesideALargeOne : public testing::Test {
   ASmallNameBesideALargeOne() : nominal_(test::fitted_puma()) {
     IdentifiedModel robot = nominal_;
     outcome_.models = test::around(nominal_);
-    auto& effects = outcome_.models.current.joints[1].effects;
+    auto& effects = outcome_.models.current->joints[1].effects;
     for (const auto& [wavenumber, amplitude] : {std::pair{14.0, 1.0}, std::pair{23.0, 0.07}}) {
       robot.joints[1].effects.push_back(test::effect("ripple", {wavenumber}, {amplitude, 0}));
       effects.push_back(test::named_effect("ripple", {wavenumber}, {amplitude, 0}));

@@ -31,7 +31,7 @@ class FriendlyFire : public ::testing::Test {
     refit(models, logs_, test::no_whitening(), 8);
     nominal_ = models.current;
     outcome_.models = models;
-    outcome_.models.current.joints[joint].effects.push_back(test::named_effect("viscous_cubic", {}, {cubic}));
+    outcome_.models.current->joints[joint].effects.push_back(test::named_effect("viscous_cubic", {}, {cubic}));
     outcome_.whitening = test::no_whitening();
     outcome_.found.push_back({.id = {false, joint, nominal_.joints[joint].effects.size()}, .alternatives = {}});
     refit(outcome_.models, logs_, outcome_.whitening, 8);
@@ -63,7 +63,7 @@ TEST_F(FriendlyFire, IsHeldBackToTheJointWhereSomethingWasFound) {
 }
 
 TEST_F(FriendlyFire, ALoadIsAllJointsAndIsNotHeldBack) {
-  outcome_.models.current.body.push_back(test::named_effect("payload", {}, {1e-3, 0, 0, 0}));
+  outcome_.models.current->body.push_back(test::named_effect("payload", {}, {1e-3, 0, 0, 0}));
   outcome_.found.push_back({.id = {true, 0, 0}, .alternatives = {}});
   outcome_.look_again(logs_);
   EXPECT_FALSE(fit_without_harm(outcome_, nominal_, logs_));

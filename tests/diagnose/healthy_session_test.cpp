@@ -30,7 +30,7 @@ TEST(HealthySession, FrictionWithMemoryIsLearnedWithoutAName) {
   ASSERT_FALSE(session.effects.empty());
   EXPECT_EQ(session.effects[0].joint, 0U);
   EXPECT_TRUE(session.structured.empty());
-  for (const JointFit& joint : session.models.current.joints) {
+  for (const JointFit& joint : session.models.current->joints) {
     for (const EffectFit& effect : joint.effects) EXPECT_FALSE(effect.named) << effect.effect;
   }
 }

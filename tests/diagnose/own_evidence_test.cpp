@@ -30,7 +30,7 @@ std::vector<OwnEvidence> evidence(const TorqueOfPositions& torque, const std::ve
     logs.back().log.tau.col(1).array() += torque(q.col(1).array(), q.col(3).array());
   }
   Models models = test::around(nominal);
-  for (const EffectFit& fit : effects) models.current.joints[1].effects.push_back(fit);
+  for (const EffectFit& fit : effects) models.current->joints[1].effects.push_back(fit);
   const Linearised problem(models, logs, test::no_whitening());
   std::vector<MatrixXd> functions(problem.joints());
   for (std::size_t j = 0; j < functions.size(); ++j) functions[j] = features(problem, j);
@@ -146,7 +146,7 @@ double form_of_tilt(double share, const std::vector<EffectFit>& at_joint, std::v
     tau.col(2) = without.log.tau.col(2) + share * (tau.col(2) - without.log.tau.col(2));
   }
   Models models = test::around(nominal);
-  models.current.body.push_back(test::named_effect("gravity_tilt", {}, {0.01, 0.01}));
+  models.current->body.push_back(test::named_effect("gravity_tilt", {}, {0.01, 0.01}));
   Linearised problem(models, logs, test::no_whitening());
   const std::vector<std::size_t> groups = in_model(problem);
   return form_on_robot(problem, groups, groups.at(0));

@@ -56,7 +56,7 @@ TEST(Refit, OfSomeJointsLeavesAllElseAsItIs) {
   EXPECT_NEAR(offset(models.current, 1) - offset(nominal, 1), 3, 0.02);
   EXPECT_EQ(offset(models.current, 0), offset(nominal, 0));
   for (std::size_t c = 0; c < nominal.base.size(); ++c)
-    EXPECT_EQ(models.current.base[c].value, nominal.base[c].value) << c;
+    EXPECT_EQ(models.current->base[c].value, nominal.base[c].value) << c;
 }
 
 }  // namespace

@@ -39,7 +39,7 @@ class UnknownsOfAModel : public testing::Test {
 };
 
 TEST_F(UnknownsOfAModel, ALoadsCentreHasAPriorAndItsMassNone) {
-  models_.current.body.push_back(test::named_effect("payload", {}, {2, 0.1, 0, 0.2}));
+  models_.current->body.push_back(test::named_effect("payload", {}, {2, 0.1, 0, 0.2}));
   const Unknowns unknowns = make_unknowns(models_);
   ASSERT_EQ(unknowns.named.size(), 1U);
   const auto first = static_cast<std::size_t>(unknowns.named[0].first);
@@ -51,9 +51,9 @@ TEST_F(UnknownsOfAModel, ALoadsCentreHasAPriorAndItsMassNone) {
 }
 
 TEST_F(UnknownsOfAModel, AreBaseParametersThenFrictionThenNames) {
-  models_.current.joints[1].effects.push_back(test::named_effect("ripple", {12}, {0.3, 0.4}));
+  models_.current->joints[1].effects.push_back(test::named_effect("ripple", {12}, {0.3, 0.4}));
   const Unknowns unknowns = make_unknowns(models_);
-  EXPECT_EQ(count(unknowns, Kind::base), models_.current.base.size());
+  EXPECT_EQ(count(unknowns, Kind::base), models_.current->base.size());
   EXPECT_EQ(count(unknowns, Kind::width), 6U);
   EXPECT_EQ(count(unknowns, Kind::shape), 1U);
   EXPECT_EQ(count(unknowns, Kind::linear), 6U * 3 + 2);
@@ -67,7 +67,7 @@ TEST_F(UnknownsOfAModel, AreBaseParametersThenFrictionThenNames) {
 TEST_F(UnknownsOfAModel, FrictionMayChangeALittleFromSessionToSession) {
   models_.has_baseline = true;
   models_.healthy = models_.current;
-  models_.current.joints[0].effects[1].linear[0] = 2.5;  // Coulomb: 2 before
+  models_.current->joints[0].effects[1].linear[0] = 2.5;  // Coulomb: 2 before
   const Unknowns unknowns = make_unknowns(models_);
   const auto change = std::find_if(unknowns.all.begin(), unknowns.all.end(),
                                    [](const Unknown& u) { return u.change && u.joint == 0 && u.effect == 1; });
@@ -100,14 +100,14 @@ TEST_F(UnknownsOfAModel, AGapThatTheLargestLoadDoesNotCloseIsNone) {
 
 // model.json with more damping would be refused: bristles would drive the joint.
 TEST_F(UnknownsOfAModel, LuGreStaysFriction) {
-  models_.current.joints[1].effects.push_back(test::named_effect("lugre", {0.01, 0.02, 0.6}, {5, 30}));
+  models_.current->joints[1].effects.push_back(test::named_effect("lugre", {0.01, 0.02, 0.6}, {5, 30}));
   const Unknowns unknowns = make_unknowns(models_);
   const auto damping = std::find_if(unknowns.all.begin(), unknowns.all.end(), [](const Unknown& u) {
     return u.kind == Kind::linear && u.joint == 1 && u.effect == 3 && u.index == 1;
   });
   ASSERT_NE(damping, unknowns.all.end());
   update(models_, unknowns.all, only(unknowns, static_cast<std::size_t>(damping - unknowns.all.begin()), 1e5), 1);
-  const JointFit& joint = models_.current.joints[1];
+  const JointFit& joint = models_.current->joints[1];
   EXPECT_EQ(why_it_does_not_brake(joint, joint.dq_limit), std::nullopt);
   EXPECT_NEAR(joint.find("lugre")->linear[1], *most_that_brakes(joint, *joint.find("lugre"), joint.dq_limit), 1);
 }
@@ -125,31 +125,31 @@ TEST_F(UnknownsOfAModel, HowMuchIsAThreshold) {
 
 TEST_F(UnknownsOfAModel, AFitMovesTheModel) {
   const Unknowns unknowns = make_unknowns(models_);
-  const std::size_t coulomb = models_.current.base.size() + 2;  // behind width and viscous
+  const std::size_t coulomb = models_.current->base.size() + 2;  // behind width and viscous
   Models moved = models_;
   update(moved, unknowns.all, only(unknowns, coulomb, 3), 0.5);
-  EXPECT_NEAR(moved.current.joints[0].effects[1].linear[0], 2.5, 1e-12);
-  EXPECT_EQ(moved.current.joints[0].effects[0].linear[0], 1);
+  EXPECT_NEAR(moved.current->joints[0].effects[1].linear[0], 2.5, 1e-12);
+  EXPECT_EQ(moved.current->joints[0].effects[0].linear[0], 1);
   // The logarithm of a width, by 0.4 at most.
-  update(moved, unknowns.all, only(unknowns, models_.current.base.size(), 5), 1);
-  EXPECT_NEAR(moved.current.joints[0].sign_width, 0.02 * std::exp(0.4), 1e-12);
+  update(moved, unknowns.all, only(unknowns, models_.current->base.size(), 5), 1);
+  EXPECT_NEAR(moved.current->joints[0].sign_width, 0.02 * std::exp(0.4), 1e-12);
   // A base parameter, with the inertia that stands for it.
-  update(moved, unknowns.all, only(unknowns, 3, models_.current.base[3].value + 0.25), 1);
-  const std::size_t column = models_.current.base[3].column;
+  update(moved, unknowns.all, only(unknowns, 3, models_.current->base[3].value + 0.25), 1);
+  const std::size_t column = models_.current->base[3].column;
   const auto inertia = [&](const IdentifiedModel& model) {
     return to_array(model.inertia[column / parameters_per_link])[column % parameters_per_link];
   };
-  EXPECT_NEAR(moved.current.base[3].value, models_.current.base[3].value + 0.25, 1e-12);
+  EXPECT_NEAR(moved.current->base[3].value, models_.current->base[3].value + 0.25, 1e-12);
   EXPECT_NEAR(inertia(moved.current), inertia(models_.current) + 0.25, 1e-12);
 }
 
 TEST_F(UnknownsOfAModel, APayloadIsMassAndFirstMoment) {
-  models_.current.body = {test::named_effect("payload", {}, {2, 0.1, 0, 0.05})};
+  models_.current->body = {test::named_effect("payload", {}, {2, 0.1, 0, 0.05})};
   const Unknowns unknowns = make_unknowns(models_);
   const auto mass = static_cast<std::size_t>(unknowns.named[0].first);
   EXPECT_NEAR(unknowns.all[mass + 1].value, 0.2, 1e-12);
   update(models_, unknowns.all, only(unknowns, mass, 4), 1);
-  const std::vector<double>& load = models_.current.body[0].linear;
+  const std::vector<double>& load = models_.current->body[0].linear;
   EXPECT_EQ(load[0], 4);
   EXPECT_NEAR(load[0] * load[1], 0.2, 1e-12);  // the first moment stays
 }
