@@ -36,6 +36,15 @@ class Compiled(unittest.TestCase):
         self.assertEqual(compiled.after_change(DEPS, 'h.hpp'), {'a': 1, 'b': 1})
         self.assertEqual(compiled.after_change(DEPS, 'r_h.hpp'), {})
 
+    def test_sources_reach_a_header_through_headers(self):
+        includes = {'model/e.hpp': [], 'host_tools/a/h.hpp': ['model/e.hpp'], 'host_tools/a/x.cpp': ['host_tools/a/h.hpp'],
+                    'host_tools/b/y.cpp': ['model/e.hpp', '<vector>'], 'host_tools/b/z.cpp': [], 'hal/w.cpp': ['model/e.hpp']}
+        self.assertEqual(compiled.sources_with(includes, 'model/e.hpp'), ['host_tools/a/x.cpp', 'host_tools/b/y.cpp'])
+        self.assertEqual(compiled.sources_with(includes, 'host_tools/b/z.cpp'), ['host_tools/b/z.cpp'])
+
+    def test_a_missed_goal_is_named(self):
+        self.assertEqual(compiled.misses([('a', 20, 20), ('b', 21, 20)]), ['b: 21 files, more than 20'])
+
 
 if __name__ == '__main__':
     unittest.main()
