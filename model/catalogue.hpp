@@ -24,6 +24,7 @@
 #include "model/effects/ripple.hpp"
 #include "model/effects/rotor_inertia.hpp"
 #include "model/effects/saturation.hpp"
+#include "model/effects/soft_knee.hpp"
 #include "model/effects/spring.hpp"
 #include "model/effects/stribeck.hpp"
 #include "model/effects/torque_gain.hpp"
@@ -52,7 +53,7 @@ using Catalogue = Joined<
     EffectList<Viscous, Coulomb, Offset, RotorInertia, Stribeck, Presliding, AsymmetricFriction, ViscousQuadratic,
                ViscousCubic, LoadFriction, TorqueGain, Ripple, Spring, GravityCompensator, FrictionDrift, Saturation,
                JointCoupling, Delay, Elasticity, Backlash, Eccentricity, MotorCoupling, Lugre, MaxwellSlip,
-               PositionCurve, VelocityCurve, LoadCurve, FrictionOverPosition, CrossPosition>,
+               PositionCurve, VelocityCurve, LoadCurve, FrictionOverPosition, CrossPosition, SoftKnee>,
     UserEffects>;
 
 /// Effects on the rigid body itself: they change its parameters and have no basis.

@@ -135,9 +135,11 @@ class MoveWords {
     return fmt::format("in the URDF, joint '{}', in place of {}:\n{}", joint.name, axis_element(joint.axis),
                        axis_element(axis));
   }
-  /// The other way to put a mirrored joint right. What one log alone has wrong is not the URDF's.
+  /// The other way to put a mirrored joint right. What one log alone has wrong is not the URDF's. The keys above turn
+  /// all mirrored joints, so that of several the URDF's line alone would turn one of them twice.
   std::string mirrored_in_urdf(Index j, const Arrangement& now) const {
-    if (format_ == nullptr || table_ != "[signals]") return "";
+    const bool several = (now.motion_gain.array() < 0).count() > 1;
+    if (format_ == nullptr || table_ != "[signals]" || several) return "";
     return "\nor " + in_urdf(j, -now.axis[static_cast<std::size_t>(j)]);
   }
 

@@ -81,6 +81,7 @@ class Diagnoser {
     }
     models_.current->session = session_;
     models_.largest_load = largest_loads(models_, logs_);
+    models_.least_width = least_widths(logs_);
     Diagnosis result;
     result.still = still_;
     // Of a baseline alone: what slipped since has bent nothing yet.
@@ -380,6 +381,7 @@ class Diagnoser {
     out.smallest_step_s = models_.smallest_step_s;
     for (const DeflectionEffect& effect : bent_already_) add_rotor(out, effect, options().prior.link_rotor);
     out.largest_load = largest_loads(out, logs);
+    out.least_width = least_widths(logs);
     return out;
   }
 

@@ -24,8 +24,9 @@ struct Models {
   std::vector<double> curve_size{};  ///< by joint: prior deviation of a free curve's heights [N*m | N]
   double smallest_step_s = 1;        ///< of all logs and of the drive's tick: what bounds a delay
   std::vector<double>
-      largest_load{};  ///< by joint: the largest structural torque of the logs [N*m | N]; empty: unknown
-  Options options;     ///< thresholds of all that is done with these models
+      largest_load{};                 ///< by joint: the largest structural torque of the logs [N*m | N]; empty: unknown
+  std::vector<double> least_width{};  ///< by joint [rad/s | m/s]: no sign is narrower; empty: unknown
+  Options options;                    ///< thresholds of all that is done with these models
 
   const IdentifiedModel& of(bool of_healthy) const { return of_healthy ? healthy : current; }
 };

@@ -185,6 +185,23 @@ std::vector<double> largest_loads(const Models& models, const std::vector<Sessio
   return out;
 }
 
+std::vector<double> least_widths(const std::vector<SessionLog>& logs) {
+  const std::size_t n = logs.empty() ? 0 : static_cast<std::size_t>(logs.front().log.q.cols());
+  std::vector<double> noise(n, 1e300), speed(n, 0.0), out;
+  for (const SessionLog& entry : logs) {
+    const ProcessedLog& log = entry.log;
+    const double recorded_s = log.step_s / static_cast<double>(log.kept_each);
+    for (std::size_t j = 0; j < n; ++j) {
+      const bool known = log.measured_dq.size() == 0 && j < log.filter.position_noise.size();
+      noise[j] = std::min(noise[j], known ? velocity_noise(log.filter, j, recorded_s) : 0.0);
+      const VectorXd dq = log.joint_velocity(static_cast<Index>(j)).segment(log.first, log.last - log.first);
+      speed[j] = std::max(speed[j], dq.cwiseAbs().maxCoeff());
+    }
+  }
+  for (std::size_t j = 0; j < n; ++j) out.push_back(std::max(noise[j], narrowest_sign * speed[j]));
+  return out;
+}
+
 std::vector<std::string> check_same_robot(Models models, const std::vector<SessionLog>& logs,
                                           const std::vector<bool>& still) {
   const SessionOptions options = models.options.session;

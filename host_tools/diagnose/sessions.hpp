@@ -40,6 +40,10 @@ void mute(std::vector<SessionLog>& logs, const IdentifiedModel& model, const std
 
 /// By joint: the largest structural torque of the logs [N*m | N].
 std::vector<double> largest_loads(const Models& models, const std::vector<SessionLog>& logs);
+/// By joint: a sign of the velocity that is narrower [rad/s | m/s] does not show. What the encoder's noise makes of the
+/// velocity, in the log where it is least, and narrowest_sign of the largest speed; where the velocity is measured the
+/// latter alone.
+std::vector<double> least_widths(const std::vector<SessionLog>& logs);
 
 /// Base parameters of the baseline with friction, load and tilt of their own against what both sessions measured.
 /// @returns a note for each joint at which nothing explains both @throws DataError: at half of the joints

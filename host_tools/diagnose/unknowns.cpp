@@ -88,6 +88,7 @@ class Builder {
     Unknown u;
     u.kind = Unknown::Kind::width;
     u.joint = joint;
+    if (joint < models_.least_width.size()) u.lower = models_.least_width[joint];
     out_.all.push_back(u);
   }
 
@@ -252,9 +253,11 @@ void add_to(IdentifiedModel& model, const Unknown& u, double step) {
       value_of(model, u) += step;
       take_from_base(model, u.in_base, step);
       return;
-    case Unknown::Kind::width:
-      joints_of(model)[u.joint].sign_width *= std::exp(step);
+    case Unknown::Kind::width: {
+      double& width = joints_of(model)[u.joint].sign_width;
+      width = std::max(width * std::exp(step), u.lower);
       return;
+    }
     case Unknown::Kind::shape: {
       const ParameterInfo& info = find_effect(effect_of(model, u).effect)->shape[u.index];
       double& value = value_of(model, u);

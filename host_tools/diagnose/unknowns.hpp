@@ -36,7 +36,7 @@ struct Unknown {
   std::size_t healthy_effect = 0;                ///< the same in the healthy model
   bool body = false;                             ///< effect of IdentifiedModel::body
   bool change = false;                           ///< what the current session has more than the healthy one
-  double lower = 0, upper = 1e300;               ///< shape: its bounds
+  double lower = 0, upper = 1e300;               ///< shape: its bounds; width: at least
   Eigen::VectorXd in_base{};                     ///< rotor: see Rotor
   double value = 0;                              ///< in the model; 0 for logarithms, whose steps are fitted
   double prior = 0, prior_std = 0;               ///< std 0: none

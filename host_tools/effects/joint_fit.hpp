@@ -43,6 +43,9 @@ struct FlexibleJoint {
   std::string note;                               ///< what a reader should know, empty if nothing
 };
 
+/// Of the joint's largest speed: no motion shows a sign's width that is less.
+inline constexpr double narrowest_sign = 1e-4;
+
 struct JointFit {
   double sign_width = 0.01;   ///< s = tanh(dq / width) [rad/s | m/s]
   double sign_width_std = 0;  ///< 0: not estimated

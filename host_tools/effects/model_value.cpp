@@ -9,7 +9,8 @@ namespace fxdyn {
 ModelValue::ModelValue() : model_(std::make_unique<IdentifiedModel>()) {}
 ModelValue::ModelValue(const IdentifiedModel& model) : model_(std::make_unique<IdentifiedModel>(model)) {}
 ModelValue::ModelValue(IdentifiedModel&& model) : model_(std::make_unique<IdentifiedModel>(std::move(model))) {}
-ModelValue::ModelValue(const ModelValue& other) : ModelValue(*other.model_) {}
+ModelValue::ModelValue(const ModelValue& other)
+    : model_(other.model_ == nullptr ? nullptr : std::make_unique<IdentifiedModel>(*other.model_)) {}
 ModelValue::ModelValue(ModelValue&& other) noexcept = default;
 ModelValue& ModelValue::operator=(const ModelValue& other) {
   if (this != &other) *this = ModelValue(other);

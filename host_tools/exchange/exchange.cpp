@@ -75,7 +75,7 @@ std::string export_for_simulators(Pipeline& pipeline, const std::vector<std::str
     SimpleRobot simple = format.whole_model
                              ? SimpleRobot{model.robot, std::vector<SimpleJoint>(model.robot.size()), {}}
                              : simple_robot(model, links, format.has_armature, train, {}, format.has_stribeck);
-    if (format.has_load) fit_load_friction(simple, model, train);
+    if (format.has_load && !format.whole_model) fit_load_friction(simple, model, train);
     simple.urdf = pipeline.project().urdf;
     if (format.has_ranges) simple.ranges = joint_ranges(pipeline.project(), model, train);
     const fs::path file = pipeline.directory() / format.file;

@@ -28,17 +28,21 @@ double loss_of(const GearFriction& load, double motor, double external, double b
   return out;
 }
 
-/// The motor also drives this friction: motor = torque + sign(dq) loss(motor), by iteration, as the loss grows by less
-/// than the motor's torque.
+/// The motor also drives this friction: motor = torque + sign(dq) loss(motor). By iteration where the loss grows by
+/// less than the motor's torque, else by bisection: it jumps where the motor's and the external torque are equal.
 double with_load(const SimpleJoint& said, double torque, double external, double dq) {
   const double bell = bell_of(said, dq), sign = dq > 0 ? 1 : dq < 0 ? -1 : 0;
-  double motor = torque;
-  for (int i = 0; i < 200; ++i) {
-    const double next = torque + sign * loss_of(said.load, motor, external, bell);
-    if (std::fabs(next - motor) <= 1e-12 * (1 + std::fabs(torque))) return next;
-    motor = next;
+  const auto loss = [&](double more) { return loss_of(said.load, torque + sign * more, external, bell); };
+  double more = 0;
+  for (int i = 0; i < 30 && sign != 0; ++i) {
+    const double next = loss(more);
+    if (std::fabs(next - more) <= 1e-12 * (1 + std::fabs(torque))) return torque + sign * next;
+    more = next;
   }
-  return motor;
+  double low = 0, high = 1 + std::fabs(torque);
+  for (int i = 0; i < 60 && loss(high) > high; ++i) high *= 2;
+  for (int i = 0; i < 100; ++i) (loss(0.5 * (low + high)) > 0.5 * (low + high) ? low : high) = 0.5 * (low + high);
+  return torque + sign * high;
 }
 
 /// What bodies get from gravity and velocity: minus the joints' torque without acceleration and friction.
@@ -160,13 +164,13 @@ Sliding sliding_rows(const SimpleRobot& simple, const IdentifiedModel& model, co
                      std::size_t joint, double least) {
   SimpleRobot frictionless = simple;
   for (SimpleJoint& said : frictionless.joints) said = {0, 0, said.armature, 0};
-  IdentifiedModel whole = model;
-  whole.filter.torque_lead_s = 0;  // friction belongs to the velocity of its own sample
   std::vector<std::array<double, 4>> rows;
   const auto j = static_cast<Index>(joint);
   for (const ProcessedLog& log : train) {
     const MotionRows motion = log.motion();
-    const MatrixXd full = predict(whole, log), bodies = torque_of(frictionless, model, motion, log.step_s),
+    // Without the log's known load: bodies and external torque have none.
+    const MatrixXd full = predict(model, motion.q, motion.dq, motion.ddq, log.step_s),
+                   bodies = torque_of(frictionless, model, motion, log.step_s),
                    external = external_torque(simple, model, motion, log.step_s);
     for (Index k = log.first; k < log.last; ++k) {
       const double dq = motion.dq(k, j);

@@ -52,6 +52,7 @@ double force(const EffectFit& fit, const JointFit& joint, Index j, const DriveSt
   const auto peer = [&] { return static_cast<Index>(fit.shape[0]) - 1; };
   if (name == "offset") return p[0];
   if (name == "stribeck") return p[0] * sign * std::exp(-std::pow(v / fit.shape[0], 2));
+  if (name == "soft_knee") return p[0] * soft_sign(v, fit.shape[0]);
   if (name == "asymmetric_friction") return p[0] * std::fabs(sign) + p[1] * std::fabs(v);
   if (name == "viscous_quadratic") return p[0] * v * std::fabs(v);
   if (name == "viscous_cubic") return p[0] * v * v * v;

@@ -284,7 +284,7 @@ json truth_json(const Case& wanted, const Ground& ground) {
   const std::vector<std::string> dry =
       wanted.friction == Friction::catalogue ? std::vector<std::string>{}
       : wanted.friction == Friction::smooth_sign
-          ? names_of_form("exponential_stribeck")
+          ? std::vector<std::string>{"stribeck", "viscous_quadratic", "viscous_cubic", "soft_knee"}
           : std::vector<std::string>{"presliding", "stribeck", "lugre", "maxwell_slip"};
   for (std::size_t j = 0; !dry.empty() && j < ground.plan.joints(); ++j)
     out["background"].push_back({{"effect", to_string(wanted.friction)}, {"joint", j + 1}, {"names", dry}});

@@ -2,9 +2,11 @@
 
 #include "host_tools/diagnose/unknowns.hpp"
 #include "host_tools/diagnose/models.hpp"
+#include "host_tools/diagnose/sessions.hpp"
 #include "host_tools/effects/braking.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/link_parameters.hpp"
+#include "host_tools/regression/encoder_noise.hpp"
 
 #include <gtest/gtest.h>
 
@@ -86,6 +88,39 @@ TEST_F(UnknownsOfAModel, StribeckIsWiderThanTheSign) {
   const EffectInfo &stribeck = *find_effect("stribeck"), &lugre = *find_effect("lugre");
   EXPECT_DOUBLE_EQ(shape_limits(models_, 1, stribeck, stribeck.shape[0]).first, 1.5 * 0.02);
   EXPECT_EQ(shape_limits(models_, 1, lugre, lugre.shape[1]).first, lugre.shape[1].lower);  // its bristles turn it over
+}
+
+TEST_F(UnknownsOfAModel, ASignIsNoNarrowerThanWhatShows) {
+  models_.least_width = {0.019, 0.03};
+  const Unknowns unknowns = make_unknowns(models_);
+  const auto width = [&](std::size_t joint) {
+    const auto found = std::find_if(unknowns.all.begin(), unknowns.all.end(),
+                                    [&](const Unknown& u) { return u.kind == Kind::width && u.joint == joint; });
+    return static_cast<std::size_t>(found - unknowns.all.begin());
+  };
+  for (std::size_t joint = 0; joint < 3; ++joint) update(models_, unknowns.all, only(unknowns, width(joint), -0.2), 1);
+  EXPECT_DOUBLE_EQ(models_.current->joints[0].sign_width, 0.019);
+  EXPECT_DOUBLE_EQ(models_.current->joints[1].sign_width, 0.03) << "it began below";
+  EXPECT_DOUBLE_EQ(models_.current->joints[2].sign_width, 0.02 * std::exp(-0.2)) << "not known";
+}
+
+TEST_F(UnknownsOfAModel, WhatOfASignShowsFollowsFromTheNoiseAndTheSpeed) {
+  std::vector<SessionLog> logs{test::small_session_log(*models_.current, Role::train, 1),
+                               test::small_session_log(*models_.current, Role::validate, 2)};
+  double speed = 0;
+  for (const SessionLog& entry : logs) {
+    const ProcessedLog& log = entry.log;
+    speed = std::max(speed, log.joint_velocity(0).segment(log.first, log.last - log.first).cwiseAbs().maxCoeff());
+  }
+  EXPECT_DOUBLE_EQ(least_widths(logs)[0], narrowest_sign * speed) << "no noise";
+  logs[0].log.filter.position_noise[0] = 1e-2;
+  logs[1].log.filter.position_noise[0] = 1e-3;
+  const double noise = velocity_noise(logs[1].log.filter, 0, logs[1].log.step_s);
+  ASSERT_GT(noise, narrowest_sign * speed);
+  EXPECT_DOUBLE_EQ(least_widths(logs)[0], noise) << "of the log that has less";
+  logs[0].log.measured_dq = logs[0].log.motion().dq;
+  EXPECT_DOUBLE_EQ(least_widths(logs)[0], narrowest_sign * speed) << "a velocity that was measured";
+  EXPECT_TRUE(least_widths({}).empty());
 }
 
 TEST_F(UnknownsOfAModel, AGapThatTheLargestLoadDoesNotCloseIsNone) {

@@ -42,7 +42,7 @@ TEST(EffectDeclarations, ListsAreThoseOfTheTraits) {
   EXPECT_EQ(named([](const EffectInfo& info) { return info.friction; }),
             (Names{"viscous", "coulomb", "offset", "stribeck", "presliding", "asymmetric_friction", "viscous_quadratic",
                    "viscous_cubic", "load_friction", "friction_drift", "lugre", "maxwell_slip", "velocity_curve",
-                   "friction_over_position"}))
+                   "friction_over_position", "soft_knee"}))
       << "differs from day to day";
 }
 
@@ -101,6 +101,8 @@ constexpr std::array promises = std::to_array<Promise>({
     {"rotor_inertia", "inertia", "kg*m^2", 0, unbounded},
     {"stribeck", "velocity", "rad/s", 1e-05, 1000},
     {"stribeck", "amplitude", "N*m", 0, unbounded},
+    {"soft_knee", "velocity", "rad/s", 1e-05, 1000},
+    {"soft_knee", "amplitude", "N*m", 0, unbounded},
     {"presliding", "distance", "rad", 1e-07, 0.03},
     {"presliding", "amplitude", "N*m", 0, unbounded},
     {"asymmetric_friction", "coulomb", "N*m", -unbounded, unbounded},

@@ -81,7 +81,8 @@ constexpr std::array cases{
     Case{"coulomb", {}, {exact}},
     Case{"offset", {}, {exact}},
     Case{"rotor_inertia", {}, {exact}},
-    Case{"stribeck", {0.02, 10}, {3e-7}},      // exp ends at exp(-16)
+    Case{"stribeck", {0.02, 10}, {3e-7}},  // exp ends at exp(-16)
+    Case{"soft_knee", {0.02, 10}, {1.6e-6}},
     Case{"presliding", {1e-5, 0.03}, {3e-7}},  // the same, and rounding of the state
     // the state as presliding's; dq's phi has its error and the reciprocal's times dq
     Case{"lugre", {1e-4, 0.03}, {1e-6, 15 * 8e-6}},

@@ -70,6 +70,7 @@ std::vector<double> expected(std::string_view effect, const JointSeries& s, int 
   if (effect == "offset") return {1};
   if (effect == "rotor_inertia") return {s.ddq[k]};
   if (effect == "stribeck") return {sign * std::exp(-std::pow(dq / 0.1, 2))};
+  if (effect == "soft_knee") return {1 - 2 / (1 + std::exp(2 * dq / 0.1))};
   if (effect == "presliding") {
     const double direction = dq > 0 ? 1 : -1;
     z = direction - (direction - z) * std::exp(-std::fabs(dq) * step_s / 0.003);
@@ -139,7 +140,7 @@ std::vector<double> expected(std::string_view effect, const JointSeries& s, int 
 }
 
 std::vector<double> shape_of(std::string_view effect) {
-  if (effect == "stribeck") return {0.1};
+  if (effect == "stribeck" || effect == "soft_knee") return {0.1};
   if (effect == "presliding") return {0.003};
   if (effect == "lugre") return {0.003, 0.2, 0.7};
   if (effect == "maxwell_slip") return {0.003};

@@ -70,11 +70,11 @@ TEST_P(Real, HeldOutErrorIsNoWorseThanTheBaseline) {
 // Limits: 2 % above what was measured, docs/findings/benchmarks.md, which has the goals, too.
 INSTANTIATE_TEST_SUITE_P(
     Sets, Real,
-    testing::Values(RealSet{"emps", 100, 40, 0.05, {3.22}, 0.576, 0.576},
+    testing::Values(RealSet{"emps", 100, 40, 0.05, {3.22}, 0.607, 0.607},
                     RealSet{"kuka_kr300", 20, 15, 0.25, {184, 545, 294, 51.8, 94.8, 39.5}, 0.580, 0.616},
                     // Its baseline knows a piece of physics that is not in the nominal list; the torque's default band
                     // is too narrow for it.
-                    RealSet{"staubli_tx40", 100, 40, 0.05, {1.85, 4.13, 1.06, 0.590, 1.01, 1.16}, 0.861, 0.972},
+                    RealSet{"staubli_tx40", 100, 40, 0.05, {1.85, 4.13, 1.06, 0.590, 1.01, 1.16}, 0.912, 0.912},
                     RealSet{"ur10_unisa", 20, 12, 0.25, {3.03, 3.37, 2.13, 0.851, 0.358, 1.00}, 0.574, 0.574}),
     [](const auto& set) { return set.param.name; });
 

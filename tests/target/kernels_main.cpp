@@ -223,6 +223,7 @@ std::uint32_t inputs_of() {
 }
 /// Beside those before: their figures depend on the size of the function that they are in.
 [[gnu::noinline]] void report_slip() { report("maxwell_slip", effect_of<MaxwellSlip>()); }
+[[gnu::noinline]] void report_knee() { report("soft_knee", effect_of<SoftKnee>()); }
 [[gnu::noinline]] void report_curves() {
   report("position_curve", effect_of<PositionCurve>());
   report("friction_over_position", effect_of<FrictionOverPosition>());
@@ -243,6 +244,7 @@ int main() {
   report("one_joint_mean", one_joint_mean(std::make_index_sequence<Model::joints>{}));
   report_other_kinds();
   report_slip();
+  report_knee();
   report_curves();
   hal::semihosting::exit(ramps_are_exact() && clamps_are_exact() ? 0 : 1);
 }
