@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "host_tools/logs/log.hpp"
-#include "host_tools/signals/encoder_edges.hpp"
 #include "host_tools/signals/filter.hpp"
 
 namespace fxdyn::diagnosis {
@@ -42,8 +41,7 @@ std::optional<MotionRows> see_again(ProcessedLog& log) {
     if (!(step > 0)) continue;
     const VectorXd q = at_recorded_rate(log.q.col(j), each);
     // Not the smooth motion: the filter would take some of it.
-    const VectorXd counted = (q.array() / step).round() * step;
-    const VectorXd error = between_edges(counted, step) - q;
+    const VectorXd error = (q.array() / step).round() * step - q.array();
     const VectorXd filtered = recorded.apply(error).col(0);
     log.q.col(j) += filtered(Eigen::seqN(0, log.q.rows(), each));
   }

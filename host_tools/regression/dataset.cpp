@@ -12,7 +12,6 @@
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/regression/noise_cutoff.hpp"
-#include "host_tools/signals/encoder_edges.hpp"
 #include "host_tools/signals/filter.hpp"
 #include "host_tools/signals/spectrum.hpp"
 #include "host_tools/support/error.hpp"
@@ -282,9 +281,7 @@ ProcessedLog process(Log log, const FilterFit& filter, const ProcessSettings& se
   // In place, column by column: a long log is not held twice.
   for (Index j = 0; j < n; ++j) {
     const VectorXd raw = log.q.col(j);
-    // Of this log: another one, or a planned motion, may be finer.
-    const double count = log.encoder_step.size() > 0 ? log.encoder_step[j] : encoder_step(raw);
-    log.q.col(j) = motion.apply(between_edges(raw, count));
+    log.q.col(j) = motion.apply(raw);
     const auto middle = log.q.col(j).segment(out.first, inside);
     out.q_range[j] = middle.maxCoeff() - middle.minCoeff();
     out.q_noise[j] = (raw.segment(out.first, inside) - middle).norm() / std::sqrt(static_cast<double>(inside));
