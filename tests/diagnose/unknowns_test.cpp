@@ -105,8 +105,8 @@ TEST_F(UnknownsOfAModel, ASignIsNoNarrowerThanWhatShows) {
 }
 
 TEST_F(UnknownsOfAModel, WhatOfASignShowsFollowsFromTheNoiseAndTheSpeed) {
-  std::vector<SessionLog> logs{test::small_session_log(*models_.current, Role::train, 1),
-                               test::small_session_log(*models_.current, Role::validate, 2)};
+  std::vector<SessionLog> logs{test::small_session_log(models_.current, Role::train, 1),
+                               test::small_session_log(models_.current, Role::validate, 2)};
   double speed = 0;
   for (const SessionLog& entry : logs) {
     const ProcessedLog& log = entry.log;
@@ -120,7 +120,7 @@ TEST_F(UnknownsOfAModel, WhatOfASignShowsFollowsFromTheNoiseAndTheSpeed) {
   EXPECT_DOUBLE_EQ(least_widths(logs)[0], noise) << "of the log that has less";
   logs[0].log.measured_dq = logs[0].log.motion().dq;
   EXPECT_DOUBLE_EQ(least_widths(logs)[0], narrowest_sign * speed) << "a velocity that was measured";
-  EXPECT_TRUE(least_widths({}).empty());
+  EXPECT_TRUE(least_widths(std::vector<SessionLog>{}).empty());
 }
 
 TEST_F(UnknownsOfAModel, AGapThatTheLargestLoadDoesNotCloseIsNone) {
