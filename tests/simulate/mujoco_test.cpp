@@ -75,7 +75,7 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         Hidden{{test::effect("offset", {}, {3})}, 1e-6}, Hidden{{test::effect("stribeck", {0.3}, {6})}, 0.03},
         Hidden{{test::effect("coulomb", {}, {8})}, 0.1},
-        // Two functions of v / velocity that differ by up to 0.08, at speeds of that size: 0.056 of this motion's RMS.
+        // Two functions of v / velocity that differ by up to 0.074, at speeds of that size: 0.056 of this motion's RMS.
         Hidden{{test::effect("coulomb", {}, {8}), test::effect("soft_knee", {0.3}, {6})}, 0.06},
         Hidden{{test::effect("coulomb", {}, {8}), test::effect("presliding", {0.01}, {8})}, 0.03},
         Hidden{{test::effect("coulomb", {}, {6}), test::effect("lugre", {0.01, 0.3, 0.75}, {8, 20})}, 0.03},
