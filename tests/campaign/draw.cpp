@@ -109,6 +109,7 @@ std::optional<Drawn> draw(const std::string& effect, std::size_t joint, const Pl
     return std::vector{amplitude * std::cos(phase), amplitude * std::sin(phase)};
   };
   if (effect == "stribeck") return all({speed * log_uniform(random, 0.01, 0.1)}, {rated});
+  if (effect == "soft_knee") return all({speed * log_uniform(random, 0.03, 0.15)}, {rated});
   if (effect == "presliding")
     return all({turns ? log_uniform(random, 1e-3, 8e-3) : log_uniform(random, 3e-5, 3e-4)}, {rated});
   if (effect == "asymmetric_friction") {
