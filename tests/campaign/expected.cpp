@@ -111,6 +111,12 @@ void project_out(const MatrixXd& basis, MatrixXd& columns) {
   }
 }
 
+/// An effect of one coefficient that would have to be below its bound is no rival: less friction is no Stribeck effect.
+bool is_impossible(const std::string& effect, const Eigen::Ref<const MatrixXd>& columns, const VectorXd& wanted) {
+  const EffectInfo& info = *find_effect(effect);
+  return info.linear.size() == 1 && info.linear[0].lower >= 0 && columns.cols() == 1 && columns.col(0).dot(wanted) < 0;
+}
+
 }  // namespace
 
 double NoiseLevel::per_sample() const {
@@ -144,8 +150,10 @@ Expected expect(const Plan& plan, const std::vector<MatrixXd>& change, const std
   expected.chi = expected.rival_chi = all.col(0).norm();
   expected.share = before > 0 ? expected.chi / before : 0;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const auto columns = all.middleCols(first[i], first[i + 1] - first[i]);
+    if (is_impossible(candidates[i].second, columns, all.col(0))) continue;
     MatrixXd left = all.leftCols(1);
-    project_out(all.middleCols(first[i], first[i + 1] - first[i]), left);
+    project_out(columns, left);
     if (left.norm() >= expected.rival_chi) continue;
     expected.rival_chi = left.norm();
     expected.rival = candidates[i].second;
