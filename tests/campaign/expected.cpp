@@ -47,6 +47,14 @@ class Stack {
   VectorXd sigma_;
 };
 
+/// A sign that is narrower than the joint's own is that one (ShapeValues::least_of_sign).
+bool is_the_sign(const EffectInfo& info, const std::vector<double>& shape, double sign_width) {
+  for (std::size_t i = 0; i < info.shape.size(); ++i) {
+    if (shape[i] < info.shape[i].values.least_of_sign * sign_width) return true;
+  }
+  return false;
+}
+
 std::vector<std::pair<EffectCandidate, std::string>> rivals(const Plan& plan, const std::vector<std::string>& names,
                                                             std::size_t joint) {
   std::vector<MatrixXd> structural;
@@ -59,8 +67,10 @@ std::vector<std::pair<EffectCandidate, std::string>> rivals(const Plan& plan, co
     if (!info.sought() || std::find(names.begin(), names.end(), name) != names.end()) continue;
     // A sine of one chosen wavenumber explains no other effect; free ones would have to be searched.
     if (name == "ripple") continue;
-    for (const auto& shape : typical_shapes(name, joint, plan.healthy.robot, plan.motions, plan.torque, structural))
-      list.push_back({{name, joint, shape}, name});
+    for (const auto& shape : typical_shapes(name, joint, plan.healthy.robot, plan.motions, plan.torque, structural)) {
+      if (!is_the_sign(info, shape, plan.healthy.joints[joint].sign_width))
+        list.push_back({{name, joint, shape}, name});
+    }
   }
   return list;
 }
