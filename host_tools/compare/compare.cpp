@@ -125,6 +125,7 @@ class Comparison {
     if (wanted("lugre")) structural("lugre", lugre_friction, "wls");
     if (wanted("lugre_physical")) of_efficiency("lugre_physical", lugre_of_possible_bodies);
     if (wanted("named")) of_efficiency("named", named_model);
+    if (wanted("named_trained")) of_efficiency("named_trained", named_and_trained_model);
     if (wanted("known_shapes")) known_shapes("known_shapes", {0});
     if (wanted("bound")) known_shapes("bound", {1, 2, 3, 4, 5, 6, 7, 8});
     if (wanted("named_bls")) named_bls();

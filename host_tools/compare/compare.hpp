@@ -28,10 +28,10 @@ namespace fxdyn {
 /// @throws DataError: no test log, no validate log, generations of another project or other logs
 ComparisonResult compare(const std::filesystem::path& project, const std::filesystem::path& directory);
 
-/// Some of these methods, and five more. bls_physical: bls_pso_physical with a small grid in place of the swarm.
-/// lugre_physical: lugre with links that are possible bodies. named: what diagnosis finds, without a BLS.
-/// known_shapes: what the logs allow at best (known_shapes.hpp), where the truth is known; bound: of
-/// eight draws of the noise. Writes nothing.
+/// Some of these methods, and six more. bls_physical: bls_pso_physical with a small grid in place of the swarm.
+/// lugre_physical: lugre with links that are possible bodies. named: what diagnosis finds, without a BLS;
+/// named_trained: with a BLS where it helps. known_shapes: what the logs allow at best (known_shapes.hpp), where the
+/// truth is known; bound: of eight draws of the noise. Writes nothing.
 /// @param from of which project file the logs are (named_bls continues from DIR/model.json)
 ComparisonResult compare_methods(const Project& project, const std::filesystem::path& directory,
                                  const std::vector<std::string>& methods);

@@ -22,9 +22,9 @@ namespace fs = std::filesystem;
 const std::vector<double> seconds{5, 10, 20, 40, 60, 120};
 const std::vector<double> mixed_seconds{10, 60};
 const std::vector<double> slow_shares{0, 0.25, 0.5, 0.75, 1};
-const std::vector<std::string> methods{"rigid_ls",    "friction_ls",  "rls",   "mlp",
-                                       "bls_default", "bls_physical", "lugre", "lugre_physical",
-                                       "named",       "known_shapes", "bound"};
+const std::vector<std::string> methods{"rigid_ls",    "friction_ls",   "rls",          "mlp",
+                                       "bls_default", "bls_physical",  "lugre",        "lugre_physical",
+                                       "named",       "named_trained", "known_shapes", "bound"};
 const std::vector<std::string> mixed_methods{"friction_ls", "lugre", "lugre_physical"};
 
 struct Source {

@@ -9,8 +9,9 @@
 #include "host_tools/pipeline/training.hpp"
 
 namespace fxdyn {
+namespace {
 
-IdentifiedModel named_model(const Project& project, GateData data, Progress& progress) {
+IdentifiedModel diagnosed_and_fitted(const Project& project, GateData data, bool with_bls, Progress& progress) {
   FinishModel finish;
   if (project.identify.physical) {
     finish = [&](const IdentifiedModel& model, const std::vector<ProcessedLog>& logs) {
@@ -19,15 +20,25 @@ IdentifiedModel named_model(const Project& project, GateData data, Progress& pro
   }
   const IdentifiedModel diagnosed = diagnose(project, data, {}, {}, progress, {}, finish).model;
   // Diagnosis searches without a prior; the fit after it, that of `train`, has one.
-  Project plain = project;
-  plain.train.enabled = false;
+  Project fitted = project;
+  fitted.train.enabled = with_bls;
   const auto errors = [&](const IdentifiedModel& model, const std::string& name) {
     StageErrors out{name, {}};
     for (const ProcessedLog& log : data.logs) out.logs.push_back(errors_of(log, model.robot, predict(model, log)));
     return out;
   };
   ResumeFile nothing;
-  return Trainer(plain, data, diagnosed, errors, progress).run(nothing).model;
+  return Trainer(fitted, data, diagnosed, errors, progress).run(nothing).model;
+}
+
+}  // namespace
+
+IdentifiedModel named_model(const Project& project, GateData data, Progress& progress) {
+  return diagnosed_and_fitted(project, std::move(data), false, progress);
+}
+
+IdentifiedModel named_and_trained_model(const Project& project, GateData data, Progress& progress) {
+  return diagnosed_and_fitted(project, std::move(data), true, progress);
 }
 
 IdentifiedModel lugre_of_possible_bodies(const Project& project, GateData data, Progress& progress) {

@@ -11,6 +11,8 @@ namespace fxdyn {
 
 /// What diagnosis names, refitted as `train` does, with the project's prior and without a BLS.
 IdentifiedModel named_model(const Project& project, GateData data, Progress& progress);
+/// The same with the BLS that `train` adds where it lowers a joint's error.
+IdentifiedModel named_and_trained_model(const Project& project, GateData data, Progress& progress);
 
 /// The method `lugre`, with links that are possible bodies.
 IdentifiedModel lugre_of_possible_bodies(const Project& project, GateData data, Progress& progress);

@@ -335,6 +335,18 @@ std::string sentence_of(const CurveResult& curve, const Bump& bump, const Robot&
                      words_of(region, robot, joint, shown));
 }
 
+bool is_any(const std::vector<bool>& of) { return std::find(of.begin(), of.end(), true) != of.end(); }
+
+std::vector<bool> harmed_by(const Models& now, const Models& before, const std::vector<SessionLog>& logs) {
+  return harmed_joints(now.options.gate, before.current, now.current, logs);
+}
+
+std::vector<bool> joints_with(const std::vector<FreeCurve>& curves, std::size_t joints) {
+  std::vector<bool> out(joints, false);
+  for (const FreeCurve& curve : curves) out[curve.effect.joint] = true;
+  return out;
+}
+
 }  // namespace
 
 std::vector<FreeCurve> add_free_curves(Models& models, const std::vector<SessionLog>& logs,
@@ -353,16 +365,23 @@ std::vector<FreeCurve> add_free_curves(Models& models, const std::vector<Session
     }
   }
   const std::vector<double> size = models.curve_size;
-  while (!found.empty()) {
+  const auto fit = [&](const std::vector<bool>& only) {
     models = before;
     models.curve_size = size;
     for (FreeCurve& curve : found) curve.id = put(models, curve.effect);
-    refit(models, logs, white(n), 4);
+    refit(models, logs, white(n), 4, only);
+  };
+  while (!found.empty()) {
+    fit({});
     // A fit that took no step leaves heights of 0: then there is nothing to draw.
     if (std::erase_if(found, [&](const FreeCurve& curve) { return is_flat(models, curve); }) > 0) continue;
-    const std::vector<bool> harmed = harmed_joints(models.options.gate, before.current, models.current, logs);
-    const bool any = std::find(harmed.begin(), harmed.end(), true) != harmed.end();
-    if (!any) return found;
+    std::vector<bool> harmed = harmed_by(models, before, logs);
+    if (is_any(harmed)) {
+      // What a curve does not explain goes to the base parameters, which its joint has in common with others.
+      fit(joints_with(found, n));
+      harmed = harmed_by(models, before, logs);
+    }
+    if (!is_any(harmed)) return found;
     const auto its = [&](const FreeCurve& curve) { return harmed[curve.effect.joint]; };
     // Harm at joints without a curve comes from one of the others: the least sure goes.
     if (std::erase_if(found, its) == 0) {

@@ -103,6 +103,7 @@ void Trainer::choose_base(Training& out) {
     if (asked.physical) base_bodies_ = possible_model(project_, base_, data_.logs).bodies;
     return;
   }
+  fitter_.polish();  // a prior of the bodies moves the shapes, too
   fit_anew(out);
   const StageErrors refitted = errors_(out.model, "bls");
   if (diagnosed_is_better(refitted)) {

@@ -31,7 +31,8 @@ struct Answer {
   }
 };
 
-Answer answer(const Torque& torque) {
+/// @param inertia of joint 3, in the train log alone, after the first fit [kg*m^2]
+Answer answer(const Torque& torque, double inertia = 0) {
   const IdentifiedModel nominal = test::fitted_puma();
   Answer out;
   for (const auto& [role, seed] : {std::pair{Role::train, 1}, std::pair{Role::validate, 2}}) {
@@ -47,6 +48,8 @@ Answer answer(const Torque& torque) {
   refit(outcome.models, out.logs, outcome.whitening, 4);
   outcome.look_again(out.logs);
   out.before = out.after = outcome.models;
+  ProcessedLog& train = out.logs[0].log;
+  train.tau.col(2) += inertia * train.motion(0, train.samples()).ddq.col(2);
   std::vector<bool> without;
   for (std::size_t j = 0; j < 6; ++j) without.push_back(!outcome.structured(j));
   out.curves = add_free_curves(out.after, out.logs, without);
@@ -123,6 +126,21 @@ TEST(FreeCurves, WhatAnotherJointsVelocityDoesIsNoneOfThem) {
     return 2 * (4 * speed).tanh();
   });
   EXPECT_TRUE(a.curves.empty()) << a.curves[0].effect.effect;
+}
+
+TEST(FreeCurves, ACurveStaysWhereAFitOfEverythingWouldHarmAnotherJoint) {
+  const auto cover = [](const ArrayXd& q, const ArrayXd&, const ArrayXd&, const ArrayXd&) -> ArrayXd {
+    return 1.5 * bump(q, -0.3, 0.1);
+  };
+  const Answer a = answer(cover, 0.3);
+  // What the train log alone has of joint 3 would go to the inertia that the validate log has as well.
+  Models everything = a.after;
+  refit(everything, a.logs, test::no_whitening(), 4);
+  ASSERT_TRUE(harmed_joints(a.before.options.gate, a.before.current, everything.current, a.logs)[2]);
+  ASSERT_EQ(a.curves.size(), 1U);
+  EXPECT_EQ(a.curves[0].effect.effect, "position_curve");
+  EXPECT_LT(a.left(1), 0.2);
+  EXPECT_NEAR(a.left(2), 1, 1e-9);
 }
 
 TEST(FreeCurves, NoiseGetsNone) {

@@ -69,6 +69,17 @@ TEST(Training, ABetterFitTakesTheModelsPlace) {
             1e-6);
 }
 
+TEST(Training, ANewFitMovesTheShapesToo) {
+  std::vector<EffectFit> effects = friction();
+  effects.push_back(test::effect_fit("stribeck", {0.3}, {3}));
+  const IdentifiedModel plant = test::model_of(test::pendulum(), effects);
+  effects.back().shape[0] = 0.45;  // as diagnosis may leave it, without what a prior knows
+  Work work(plant, test::train_and_validate(plant, 0.01), effects);
+  const Training training = work.run();
+  EXPECT_NEAR(training.model.joints[0].find("stribeck")->shape[0], 0.3, 0.006);
+  EXPECT_LT(validation_error(training.trained), 0.5 * validation_error(work.errors()(work.diagnosed, "before")));
+}
+
 TEST(Training, AModelThatTheTrainLogsWouldSpoilStays) {
   const IdentifiedModel plant = test::model_of(test::pendulum(), friction());
   std::vector<EffectFit> warm = friction();
