@@ -21,7 +21,7 @@ std::span<const ExportFormat> export_formats() {
                    "Isaac Lab and mjlab: actuators in Python, with ranges to randomise them; bodies as URDF",
                    "simulator_isaaclab.py", own_reader, true, write_isaaclab, replay_isaaclab, false, false, true},
       ExportFormat{"bam", "BAM: friction models m1 to m6 of each joint as JSON; bodies as URDF", "simulator_bam.json",
-                   own_reader, true, write_bam, replay_bam, true, true},
+                   own_reader, true, write_bam, replay_bam, true, true, false, false, bam_model},
       ExportFormat{"usd", "USD: a layer with PhysX joint friction and armature; bodies as URDF", "simulator_usd.usda",
                    own_reader, true, write_usd, replay_usd},
       ExportFormat{"inverse_dynamics_solver",

@@ -38,6 +38,8 @@ struct ExportFormat {
   /// It holds the model as the drive's tables have it: SimpleRobot has names only, and replay() expects the model
   /// itself.
   bool whole_model = false;
+  /// What the format calls the friction of a joint that is written so; nullptr: it has one form only.
+  std::string (*friction_model)(const SimpleJoint& said) = nullptr;
 };
 
 std::span<const ExportFormat> export_formats();
@@ -66,6 +68,7 @@ ReplayedTorque replay_isaaclab(const std::filesystem::path& file, const Identifi
                                const MotionRows& motion, double step_s);
 // bam_format.cpp
 void write_bam(const SimpleRobot& robot, const std::filesystem::path& file);
+std::string bam_model(const SimpleJoint& said);
 ReplayedTorque replay_bam(const std::filesystem::path& file, const IdentifiedModel& expected, const MotionRows& motion,
                           double step_s);
 // usd_format.cpp

@@ -53,6 +53,9 @@ struct SimpleRobot {
   std::vector<SimpleJoint> joints;
   std::filesystem::path urdf;        ///< the project's, which an export may take its other content from
   std::vector<JointRange> ranges{};  ///< per joint (posterior.hpp); empty: not asked for
+  /// Per joint what would be said if the format had the model's own load friction (load_friction.hpp): tells what
+  /// another formula of it costs. Empty: no joint has any.
+  std::vector<SimpleJoint> beside_load{};
 };
 
 struct ProjectionOptions {

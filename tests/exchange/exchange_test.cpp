@@ -256,6 +256,8 @@ TEST_P(Exchange, CertificateHoldsWhatTheTableSays) {
   for (const JointCertificate& joint : certificate.joints) {
     EXPECT_NE(table.find(joint.name), std::string::npos);
     EXPECT_NE(table.find(fmt::format("{:.4g}", joint.cannot_say)), std::string::npos);
+    EXPECT_NE(table.find(fmt::format("{:.4g}", joint.cannot_say_in_motion)), std::string::npos);
+    EXPECT_EQ(joint.friction_model, is("bam") ? "m1" : "");
   }
 }
 
