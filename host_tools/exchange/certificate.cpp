@@ -111,7 +111,8 @@ Certificate certify(const ExportFormat& format, const std::filesystem::path& fil
     joint.unit = meant.robot.joints[j].torque_unit();
     if (!format.whole_model) joint.written = meant.joints[j];
     joint.left_out = format.whole_model ? settled_effects(model, j)
-                                        : left_out(model, j, format.has_armature, format.has_stribeck, format.has_load);
+                                        : left_out(model, j, format.has_armature, format.has_stribeck, format.has_load,
+                                                   format.has_dry_friction);
     if (format.friction_model != nullptr) joint.friction_model = format.friction_model(meant.joints[j]);
     if (meant.joints[j].load.model > 0) joint.cannot_say_but_load = std::sqrt(sum.but_load[k] / sum.samples);
     joint.cannot_say_in_motion = std::sqrt(sum.in_motion[k] / sum.samples);

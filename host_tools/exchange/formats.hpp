@@ -40,6 +40,7 @@ struct ExportFormat {
   bool whole_model = false;
   /// What the format calls the friction of a joint that is written so; nullptr: it has one form only.
   std::string (*friction_model)(const SimpleJoint& said) = nullptr;
+  bool has_dry_friction = true;
 };
 
 std::span<const ExportFormat> export_formats();
@@ -52,6 +53,10 @@ std::string export_format_names();
 void write_urdf_dynamics(const SimpleRobot& robot, const std::filesystem::path& file);
 ReplayedTorque replay_urdf(const std::filesystem::path& file, const IdentifiedModel& expected, const MotionRows& motion,
                            double step_s);
+// drake_format.cpp
+void write_drake(const SimpleRobot& robot, const std::filesystem::path& file);
+ReplayedTorque replay_drake(const std::filesystem::path& file, const IdentifiedModel& expected,
+                            const MotionRows& motion, double step_s);
 // sdf_format.cpp
 void write_sdf(const SimpleRobot& robot, const std::filesystem::path& file);
 ReplayedTorque replay_sdf(const std::filesystem::path& file, const IdentifiedModel& expected, const MotionRows& motion,

@@ -61,6 +61,7 @@ struct SimpleRobot {
 struct ProjectionOptions {
   /// Dry friction is fitted where it slides: from this many of the joint's sign widths on, tanh(3) = 0.995 [-]; hand.
   double sliding_widths = 3;
+  bool dry_friction = true;  ///< the format has it; else damping takes what it can of it
 };
 
 /// Damping and dry friction of one joint [as in SimpleJoint].
@@ -96,6 +97,6 @@ ModelValue as_model(const SimpleRobot& simple, ModelValue model);
 
 /// Effects of a joint, and of the whole body, that a simple robot has no word for. ("bls": the learned part.)
 std::vector<std::string> left_out(const IdentifiedModel& model, std::size_t joint, bool has_armature,
-                                  bool has_stribeck = false, bool has_load = false);
+                                  bool has_stribeck = false, bool has_load = false, bool has_dry_friction = true);
 
 }  // namespace fxdyn

@@ -269,7 +269,8 @@ TEST(ExportFormats, UnknownOneIsRefusedWithThoseThereAre) {
     export_format("sldprt");
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("urdf, mjcf, sdf, isaaclab, bam, usd"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("urdf, mjcf, sdf, drake, isaaclab, bam, usd"), std::string::npos)
+        << error.what();
   }
 }
 

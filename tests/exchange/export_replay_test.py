@@ -116,6 +116,7 @@ class Replay:
 
 
 READERS = {
+    'drake': ('simulator_drake.urdf', lambda path: [replay.drake_joint(path, j) for j in JOINTS]),
     'isaaclab': ('simulator_isaaclab.py', lambda path: (lambda names: [replay.isaaclab_joint(names, j) for j in JOINTS])(replay.run_python(path))),
     'mjlab': ('simulator_isaaclab.py', lambda path: (lambda names: [replay.mjlab_joint(names, j) for j in JOINTS])(replay.run_python(path))),
     'bam': ('simulator_bam.json', lambda path: [replay.bam_joint(path, j) for j in JOINTS]),
@@ -123,6 +124,7 @@ READERS = {
 }
 # what stands before the elbow's numbers: viscous and dry friction, rotor
 PLACES = {
+    'drake': (r'<joint name="elbow".*?damping="', r'<actuator name="elbow">.*?rotor_inertia value="'),
     'isaaclab': (r'\nVISCOUS_FRICTION = .*?"elbow":', r'\nFRICTION = .*?"elbow":', r'\nARMATURE = .*?"elbow":'),
     'bam': (r'"elbow".*?"friction_viscous": ', r'"elbow".*?"friction_base": ', r'"elbow".*?"armature": '),
     'usd': (r'over "elbow".*?viscousFrictionCoefficient = ', r'over "elbow".*?dynamicFrictionEffort = ',
@@ -317,7 +319,7 @@ with tempfile.TemporaryDirectory() as name:
     (work / 'scenario.toml').write_text(SCENARIO)
     (work / 'arm.toml').write_text(PROJECT)
     run('simulate', work / 'scenario.toml', '--out', work / 'logs')
-    run('export', work / 'arm.toml', '--out', work / 'out', '--to', 'isaaclab,bam,usd')
+    run('export', work / 'arm.toml', '--out', work / 'out', '--to', 'drake,isaaclab,bam,usd')
     held_out = Replay(work)
     for form in READERS:
         check_format(form, work / 'out', held_out)
