@@ -303,14 +303,24 @@ def check_trajectory(work):
     truth = replay.rows(work / 'logs/a.truth.csv')
     middle = range(500, len(log) - 500)
     check(all(abs(points[k]['t'] - log[k]['t']) < 1e-9 for k in middle), 'time counts from the first point')
+    for key, (off, most) in trajectory_off(points, log, truth, middle).items():
+        check(off < most, f'{key}: off by {off}, {most} at most')
+    for key, (_, most) in trajectory_off(points, log, truth, middle).items():
+        for what, how in ERRORS.items():
+            wrong = [{**point, key[0]: [how(x) if j == key[1] else x for j, x in enumerate(point[key[0]])]} for point in points]
+            off = trajectory_off(wrong, log, truth, middle)[key][0]
+            check(off > most, f'{key}: {what} shows: off by {off}')
+
+
+def trajectory_off(points, log, truth, middle):
+    """Per kind and joint: RMS of what is off, and how much it may be."""
+    rms, out = lambda values: math.sqrt(sum(x * x for x in values) / len(middle)), {}
     for j in range(2):
-        rms = lambda values: math.sqrt(sum(x * x for x in values) / len(middle))
-        for key, column in ('positions', 'q'), ('velocities', 'dq'), ('accelerations', 'ddq'):
-            size = rms([log[k][f'{column}{j + 1}'] for k in middle])
-            off = rms([points[k][key][j] - log[k][f'{column}{j + 1}'] for k in middle])
-            check(off < 1e-3 * size, f'{key} {j + 1}: off by {off} of {size}')
-        size, off = rms([truth[k][f'tau{j + 1}'] for k in middle]), rms([truth[k][f'tau{j + 1}'] - points[k]['effort'][j] for k in middle])
-        check(off < 0.01 * size, f'effort {j + 1}: off by {off} of {size} N m')
+        for key, rows, column, share in (('positions', log, 'q', 1e-3), ('velocities', log, 'dq', 1e-3),
+                                         ('accelerations', log, 'ddq', 1e-3), ('effort', truth, 'tau', 0.01)):
+            true = [rows[k][f'{column}{j + 1}'] for k in middle]
+            out[key, j] = (rms([points[k][key][j] - x for k, x in zip(middle, true)]), share * rms(true))
+    return out
 
 
 with tempfile.TemporaryDirectory() as name:
