@@ -241,6 +241,22 @@ std::unique_ptr<ParquetValues> of_type(const ParquetColumn& column, std::string_
   }
 }
 
+/// As the format's pages and other programs call it.
+std::string encoding_name(ParquetEncoding encoding) {
+  constexpr std::array names{"PLAIN",
+                             "1",
+                             "PLAIN_DICTIONARY",
+                             "RLE",
+                             "BIT_PACKED",
+                             "DELTA_BINARY_PACKED",
+                             "DELTA_LENGTH_BYTE_ARRAY",
+                             "DELTA_BYTE_ARRAY",
+                             "RLE_DICTIONARY",
+                             "BYTE_STREAM_SPLIT"};
+  const auto number = static_cast<std::size_t>(encoding);
+  return number < names.size() ? names[number] : std::to_string(number);
+}
+
 }  // namespace
 
 RunReader::RunReader(std::string_view bytes, std::uint32_t bits) : bytes_(bytes), bits_(bits) {
@@ -314,7 +330,7 @@ std::unique_ptr<ParquetValues> parquet_values(ParquetEncoding encoding, const Pa
   }
   throw DamagedBytes(
       fmt::format("has numbers in an encoding that is not read ({}): write them plain or with a dictionary",
-                  static_cast<int>(encoding)));
+                  encoding_name(encoding)));
 }
 
 }  // namespace fxdyn

@@ -48,7 +48,7 @@ void add_load(const GearFriction& load, ordered_json& out) {
 
 ordered_json entry_of(const SimpleJoint& said) {
   const int model = model_of(said);
-  ordered_json out = {{"model", fmt::format("m{}", model)},
+  ordered_json out = {{"model", bam_model(said)},
                       {"armature", said.armature},
                       {"friction_base", said.friction},
                       {"friction_viscous", said.damping}};
@@ -90,6 +90,8 @@ SimpleJoint read_entry(const nlohmann::json& entry, const std::string& joint, co
 }
 
 }  // namespace
+
+std::string bam_model(const SimpleJoint& said) { return fmt::format("m{}", model_of(said)); }
 
 void write_bam(const SimpleRobot& robot, const std::filesystem::path& file) {
   write_bodies(robot, file);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -19,9 +20,11 @@ namespace {
 /// Sums over logs, joint by joint.
 struct Totals {
   double samples = 0;
-  Eigen::VectorXd cannot_say, file, model, sliding, misread, largest;
+  Eigen::VectorXd cannot_say, in_motion, but_load, file, model, sliding, misread, largest;
   explicit Totals(Eigen::Index n)
       : cannot_say(Eigen::VectorXd::Zero(n)),
+        in_motion(cannot_say),
+        but_load(cannot_say),
         file(cannot_say),
         model(cannot_say),
         sliding(cannot_say),
@@ -34,6 +37,28 @@ Eigen::MatrixXd as_recorded(const Eigen::MatrixXd& tau, const IdentifiedModel& m
   return filter_of(model).torque_lead_s == 0 ? tau : at_other_times(tau, filter_of(model).torque_lead_s / log.step_s);
 }
 
+/// What the file would lose if it had the model's own load friction: the rest of the model minus the rest of the file.
+Eigen::MatrixXd lost_but_load(const SimpleRobot& meant, const IdentifiedModel& model, const ProcessedLog& log) {
+  SimpleRobot rest = meant;
+  rest.joints = meant.beside_load;
+  const ModelValue plain = without_load_friction(model);
+  return predict(plain, log) - as_recorded(torque_of(rest, plain, log.motion(), log.step_s), model, log);
+}
+
+/// The same, but nothing where the joint turns round or stands: there, every simulator has its own rule.
+Eigen::MatrixXd where_sliding(Eigen::MatrixXd lost, const IdentifiedModel& model, const ProcessedLog& log) {
+  for (Eigen::Index j = 0; j < lost.cols(); ++j) {
+    const double least = ProjectionOptions{}.sliding_widths * joints_of(model)[static_cast<std::size_t>(j)].sign_width;
+    lost.col(j).array() *= (log.joint_velocity(j).array().abs() > least).cast<double>();
+  }
+  return lost;
+}
+
+/// Per column, over the samples that the log is judged by, below the torque's cut-off.
+Eigen::VectorXd squares(const Eigen::MatrixXd& torque, const ProcessedLog& log) {
+  return log.filter_columns(torque).middleRows(log.first, log.last - log.first).colwise().squaredNorm();
+}
+
 void add_log(Totals& sum, const ExportFormat& format, const std::filesystem::path& file, const SimpleRobot& meant,
              const IdentifiedModel& expected, const IdentifiedModel& model, const ProcessedLog& log) {
   const MotionRows motion = log.motion();
@@ -43,14 +68,16 @@ void add_log(Totals& sum, const ExportFormat& format, const std::filesystem::pat
   const Eigen::MatrixXd full = predict(model, log), written = as_recorded(replayed.tau, model, log);
   const std::vector<JointMetrics> of_file = judge(log, written), of_model = judge(log, full);
   const Eigen::Index count = log.last - log.first;
-  const Eigen::MatrixXd lost = log.filter_columns(full - written).middleRows(log.first, count);
   const Eigen::ArrayXXd sliding = replayed.sliding.middleRows(log.first, count).array();
   const Eigen::ArrayXXd off = (replayed.tau - said).middleRows(log.first, count).array().abs() * sliding;
   const auto samples = static_cast<double>(count);
   sum.samples += samples;
-  for (Eigen::Index j = 0; j < lost.cols(); ++j) {
+  sum.cannot_say += squares(full - written, log);
+  sum.in_motion += squares(where_sliding(full - written, model, log), log);
+  if (!meant.beside_load.empty())
+    sum.but_load += squares(where_sliding(lost_but_load(meant, model, log), model, log), log);
+  for (Eigen::Index j = 0; j < full.cols(); ++j) {
     const auto i = static_cast<std::size_t>(j);
-    sum.cannot_say[j] += lost.col(j).squaredNorm();
     sum.file[j] += samples * of_file[i].rmse * of_file[i].rmse;
     sum.model[j] += samples * of_model[i].rmse * of_model[i].rmse;
     sum.sliding[j] += sliding.col(j).sum();
@@ -84,7 +111,11 @@ Certificate certify(const ExportFormat& format, const std::filesystem::path& fil
     joint.unit = meant.robot.joints[j].torque_unit();
     if (!format.whole_model) joint.written = meant.joints[j];
     joint.left_out = format.whole_model ? settled_effects(model, j)
-                                        : left_out(model, j, format.has_armature, format.has_stribeck, format.has_load);
+                                        : left_out(model, j, format.has_armature, format.has_stribeck, format.has_load,
+                                                   format.has_dry_friction);
+    if (format.friction_model != nullptr) joint.friction_model = format.friction_model(meant.joints[j]);
+    if (meant.joints[j].load.model > 0) joint.cannot_say_but_load = std::sqrt(sum.but_load[k] / sum.samples);
+    joint.cannot_say_in_motion = std::sqrt(sum.in_motion[k] / sum.samples);
     joint.cannot_say = std::sqrt(sum.cannot_say[k] / sum.samples);
     joint.file_rmse = std::sqrt(sum.file[k] / sum.samples);
     joint.model_rmse = std::sqrt(sum.model[k] / sum.samples);
@@ -105,6 +136,7 @@ nlohmann::json to_json(const Certificate& certificate) {
         {"unit", joint.unit},
         {"left_out", joint.left_out},
         {"cannot_say", joint.cannot_say},
+        {"cannot_say_in_motion", joint.cannot_say_in_motion},
         {"file_rmse", joint.file_rmse},
         {"model_rmse", joint.model_rmse},
         {"misread", std::isfinite(joint.misread) ? nlohmann::json(joint.misread) : nlohmann::json()},
@@ -115,6 +147,8 @@ nlohmann::json to_json(const Certificate& certificate) {
                     {"friction", joint.written->friction},
                     {"armature", joint.written->armature}});
     }
+    if (!joint.friction_model.empty()) entry["friction_model"] = joint.friction_model;
+    if (joint.cannot_say_but_load) entry["cannot_say_but_load"] = *joint.cannot_say_but_load;
     joints.push_back(std::move(entry));
   }
   return {{"schema", "fxdyn.certificate/1"},    {"format", certificate.format},
@@ -125,16 +159,33 @@ nlohmann::json to_json(const Certificate& certificate) {
 
 std::string certificate_table(const Certificate& certificate) {
   std::size_t width = 5;
-  for (const JointCertificate& joint : certificate.joints) width = std::max(width, joint.name.size());
+  bool with_load = false, with_model = false;  // columns that only some formats and robots need
+  for (const JointCertificate& joint : certificate.joints) {
+    width = std::max(width, joint.name.size());
+    with_load |= joint.cannot_say_but_load.has_value();
+    with_model |= !joint.friction_model.empty();
+  }
   std::string out = fmt::format(
       "{}, read back by {}, over the {} logs: RMS of what it can't say, RMSE of the file and of the model\n",
       certificate.file, certificate.reader, certificate.role);
-  out += fmt::format("  {:<{}}{:>12}{:>10}{:>10}  {:<5}{}\n", "joint", width, "can't say", "file", "model", "",
-                     "effects left out");
+  const auto line = [&](const std::string& name, const std::array<std::string, 5>& numbers, const std::string& unit,
+                        const std::string& friction, const std::string& effects) {
+    const auto& [lost, in_motion, but_load, file, of_model] = numbers;
+    out += fmt::format("  {:<{}}{:>12}{:>11}", name, width, lost, in_motion);
+    if (with_load) out += fmt::format("{:>10}", but_load);
+    out += fmt::format("{:>10}{:>10}  {:<5}", file, of_model, unit);
+    if (with_model) out += fmt::format("{:<10}", friction);
+    out += effects + "\n";
+  };
+  const auto number = [](double value) { return fmt::format("{:.4g}", value); };
+  line("joint", {"can't say", "in motion", "but load", "file", "model"}, "", "friction", "effects left out");
   for (const JointCertificate& joint : certificate.joints) {
-    out += fmt::format("  {:<{}}{:>12.4g}{:>10.4g}{:>10.4g}  {:<5}{}\n", joint.name, width, joint.cannot_say,
-                       joint.file_rmse, joint.model_rmse, joint.unit,
-                       joint.left_out.empty() ? "none" : fmt::format("{}", fmt::join(joint.left_out, ", ")));
+    line(joint.name,
+         {number(joint.cannot_say), number(joint.cannot_say_in_motion),
+          joint.cannot_say_but_load ? number(*joint.cannot_say_but_load) : "-", number(joint.file_rmse),
+          number(joint.model_rmse)},
+         joint.unit, joint.friction_model,
+         joint.left_out.empty() ? "none" : fmt::format("{}", fmt::join(joint.left_out, ", ")));
   }
   return out;
 }

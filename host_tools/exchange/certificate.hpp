@@ -24,13 +24,18 @@ struct JointCertificate {
   std::string name, unit;
   std::optional<SimpleJoint> written;  ///< nothing: the whole model
   std::vector<std::string> left_out;  ///< effects without a word in the format; of the whole model: those that remember
+  std::string friction_model;         ///< what the format calls it; empty: it has one form only
   double cannot_say = 0;              ///< RMS of model minus file, both below the torque's cut-off
-  double file_rmse = 0;               ///< of measured minus file
-  double model_rmse = 0;              ///< of measured minus model
-  double misread = 0;                 ///< largest |read back - meant| where friction slides
-  double largest = 0;                 ///< largest |meant|: what `misread` is compared with
-  double sliding_share = 0;           ///< of the samples
-  bool as_meant = true;               ///< the format's own library reads what was meant
+  /// What would be left of it if the file were right wherever the joint turns round or stands.
+  double cannot_say_in_motion = 0;
+  /// What would be left of that if the file had the model's own load friction; nothing: the joint has none in the file.
+  std::optional<double> cannot_say_but_load;
+  double file_rmse = 0;      ///< of measured minus file
+  double model_rmse = 0;     ///< of measured minus model
+  double misread = 0;        ///< largest |read back - meant| where friction slides
+  double largest = 0;        ///< largest |meant|: what `misread` is compared with
+  double sliding_share = 0;  ///< of the samples
+  bool as_meant = true;      ///< the format's own library reads what was meant
 };
 
 struct Certificate {

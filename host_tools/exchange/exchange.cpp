@@ -74,7 +74,8 @@ std::string export_for_simulators(Pipeline& pipeline, const std::vector<std::str
     const ExportFormat& format = export_format(name);
     SimpleRobot simple = format.whole_model
                              ? SimpleRobot{model.robot, std::vector<SimpleJoint>(model.robot.size()), {}}
-                             : simple_robot(model, links, format.has_armature, train, {}, format.has_stribeck);
+                             : simple_robot(model, links, format.has_armature, train,
+                                            {.dry_friction = format.has_dry_friction}, format.has_stribeck);
     if (format.has_load && !format.whole_model) fit_load_friction(simple, model, train);
     simple.urdf = pipeline.project().urdf;
     if (format.has_ranges) simple.ranges = joint_ranges(pipeline.project(), model, train);

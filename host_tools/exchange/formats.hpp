@@ -38,6 +38,9 @@ struct ExportFormat {
   /// It holds the model as the drive's tables have it: SimpleRobot has names only, and replay() expects the model
   /// itself.
   bool whole_model = false;
+  /// What the format calls the friction of a joint that is written so; nullptr: it has one form only.
+  std::string (*friction_model)(const SimpleJoint& said) = nullptr;
+  bool has_dry_friction = true;
 };
 
 std::span<const ExportFormat> export_formats();
@@ -50,6 +53,10 @@ std::string export_format_names();
 void write_urdf_dynamics(const SimpleRobot& robot, const std::filesystem::path& file);
 ReplayedTorque replay_urdf(const std::filesystem::path& file, const IdentifiedModel& expected, const MotionRows& motion,
                            double step_s);
+// drake_format.cpp
+void write_drake(const SimpleRobot& robot, const std::filesystem::path& file);
+ReplayedTorque replay_drake(const std::filesystem::path& file, const IdentifiedModel& expected,
+                            const MotionRows& motion, double step_s);
 // sdf_format.cpp
 void write_sdf(const SimpleRobot& robot, const std::filesystem::path& file);
 ReplayedTorque replay_sdf(const std::filesystem::path& file, const IdentifiedModel& expected, const MotionRows& motion,
@@ -66,6 +73,7 @@ ReplayedTorque replay_isaaclab(const std::filesystem::path& file, const Identifi
                                const MotionRows& motion, double step_s);
 // bam_format.cpp
 void write_bam(const SimpleRobot& robot, const std::filesystem::path& file);
+std::string bam_model(const SimpleJoint& said);
 ReplayedTorque replay_bam(const std::filesystem::path& file, const IdentifiedModel& expected, const MotionRows& motion,
                           double step_s);
 // usd_format.cpp

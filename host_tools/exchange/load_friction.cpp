@@ -20,6 +20,8 @@ double bell_of(const SimpleJoint& said, double dq) {
 }
 
 double loss_of(const GearFriction& load, double motor, double external, double bell) {
+  // one coefficient for both torques; a negative one, of another writer, lessens friction
+  if (load.model < 5) return (load.external + bell * load.external_stribeck) * std::fabs(external - motor);
   double out = std::fabs(load.external * external - load.motor * motor) +
                bell * std::fabs(load.external_stribeck * external - load.motor_stribeck * motor);
   if (motor * external >= 0) return out;
@@ -59,7 +61,8 @@ bool any_load(const SimpleRobot& simple) {
 
 /// Rows of one joint in which it slides.
 struct Sliding {
-  ArrayXd dq, motor, external, friction, bell;  ///< friction: against the motion
+  ArrayXd dq, motor, external, friction, own_load, bell;  ///< friction, and of it the model's load friction: against
+                                                          ///< the motion
 
   Index rows() const { return dq.size(); }
 };
@@ -71,9 +74,11 @@ struct At {
 };
 
 bool is_in(int model, Index unknown) {
-  if (unknown == At::stribeck) return model >= 4;
+  if (unknown == At::base || unknown == At::viscous) return true;
+  if (unknown == At::stribeck) return model == 2 || model >= 4;
+  if (unknown == At::external || unknown == At::motor) return model >= 3;
   if (unknown == At::external_low || unknown == At::motor_low) return model >= 4;
-  return unknown < At::external_quad || model == 6;
+  return model == 6;
 }
 
 /// Columns of the unknowns where |external e - motor m| has the sign that `last` gives it. m3 and m4: one coefficient
@@ -94,8 +99,8 @@ MatrixXd columns_of(const Sliding& at, int model, const VectorXd& last) {
     out.col(of_motor) = -weight * sign * at.motor;
   };
   pair(At::external, At::motor, ArrayXd::Ones(at.rows()));
+  if (is_in(model, At::stribeck)) out.col(At::stribeck) = at.bell;
   if (model >= 4) {
-    out.col(At::stribeck) = at.bell;
     pair(At::external_low, At::motor_low, at.bell);
   }
   if (model != 6) return out;
@@ -133,6 +138,9 @@ BamFit fit_bam(const Sliding& at, int model, const LoadFrictionOptions& options)
   VectorXd most = VectorXd::Constant(At::all, HUGE_VAL);
   most[At::motor] = most[At::motor_low] = options.most;
   if (model < 5) most[At::external] = most[At::external_low] = options.most;
+  // The square of a torque is no more of it either, up to the largest one: few samples tell these two.
+  most[At::external_quad] = options.most / at.external.abs().maxCoeff();
+  most[At::motor_quad] = options.most / at.motor.abs().maxCoeff();
   for (Index i = 0; i < At::all; ++i) {
     if (!is_in(model, i)) most[i] = 0;
   }
@@ -153,6 +161,7 @@ void say(const BamFit& fit, const EffectFit* effect, SimpleJoint& said) {
   said.damping = x[At::viscous];
   said.stribeck = x[At::stribeck];
   said.stribeck_velocity = effect == nullptr ? 0 : effect->shape.at(0);
+  if (fit.model < 3) return;
   const bool one = fit.model < 5;  // coefficient for both
   said.load = {fit.model,           x[one ? At::external : At::motor],
                x[At::external],     x[one ? At::external_low : At::motor_low],
@@ -164,18 +173,21 @@ Sliding sliding_rows(const SimpleRobot& simple, const IdentifiedModel& model, co
                      std::size_t joint, double least) {
   SimpleRobot frictionless = simple;
   for (SimpleJoint& said : frictionless.joints) said = {0, 0, said.armature, 0};
-  std::vector<std::array<double, 4>> rows;
+  const ModelValue plain = without_load_friction(model);
+  std::vector<std::array<double, 5>> rows;
   const auto j = static_cast<Index>(joint);
   for (const ProcessedLog& log : train) {
     const MotionRows motion = log.motion();
     // Without the log's known load: bodies and external torque have none.
     const MatrixXd full = predict(model, motion.q, motion.dq, motion.ddq, log.step_s),
                    bodies = torque_of(frictionless, model, motion, log.step_s),
-                   external = external_torque(simple, model, motion, log.step_s);
+                   external = external_torque(simple, model, motion, log.step_s),
+                   rest = predict(plain, motion.q, motion.dq, motion.ddq, log.step_s);
     for (Index k = log.first; k < log.last; ++k) {
-      const double dq = motion.dq(k, j);
-      if (std::fabs(dq) > least)
-        rows.push_back({dq, full(k, j), external(k, j), (full(k, j) - bodies(k, j)) * (dq > 0 ? 1 : -1)});
+      const double dq = motion.dq(k, j), sign = dq > 0 ? 1 : -1;
+      if (std::fabs(dq) <= least) continue;
+      rows.push_back(
+          {dq, full(k, j), external(k, j), (full(k, j) - bodies(k, j)) * sign, (full(k, j) - rest(k, j)) * sign});
     }
   }
   const auto column = [&](std::size_t c) {
@@ -183,10 +195,16 @@ Sliding sliding_rows(const SimpleRobot& simple, const IdentifiedModel& model, co
     for (std::size_t r = 0; r < rows.size(); ++r) out[static_cast<Index>(r)] = rows[r][c];
     return out;
   };
-  return {column(0), column(1), column(2), column(3), {}};
+  return {column(0), column(1), column(2), column(3), column(4), {}};
 }
 
 }  // namespace
+
+ModelValue without_load_friction(ModelValue model) {
+  for (JointFit& joint : model->joints)
+    std::erase_if(joint.effects, [](const EffectFit& fit) { return fit.effect == "load_friction"; });
+  return model;
+}
 
 MatrixXd torque_of(const SimpleRobot& simple, const IdentifiedModel& model, const MotionRows& motion, double step_s) {
   MatrixXd out = predict(as_model(simple, model), motion.q, motion.dq, motion.ddq, step_s);
@@ -209,6 +227,7 @@ void fit_load_friction(SimpleRobot& simple, const IdentifiedModel& model, const 
     if (rows.rows() < At::all) continue;  // m1 or m2, as it is
     const EffectFit* effect = model.joints[j].find("stribeck");
     SimpleJoint& said = simple.joints[j];
+    if (simple.beside_load.empty()) simple.beside_load = simple.joints;
     said.stribeck_velocity = effect == nullptr ? 0 : effect->shape.at(0);
     rows.bell = rows.dq.unaryExpr([&](double dq) { return bell_of(said, dq); });
     BamFit best = fit_bam(rows, effect == nullptr ? 3 : 4, options);
@@ -218,6 +237,8 @@ void fit_load_friction(SimpleRobot& simple, const IdentifiedModel& model, const 
       if (std::sqrt(other.left) < options.worth * std::sqrt(best.left)) best = std::move(other);
     }
     say(best, effect, said);
+    rows.friction -= rows.own_load;
+    say(fit_bam(rows, effect == nullptr ? 1 : 2, options), effect, simple.beside_load[j]);
   }
 }
 

@@ -79,6 +79,7 @@ struct Sums {
     const double gain_of_d = 2 * d * vr - d * d * vv, gain_of_f = 2 * f * sr - f * f * ss;
     return gain_of_d > gain_of_f ? FrictionPair{d, 0} : FrictionPair{0, f};
   }
+  FrictionPair no_dry_friction() const { return {std::max(damping_alone().damping, 0.0), 0}; }
   /// Without bounds, those alone that are not 0 here.
   FrictionPair solve_like(const SimpleJoint& said) const {
     if (said.damping > 0 && said.friction > 0) return both().value_or(FrictionPair{});
@@ -134,7 +135,10 @@ std::vector<FrictionPair> fit_friction(const IdentifiedModel& model, const std::
   std::vector<FrictionPair> out;
   for (std::size_t j = 0; j < n; ++j) {
     const Sums& sums = (sliding[j].ss > 0 ? sliding : moving)[j];
-    out.push_back(inside.empty() ? sums.solve() : sums.solve_like(inside[j]));
+    if (!inside.empty())
+      out.push_back(sums.solve_like(inside[j]));
+    else
+      out.push_back(options.dry_friction ? sums.solve() : sums.no_dry_friction());
   }
   return out;
 }
@@ -172,10 +176,10 @@ SimpleRobot simple_robot(const IdentifiedModel& model, const Robot& bodies, bool
 }
 
 std::vector<std::string> left_out(const IdentifiedModel& model, std::size_t joint, bool has_armature, bool has_stribeck,
-                                  bool has_load) {
+                                  bool has_load, bool has_dry_friction) {
   std::vector<std::string> out;
   const auto said = [&](const std::string& name) {
-    return name == "viscous" || name == "coulomb" || (has_armature && name == "rotor_inertia") ||
+    return name == "viscous" || (has_dry_friction && name == "coulomb") || (has_armature && name == "rotor_inertia") ||
            (has_stribeck && name == "stribeck") || (has_load && name == "load_friction");
   };
   for (const EffectFit& fit : model.joints.at(joint).effects) {

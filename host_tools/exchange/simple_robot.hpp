@@ -53,11 +53,15 @@ struct SimpleRobot {
   std::vector<SimpleJoint> joints;
   std::filesystem::path urdf;        ///< the project's, which an export may take its other content from
   std::vector<JointRange> ranges{};  ///< per joint (posterior.hpp); empty: not asked for
+  /// Per joint what would be said if the format had the model's own load friction (load_friction.hpp): tells what
+  /// another formula of it costs. Empty: no joint has any.
+  std::vector<SimpleJoint> beside_load{};
 };
 
 struct ProjectionOptions {
   /// Dry friction is fitted where it slides: from this many of the joint's sign widths on, tanh(3) = 0.995 [-]; hand.
   double sliding_widths = 3;
+  bool dry_friction = true;  ///< the format has it; else damping takes what it can of it
 };
 
 /// Damping and dry friction of one joint [as in SimpleJoint].
@@ -93,6 +97,6 @@ ModelValue as_model(const SimpleRobot& simple, ModelValue model);
 
 /// Effects of a joint, and of the whole body, that a simple robot has no word for. ("bls": the learned part.)
 std::vector<std::string> left_out(const IdentifiedModel& model, std::size_t joint, bool has_armature,
-                                  bool has_stribeck = false, bool has_load = false);
+                                  bool has_stribeck = false, bool has_load = false, bool has_dry_friction = true);
 
 }  // namespace fxdyn

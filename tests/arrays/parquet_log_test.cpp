@@ -291,7 +291,8 @@ TEST(SmallParquet, PagesThatNoWriterMakesAreRefused) {
   is_refused(with(test::small_page(20, zeros())), "ends in the middle");
   is_refused(with(test::small_page(31, zeros())), "is damaged");
   is_refused(with(test::small_page(30, zeros().substr(8))), "ends in the middle");
-  is_refused(with(test::small_page(30, zeros(), 6)), "has numbers in an encoding that is not read (6)");
+  is_refused(with(test::small_page(30, zeros(), 6)),
+             "has numbers in an encoding that is not read (DELTA_LENGTH_BYTE_ARRAY)");
   is_refused(with(test::small_page(30, zeros(), 8)), "is damaged");
   is_refused(with(test::small_page(30, zeros(), 0, std::int64_t{1} << 40)), "is damaged");
   is_refused(with(test::small_page(30, zeros(), 0, 1 << 20)), "is damaged");
@@ -335,6 +336,54 @@ TEST(SmallParquet, AFooterThatClaimsTooMuchIsDamaged) {
   std::string encrypted = whole;
   encrypted.back() = 'E';
   refused_as(test::write("small.parquet", encrypted), "is encrypted");
+}
+
+/// What page_kinds.py has written in that folder.
+std::vector<std::filesystem::path> page_kinds(const char* subfolder) {
+  const char* folder = std::getenv("FXDYN_PAGE_KINDS");
+  if (folder == nullptr) return {};
+  std::vector<std::filesystem::path> out;
+  for (const auto& entry : std::filesystem::directory_iterator(std::filesystem::path(folder) / subfolder))
+    if (entry.path().extension() == ".parquet") out.push_back(entry.path());
+  return out;
+}
+
+TEST(PageKinds, EveryNumberIsTheWritersOwn) {
+  const auto all = page_kinds("");
+  if (all.empty()) GTEST_SKIP() << "page_kinds.py gives the folder";
+  const Log as_csv = truth();
+  for (const auto& file : all) {
+    SCOPED_TRACE(file.filename());
+    const std::string name = file.filename();
+    if (name.starts_with("lerobot")) {
+      LogFormat only = of_lerobot("");  // one episode
+      only.columns.erase(topic_key);
+      const Log log = read(file, only);
+      ASSERT_EQ(log.samples(), 60);
+      EXPECT_TRUE(log.q == as_csv.q.cast<float>().cast<double>());
+      EXPECT_TRUE(log.dq == as_csv.dq.cast<float>().cast<double>());
+      EXPECT_TRUE(log.tau == as_csv.tau.cast<float>().cast<double>());
+      continue;
+    }
+    const Log log = read(file);
+    const Eigen::Index first = name.starts_with("holes") ? 5 : 0, count = name.starts_with("holes") ? 53 : 60;
+    ASSERT_EQ(log.samples(), count);
+    EXPECT_LT((log.t - as_csv.t.segment(first, count)).cwiseAbs().maxCoeff(), 1e-12);
+    EXPECT_TRUE(log.q == as_csv.q.middleRows(first, count));
+    EXPECT_TRUE(log.dq == as_csv.dq.middleRows(first, count));
+    EXPECT_TRUE(log.tau == as_csv.tau.middleRows(first, count));
+  }
+}
+
+TEST(PageKinds, WhatIsNotReadIsNamed) {
+  const auto all = page_kinds("refused");
+  if (all.empty()) GTEST_SKIP() << "page_kinds.py gives the folder";
+  for (const auto& file : all) {
+    std::ifstream text(std::filesystem::path(file).replace_extension(".txt"));
+    std::string words;
+    std::getline(text, words);
+    test::expect_refused(file, {words}, [&] { read(file); });
+  }
 }
 
 /// What writers/run_parquet.sh has written.

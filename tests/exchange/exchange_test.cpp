@@ -256,6 +256,8 @@ TEST_P(Exchange, CertificateHoldsWhatTheTableSays) {
   for (const JointCertificate& joint : certificate.joints) {
     EXPECT_NE(table.find(joint.name), std::string::npos);
     EXPECT_NE(table.find(fmt::format("{:.4g}", joint.cannot_say)), std::string::npos);
+    EXPECT_NE(table.find(fmt::format("{:.4g}", joint.cannot_say_in_motion)), std::string::npos);
+    EXPECT_EQ(joint.friction_model, is("bam") ? "m1" : "");
   }
 }
 
@@ -267,7 +269,8 @@ TEST(ExportFormats, UnknownOneIsRefusedWithThoseThereAre) {
     export_format("sldprt");
     FAIL();
   } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("urdf, mjcf, sdf, isaaclab, bam, usd"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("urdf, mjcf, sdf, drake, isaaclab, bam, usd"), std::string::npos)
+        << error.what();
   }
 }
 

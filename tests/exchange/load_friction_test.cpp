@@ -32,6 +32,19 @@ struct Case {
   GearFriction load;
 };
 
+/// Every number of each is another one than 0.
+const std::vector<Case> every_model{{1, {}},
+                                    {2, {}},
+                                    {3, {3, 0.1, 0.1}},
+                                    {4, {4, 0.1, 0.1, 0.2, 0.2}},
+                                    {5, {5, 0.3, 0.1, 0.05, 0.2}},
+                                    {6, {6, 0.2, 0.3, 0.1, 0.05, 0.004, 0.006}}};
+
+SimpleJoint joint_of(const Case& one) {
+  const bool stribeck = one.model != 1 && one.model != 3;
+  return {0.2, 0.4, 0.03, 0, stribeck ? 0.3 : 0, stribeck ? 0.8 : 0, one.load};
+}
+
 class BamLoad : public testing::Test {
  protected:
   BamLoad() : urdf(test::write("arm.urdf", arm)), model(test::model_of(read_urdf(urdf))) {
@@ -92,9 +105,8 @@ double motor_torque(const nlohmann::json& p, double q, double dq, double ddq) {
 }
 
 TEST_F(BamLoad, FileSaysWhatBamMakesOfIt) {
-  for (const Case& one : {Case{3, {3, 0.1, 0.1}}, Case{4, {4, 0.1, 0.1, 0.2, 0.2}}, Case{5, {5, 0.3, 0.1, 0.05, 0.2}},
-                          Case{6, {6, 0.2, 0.3, 0.1, 0.05, 0.004, 0.006}}}) {
-    format.write(simple({0.2, 0.4, 0.03, 0, one.model == 3 ? 0 : 0.3, one.model == 3 ? 0 : 0.8, one.load}), file());
+  for (const Case& one : every_model) {
+    format.write(simple(joint_of(one)), file());
     const nlohmann::json p = nlohmann::json::parse(read_file(file())).at("joint");
     EXPECT_EQ(p.at("model"), fmt::format("m{}", one.model));
     const MotionRows rows{motion.q, motion.dq, motion.ddq};
@@ -110,31 +122,43 @@ TEST_F(BamLoad, FileSaysWhatBamMakesOfIt) {
   }
 }
 
+/// Numbers of a joint's friction in the file.
+std::vector<std::string> numbers_of(const nlohmann::json& joint) {
+  std::vector<std::string> out;
+  for (const auto& [key, value] : joint.items()) {
+    if (value.is_number() && key != "alpha") out.push_back(key);
+  }
+  return out;
+}
+
 TEST_F(BamLoad, ErrorsInTheFileAreFound) {
   set_effects(0.15, 0.5);
-  const SimpleRobot robot = simple({0.2, 0.4, 0.03, 0, 0.3, 0.8, {6, 0.2, 0.3, 0.1, 0.05, 0.004, 0.006}});
-  format.write(robot, file());
-  ASSERT_TRUE(certify(format, file(), robot, model, held_out).as_meant());
-  const std::string right = read_file(file());
   constexpr double degrees = 57.29577951308232, gear = 50;
-  const std::vector<std::function<double(double)>> wrong{[](double x) { return x * degrees; },
+  const std::vector<std::function<double(double)>> wrong{[](double x) { return -x; },
+                                                         [](double x) { return x * degrees; },
                                                          [](double x) { return x / degrees; },
-                                                         [](double x) { return x / gear; }, [](double) { return 0.0; }};
-  for (const char* key :
-       {"load_friction_motor", "load_friction_external", "load_friction_motor_stribeck",
-        "load_friction_external_stribeck", "load_friction_motor_quad", "load_friction_external_quad"}) {
-    for (const auto& how : wrong) {
-      nlohmann::json text = nlohmann::json::parse(right);
-      text["joint"][key] = how(text["joint"][key].get<double>());
-      write_file(file(), text.dump(1));
-      EXPECT_FALSE(certify(format, file(), robot, model, held_out).as_meant()) << key;
+                                                         [](double x) { return x / gear; },
+                                                         [](double x) { return x / (gear * gear); },
+                                                         [](double) { return 0.0; }};
+  for (const Case& one : every_model) {
+    const SimpleRobot robot = simple(joint_of(one));
+    format.write(robot, file());
+    ASSERT_TRUE(certify(format, file(), robot, model, held_out).as_meant()) << one.model;
+    const nlohmann::json right = nlohmann::json::parse(read_file(file()));
+    const std::vector<std::string> keys = numbers_of(right.at("joint"));
+    EXPECT_EQ(keys.size(), (std::array{3U, 5U, 4U, 7U, 9U, 11U}.at(static_cast<std::size_t>(one.model - 1))));
+    for (const std::string& key : keys) {
+      for (std::size_t k = 0; k < wrong.size(); ++k) {
+        // an even power, or nothing to divide by
+        if (key == "dtheta_stribeck" && (k == 0 || k == 5)) continue;
+        nlohmann::json text = right;
+        text["joint"][key] = wrong[k](text["joint"][key].get<double>());
+        write_file(file(), text.dump(1));
+        EXPECT_FALSE(certify(format, file(), robot, model, held_out).as_meant())
+            << "m" << one.model << " " << key << " " << k;
+      }
     }
   }
-  // |external e - motor m| with the motor's torque on the wrong side
-  nlohmann::json text = nlohmann::json::parse(right);
-  text["joint"]["load_friction_motor"] = -0.2;
-  write_file(file(), text.dump(1));
-  EXPECT_FALSE(certify(format, file(), robot, model, held_out).as_meant());
 }
 
 TEST_F(BamLoad, AModelsLoadFrictionIsWritten) {
@@ -153,6 +177,13 @@ TEST_F(BamLoad, AModelsLoadFrictionIsWritten) {
     // What is left is the load that accelerating the arm makes, up to a third of gravity's: BAM's external torque has
     // none of it.
     EXPECT_LT(said.cannot_say, 0.8 * lost.cannot_say) << "m" << robot.joints[0].load.model;
+    EXPECT_EQ(said.friction_model, fmt::format("m{}", robot.joints[0].load.model));
+    EXPECT_EQ(lost.friction_model, stribeck > 0 ? "m2" : "m1");
+    EXPECT_FALSE(lost.cannot_say_but_load.has_value());
+    // With the model's own load friction nothing would be lost but the turn of the sign, three of its widths away.
+    ASSERT_TRUE(said.cannot_say_but_load.has_value());
+    EXPECT_LT(*said.cannot_say_but_load, 0.05 * said.cannot_say_in_motion);
+    EXPECT_LE(said.cannot_say_in_motion, said.cannot_say);
   }
 }
 
@@ -197,7 +228,38 @@ TEST_F(BamLoad, TheModelsOwnCoefficientIsFound) {
 TEST_F(BamLoad, JointsWithoutItStayAsTheyAre) {
   set_effects(0, 0);
   model.joints[0].effects.pop_back();
-  EXPECT_EQ(fitted().joints[0].load.model, 0);
+  const SimpleRobot robot = fitted();
+  EXPECT_EQ(robot.joints[0].load.model, 0);
+  EXPECT_TRUE(robot.beside_load.empty());
+}
+
+TEST_F(BamLoad, SquaresTakeNoMoreOfATorqueThanOtherNumbersMay) {
+  set_effects(0.4, 0.5);
+  const LoadFrictionOptions any{.worth = 10};
+  SimpleRobot robot = simple_robot(model, model.robot, true, train, {}, true);
+  fit_load_friction(robot, model, train, {}, any);
+  const GearFriction load = robot.joints[0].load;
+  ASSERT_EQ(load.model, 6);
+  const double largest = predict(model, train[0]).cwiseAbs().maxCoeff();
+  EXPECT_GT(load.motor_quad + load.external_quad, 0);
+  EXPECT_LE(load.motor_quad * largest, any.most * 1.000001);
+  EXPECT_LE(load.external_quad * mass * gravity * centre, any.most * 1.01);  // the log may not reach the horizontal
+}
+
+TEST_F(BamLoad, TheCertificateNamesTheModelAndWhatTheLoadCosts) {
+  set_effects(0.15, 0.5);
+  const SimpleRobot robot = fitted();
+  format.write(robot, file());
+  const Certificate certificate = certify(format, file(), robot, model, held_out);
+  const JointCertificate& joint = certificate.joints[0];
+  const nlohmann::json json = to_json(certificate).at("joints")[0];
+  EXPECT_EQ(json.at("friction_model"), joint.friction_model);
+  EXPECT_EQ(json.at("cannot_say_but_load").get<double>(), *joint.cannot_say_but_load);
+  EXPECT_EQ(json.at("cannot_say_in_motion").get<double>(), joint.cannot_say_in_motion);
+  const std::string table = certificate_table(certificate);
+  for (const std::string& word : {std::string("but load"), std::string("friction"), joint.friction_model,
+                                  fmt::format("{:.4g}", *joint.cannot_say_but_load)})
+    EXPECT_NE(table.find(word), std::string::npos) << word << "\n" << table;
 }
 
 TEST_F(BamLoad, UnknownModelIsRefused) {

@@ -119,6 +119,21 @@ def run_python(path):
     return names
 
 
+def drake_joint(path, joint):
+    """MultibodyPlant: damping of the joint, the rotor times the square of its gear ratio, no dry friction; no drive where the
+    effort is 0."""
+    root = xml.parse(path).getroot()
+    said = next(e for e in root.findall('joint') if e.get('name') == joint)
+    assert root.tag == 'robot' and float(said.find('dynamics').get('friction')) == 0
+    damping, limit = float(said.find('dynamics').get('damping')), said.find('limit')
+    drives = [e for e in root.findall('transmission') if e.find('joint').get('name') == joint]
+    assert len(drives) == 1 and 'SimpleTransmission' in drives[0].find('type').text
+    assert limit is None or float(limit.get('effort', 'inf')) > 0
+    value = lambda name: float(drives[0].find('actuator/{http://drake.mit.edu}' + name).get('value'))
+    assert damping >= 0  # Drake refuses it
+    return lambda dq, ddq, *_: damping * dq + value('gear_ratio') ** 2 * value('rotor_inertia') * ddq
+
+
 def isaaclab_joint(names, joint):
     """tau = armature ddq + dynamic_friction sign(dq) + viscous_friction dq: of PhysX, SI units."""
     found = [a for a in names['isaaclab_actuators']().values() if any(re.fullmatch(e, joint) for e in a.joint_names_expr)]

@@ -3,6 +3,7 @@
 compiled against the interface alone (ROS is not here) and evaluated over the held-out log: its terms are those of the
 true arm, by formulas of the test's own, and its loss is the certificate's."""
 import json
+import math
 import pathlib
 import subprocess
 import sys
@@ -159,28 +160,52 @@ def evaluated(program, states):
 def rms(values): return (sum(x * x for x in values) / len(values)) ** 0.5
 
 
-def check_terms(states, terms, urdf):
-    """Against the true arm: bodies by Newton and Euler's recursion, spring and friction by their formulas."""
-    chain, zero = replay.Chain(urdf), [0.0, 0.0]
-    off = {name: [] for name in ('gravity', 'coriolis', 'inertia', 'friction', 'sum', 'symmetric')}
-    for state, term in zip(states, terms):
-        q, dq, ddq = state[0:2], state[2:4], state[4:6]
-        rest = chain.torque(q, zero, zero)
-        moved = chain.torque(q, dq, zero)
+def true_terms(states, urdf):
+    """Bodies by Newton and Euler's recursion, spring and friction by their formulas."""
+    chain, zero, out = replay.Chain(urdf), [0.0, 0.0], []
+    for state in states:
+        q, dq = state[0:2], state[2:4]
+        rest, moved = chain.torque(q, zero, zero), chain.torque(q, dq, zero)
         columns = [[a - b for a, b in zip(chain.torque(q, zero, unit), rest)] for unit in ([1, 0], [0, 1])]
-        spring = [0, SPRING * q[1]]
+        out.append({'gravity': [rest[0], rest[1] + SPRING * q[1]], 'coriolis': [b - a for a, b in zip(rest, moved)],
+                    'inertia': [columns[i][j] for j in range(2) for i in range(2)],
+                    'friction': [VISCOUS[j] * dq[j] + COULOMB[j] * replay.sign(dq[j]) for j in range(2)]})
+    return out
+
+
+MOST_OFF = {'gravity': 0.03, 'coriolis': 0.02, 'inertia': 0.01, 'friction': 0.05, 'sum': 1e-3, 'symmetric': 1e-4}
+
+
+def terms_off(states, terms, right):
+    """RMS of what each term is off."""
+    off = {name: [] for name in MOST_OFF}
+    for state, term, true in zip(states, terms, right):
+        dq, ddq = state[2:4], state[4:6]
+        for name in ('gravity', 'coriolis', 'inertia'):
+            off[name] += [a - b for a, b in zip(term[name], true[name])]
         for j in range(2):
-            off['gravity'].append(term['gravity'][j] - rest[j] - spring[j])
-            off['coriolis'].append(term['coriolis'][j] - moved[j] + rest[j])
             if abs(dq[j]) > 0.1:  # beyond: friction slides and the path has settled
-                off['friction'].append(term['friction'][j] - VISCOUS[j] * dq[j] - COULOMB[j] * replay.sign(dq[j]))
-            off['inertia'] += [term['inertia'][2 * j + i] - columns[i][j] for i in range(2)]
+                off['friction'].append(term['friction'][j] - true['friction'][j])
             inertial = sum(term['inertia'][2 * j + i] * ddq[i] for i in range(2))
             off['sum'].append(term['torques'][j] - inertial - term['coriolis'][j] - term['gravity'][j])
         off['symmetric'].append(term['inertia'][1] - term['inertia'][2])
-    for name, most in {'gravity': 0.03, 'coriolis': 0.02, 'inertia': 0.01, 'friction': 0.05, 'sum': 1e-3,
-                       'symmetric': 1e-4}.items():
-        check(rms(off[name]) < most, f'{name}: off by {rms(off[name])}')
+    return {name: rms(values) for name, values in off.items()}
+
+
+def check_terms(program, states, terms, urdf):
+    right = true_terms(states, urdf)
+    for name, off in terms_off(states, terms, right).items():
+        check(off < MOST_OFF[name], f'{name}: off by {off}')
+    gear = 50
+    for name in ('gravity', 'coriolis', 'inertia', 'friction'):
+        for what, factor in {'another sign': -1, '57.3 times': 57.3, 'a 57.3th': 1 / 57.3, "the motor's side": 1 / gear}.items():
+            wrong = [{**term, name: [factor * x for x in term[name]]} for term in terms]
+            off = terms_off(states, wrong, right)[name]
+            check(off > MOST_OFF[name], f'{name}: {what} shows: off by {off}')
+    for k, what in enumerate(('positions', 'velocities')):  # read as degrees
+        turned = [[x * math.pi / 180 if at // 2 == k else x for at, x in enumerate(state)] for state in states]
+        off = terms_off(states, evaluated(program, turned)[0], right)
+        check(any(off[name] > MOST_OFF[name] for name in ('gravity', 'friction')), f'{what} in degrees show: {off}')
 
 
 with tempfile.TemporaryDirectory() as name:
@@ -213,7 +238,7 @@ with tempfile.TemporaryDirectory() as name:
     check(refused == 'fxdyn_arm_solver: 3 joints instead of 2: shoulder, elbow', refused)
     check('limited' not in warned, 'within the limits')
     check('limited' in evaluated(program, [[9, 0, 0, 0, 0, 0]])[2], 'a state beyond the limits')
-    check_terms(states, terms, work / 'arm.urdf')
+    check_terms(program, states, terms, work / 'arm.urdf')
     truth = {row['t']: row for row in replay.rows(work / 'logs/a.truth.csv')}
     for j, joint in enumerate(certificate['joints']):
         # What the path after a reversal was worth, and nothing at the joint without it.

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <zlib.h>
+#include <zstd.h>
 
 #include <array>
 #include <string>
@@ -133,6 +135,23 @@ TEST(CanLog, TheLongFormIsTheSame) {
   EXPECT_EQ(log.tau(9, 0), -1);
   EXPECT_EQ(log.q(9, 1), 256);
   EXPECT_EQ(log.tau(9, 1), 2);
+}
+
+TEST(CanLog, PackedByGzipOrZstdItIsTheSame) {
+  const std::string text = node_log();
+  const Log plain = recorded_on_bus(text).log;
+  const auto gzip = test::folder() / "bus.log.gz";
+  gzFile out = ::gzopen(gzip.c_str(), "wb");
+  ASSERT_EQ(::gzwrite(out, text.data(), static_cast<unsigned>(text.size())), static_cast<int>(text.size()));
+  ::gzclose(out);
+  std::string packed(::ZSTD_compressBound(text.size()), '\0');
+  packed.resize(::ZSTD_compress(packed.data(), packed.size(), text.data(), text.size(), 1));
+  for (const std::filesystem::path& file : {gzip, test::write("bus.log.zst", packed)}) {
+    ASSERT_EQ(reader_of(file).name, "candump") << file;
+    const Log log = reader_of(file).read({file, 2, {}}).log;
+    EXPECT_TRUE(log.t == plain.t) << file;
+    EXPECT_TRUE(log.tau == plain.tau) << file;
+  }
 }
 
 TEST(CanLog, FramesOfCanFdAndErrorsAreUnderstood) {
