@@ -130,9 +130,9 @@ TEST(FreeCurves, WhatAnotherJointsVelocityDoesIsNoneOfThem) {
 
 TEST(FreeCurves, ACurveStaysWhereAFitOfEverythingWouldHarmAnotherJoint) {
   const auto cover = [](const ArrayXd& q, const ArrayXd&, const ArrayXd&, const ArrayXd&) -> ArrayXd {
-    return 1.5 * bump(q, -0.3, 0.1);
+    return 4 * bump(q, -0.3, 0.1);
   };
-  const Answer a = answer(cover, 0.3);
+  const Answer a = answer(cover, 0.1);
   // What the train log alone has of joint 3 would go to the inertia that the validate log has as well.
   Models everything = a.after;
   refit(everything, a.logs, test::no_whitening(), 4);
