@@ -92,7 +92,7 @@ class Moves {
     }
   }
   ArrangementMove& add(Mistake mistake, Index joint) {
-    all.push_back({mistake, joint, joint, 0, Vector3d::Zero(), now_});
+    all.push_back({mistake, joint, joint, 0, Vector3d::Zero(), now_, 0});
     return all.back();
   }
   const Joint& joint(Index j) const { return evidence_.robot().joints[static_cast<std::size_t>(j)]; }
@@ -304,6 +304,15 @@ std::vector<Scored> best_of_each(const ArrangementEvidence& evidence, const Arra
   return best;
 }
 
+/// A URDF without masses explains next to any torque a little better in some other way, or with a spring as well.
+bool is_doubtful(const ArrangementFinding& finding, double nats, const ArrangementOptions& options) {
+  if (nats > options.vague_gain) return false;
+  const bool spring = std::any_of(finding.others.begin(), finding.others.end(), [&](const ArrangementMove& other) {
+    return other.mistake == Mistake::spring && other.nats > nats - options.as_good;
+  });
+  return spring || finding.after > options.vague_leaves * finding.before;
+}
+
 }  // namespace
 
 std::vector<ArrangementFinding> find_mistakes(const ArrangementEvidence& evidence, const ArrangementOptions& options,
@@ -317,16 +326,14 @@ std::vector<ArrangementFinding> find_mistakes(const ArrangementEvidence& evidenc
     if (best.empty() || best.front().score.nats > score.nats - options.gain) break;
     ArrangementFinding finding;
     finding.from = now;
-    finding.nats = score.nats - best.front().score.nats;
+    for (Scored& one : best) one.move.nats = score.nats - one.score.nats;
     (best.front().score.rms.array() / score.rms.array()).minCoeff(&finding.felt);
     finding.before = score.rms[finding.felt];
     finding.after = best.front().score.rms[finding.felt];
-    for (std::size_t i = 1; i < best.size() && best[i].score.nats < best.front().score.nats + options.as_good; ++i)
-      finding.as_good.push_back(best[i].move);
+    for (std::size_t i = 1; i < best.size() && best[i].score.nats < best.front().score.nats + options.gain; ++i)
+      if (!is_small(best[i].move, now, options)) finding.others.push_back(best[i].move);
     const bool spring = best.front().move.mistake == Mistake::spring;
-    // A URDF without masses explains next to any torque a little better in some other way.
-    const bool doubtful = !has_all_masses(evidence.robot()) && finding.after > options.vague_leaves * finding.before;
-    if (doubtful && !spring) break;
+    if (!spring && !has_all_masses(evidence.robot()) && is_doubtful(finding, best.front().move.nats, options)) break;
     const bool is_none = spring || is_small(best.front().move, now, options);
     if (!spring) ++found;
     now = best.front().move.result;

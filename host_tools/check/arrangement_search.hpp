@@ -34,15 +34,15 @@ struct ArrangementMove {
   double value = 0;                                     ///< offset [rad | m], gain, unit
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< axis, gravity
   Arrangement result;                                   ///< with all moves before it
+  double nats = 0;                                      ///< gained
 };
 
 struct ArrangementFinding {
   Arrangement from;  ///< what it was compared with: all moves before it, and springs
   ArrangementMove move;
-  double nats = 0;                       ///< gained
-  Eigen::Index felt = 0;                 ///< the joint whose error falls most
-  double before = 0, after = 0;          ///< RMS error of that joint [N*m | N]
-  std::vector<ArrangementMove> as_good;  ///< other explanations that the data can't exclude
+  Eigen::Index felt = 0;                ///< the joint whose error falls most
+  double before = 0, after = 0;         ///< RMS error of that joint [N*m | N]
+  std::vector<ArrangementMove> others;  ///< explanations that the data can't exclude, the best first
 };
 
 /// The changes that explain the torques better than what the project says, each beside those before it, one by one

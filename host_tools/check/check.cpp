@@ -357,6 +357,11 @@ json to_json(const CheckResult& result) {
   for (const CheckFinding& finding : result.findings) {
     json one = {{"severity", finding.error ? "error" : "warning"}, {"kind", finding.kind}, {"text", finding.text}};
     if (finding.joint) one["joint"] = *finding.joint + 1;
+    for (const OtherFinding& other : finding.others) {
+      json also = {{"kind", other.kind}};
+      if (other.joint) also["joint"] = *other.joint + 1;
+      one["or"].push_back(std::move(also));
+    }
     if (!finding.log.empty()) one["log"] = finding.log;
     if (!finding.fix.empty()) one["fix"] = finding.fix;
     findings.push_back(one);

@@ -18,14 +18,21 @@ struct CheckOptions {
   LogFactOptions facts;
 };
 
+/// Another explanation of the same that the data can't exclude.
+struct OtherFinding {
+  std::string kind;                  ///< as that of a finding
+  std::optional<std::size_t> joint;  ///< from 0
+};
+
 /// Something that is wrong, or may be.
 struct CheckFinding {
-  bool error = false;                ///< the data can't be what the project says
-  std::string kind;                  ///< "swapped_joints", "rest", ..
-  std::optional<std::size_t> joint;  ///< from 0
-  std::string log;                   ///< its name; empty: all of them
-  std::string text;                  ///< one line: what, and why
-  std::string fix;                   ///< the line to write into the project; may be empty
+  bool error = false;                  ///< the data can't be what the project says
+  std::string kind;                    ///< "swapped_joints", "rest", ..
+  std::optional<std::size_t> joint;    ///< from 0
+  std::string log;                     ///< its name; empty: all of them
+  std::string text;                    ///< one line: what, and why
+  std::string fix;                     ///< the line to write into the project; may be empty
+  std::vector<OtherFinding> others{};  ///< the likeliest first
 };
 
 /// What a log is, before any fit.

@@ -225,15 +225,42 @@ class MoveWords {
   std::string table_ = "[signals]";
 };
 
+bool is_as_good(const ArrangementMove& other, const ArrangementFinding& finding, const ArrangementOptions& options) {
+  return other.nats > finding.move.nats - options.as_good;
+}
+
 /// A gain of other units; a smaller one may be masses that the URDF has wrong. A spring that explains the torque as
 /// well is no mistake.
-bool is_sure(const ArrangementFinding& finding) {
+bool is_sure(const ArrangementFinding& finding, const ArrangementOptions& options) {
   const ArrangementMove& move = finding.move;
-  if (std::any_of(finding.as_good.begin(), finding.as_good.end(),
-                  [](const ArrangementMove& other) { return other.mistake == Mistake::spring; }))
+  if (std::any_of(finding.others.begin(), finding.others.end(), [&](const ArrangementMove& other) {
+        return other.mistake == Mistake::spring && is_as_good(other, finding, options);
+      }))
     return false;
   if (move.mistake == Mistake::torque_unit) return false;
   return move.mistake != Mistake::torque_gain || move.value > 3 || move.value < 1.0 / 3;
+}
+
+/// Gravity and a unit of all torques are of no joint.
+std::optional<std::size_t> joint_of(const ArrangementMove& move) {
+  if (move.mistake == Mistake::gravity || move.mistake == Mistake::torque_unit) return {};
+  return static_cast<std::size_t>(move.joint);
+}
+
+/// Names the best of the other explanations, and counts the rest.
+void add_others(const ArrangementFinding& finding, const MoveWords& words, const ArrangementOptions& options,
+                CheckFinding& out) {
+  int unnamed = 0;
+  for (const ArrangementMove& other : finding.others) {
+    out.others.push_back({to_string(other.mistake), joint_of(other)});
+    if (static_cast<int>(out.others.size()) > options.alternatives && !is_as_good(other, finding, options)) {
+      ++unnamed;
+      continue;
+    }
+    out.text += fmt::format("; or {}", words.what(other));
+    if (const std::string fix = words.fix(other, other.result); !fix.empty()) out.fix += "\nor " + fix;
+  }
+  if (unnamed > 0) out.text += fmt::format("; or one of {} less likely changes, see --json", unnamed);
 }
 
 }  // namespace
@@ -242,11 +269,10 @@ CheckFinding in_words(const ArrangementFinding& finding, const Arrangement& all,
                       const std::vector<std::string>& signals, const ArrangementOptions& options) {
   const MoveWords words(project, signals);
   CheckFinding out;
-  out.error = is_sure(finding) && finding.after < options.sure * finding.before;
+  out.error = is_sure(finding, options) && finding.after < options.sure * finding.before;
   out.kind = to_string(finding.move.mistake);
-  if (finding.move.mistake != Mistake::gravity && finding.move.mistake != Mistake::torque_unit)
-    out.joint = static_cast<std::size_t>(finding.move.joint);
-  const double odds = finding.nats / std::numbers::ln10;
+  out.joint = joint_of(finding.move);
+  const double odds = finding.move.nats / std::numbers::ln10;
   out.text = words.what(finding.move);
   // Errors before and after may be in different units. A fit that is hardly better may still need far less likely
   // bodies.
@@ -258,10 +284,7 @@ CheckFinding in_words(const ArrangementFinding& finding, const Arrangement& all,
                     words.joint(finding.felt), finding.before, finding.after, words.torque_unit(finding.felt), odds);
   }
   out.fix = words.fix(finding.move, all);
-  for (const ArrangementMove& other : finding.as_good) {
-    out.text += fmt::format("; or {}", words.what(other));
-    if (const std::string fix = words.fix(other, other.result); !fix.empty()) out.fix += "\nor " + fix;
-  }
+  add_others(finding, words, options, out);
   return out;
 }
 

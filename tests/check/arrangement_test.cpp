@@ -254,16 +254,55 @@ TEST(Arrangement, AMistakeThatASpringExplainsAsWellIsNotSure) {
   finding.move.direction = Eigen::Vector3d::UnitX();
   finding.before = 10;
   finding.after = 1;
-  finding.nats = 100;
+  finding.move.nats = 100;
   const auto said = [&] { return in_words(finding, finding.from, project, {"t", "q", "tau"}, {}); };
   EXPECT_TRUE(said().error);
   ArrangementMove spring = finding.move;
   spring.mistake = Mistake::spring;
-  finding.as_good = {spring};
+  finding.others = {spring};
   EXPECT_FALSE(said().error);
   EXPECT_EQ(said().kind, "axis");
   EXPECT_NE(said().text.find("; or joint 2 (joint_2) has a spring or a gravity compensator"), std::string::npos)
       << said().text;
+}
+
+TEST(Arrangement, TheBestOtherChangesAreNamedAndTheRestIsCounted) {
+  Project project;
+  project.robot = read_urdf(test::puma560);
+  ArrangementFinding finding;
+  finding.from = finding.move.result = as_given(project.robot);
+  finding.move.mistake = Mistake::mirrored_motion;
+  finding.move.nats = 100;
+  finding.before = 10;
+  finding.after = 1;
+  ArrangementMove other = finding.move;
+  for (Index joint = 1; joint < 6; ++joint) {
+    other.joint = joint;
+    other.nats = 90;
+    finding.others.push_back(other);
+  }
+  const CheckFinding said = in_words(finding, finding.from, project, {"t", "q", "tau"}, {});
+  ASSERT_EQ(said.others.size(), 5U);
+  EXPECT_EQ(said.others[4].joint, 5U);
+  EXPECT_EQ(said.others[4].kind, "mirrored_motion");
+  EXPECT_NE(said.text.find("or q of joint 4 "), std::string::npos) << said.text;
+  EXPECT_EQ(said.text.find("or q of joint 5 "), std::string::npos) << said.text;
+  EXPECT_NE(said.text.find("or one of 2 less likely changes"), std::string::npos) << said.text;
+}
+
+// Where a change does not halve the error, a URDF without masses needs more evidence.
+TEST(Arrangement, WithoutMassesEnoughEvidenceCountsAsAHalvedError) {
+  Recorded recorded;
+  for (Joint& joint : recorded.robot.joints) joint.inertial.reset();
+  recorded.samples.tau.col(0).swap(recorded.samples.tau.col(3));
+  ArrangementOptions options;
+  options.vague_leaves = 0;
+  const ArrangementEvidence evidence(recorded.robot, recorded.samples, options);
+  const auto found = find_mistakes(evidence, options);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(to_string(found[0].move.mistake), "swapped_torques");
+  options.vague_gain = 1e9;
+  EXPECT_TRUE(find_mistakes(evidence, options).empty());
 }
 
 // Two mistakes at once, as where a driver counts both from another end.
@@ -336,7 +375,7 @@ TEST(Arrangement, AxesAndGravityAreNotOfOneLog) {
        find_mistakes(ArrangementEvidence(recorded.robot, recorded.samples, options), options, true)) {
     EXPECT_NE(to_string(finding.move.mistake), "gravity");
     EXPECT_NE(to_string(finding.move.mistake), "axis");
-    for (const ArrangementMove& other : finding.as_good) EXPECT_NE(to_string(other.mistake), "gravity");
+    for (const ArrangementMove& other : finding.others) EXPECT_NE(to_string(other.mistake), "gravity");
   }
 }
 
