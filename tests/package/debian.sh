@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # debian.sh BUILD: the packages fxdyn and libfxdyn-dev. Made twice they are the same bytes; unpacked into an empty folder, the program
-# there goes from logs to tables, and the headers there are those that `cmake --install` of the model alone gives.
+# there goes from logs to tables, the module of Python there writes the same files, and the headers there are those that
+# `cmake --install` of the model alone gives.
 set -euo pipefail
 build=$1
 root=$(cd "$(dirname "$0")/../.." && pwd)
@@ -47,7 +48,10 @@ diff -r "$work/alone/usr" "$work/dev/usr" || fail "libfxdyn-dev is not what the 
 # The program, with nothing of fxdyn but what its package has.
 dpkg -x "$program" "$work/clean"
 usr=$work/clean/usr
-for file in "$usr"/bin/* "$usr"/lib/fxdyn/*.so; do
+packages=$usr/lib/python3/dist-packages
+modules=()
+if grep -qx 'FXDYN_PYTHON:BOOL=ON' "$build/CMakeCache.txt"; then modules=("$packages"/fxdyn/stages*.so); fi
+for file in "$usr"/bin/* "$usr"/lib/fxdyn/*.so "${modules[@]}"; do
   [ -f "$file" ] || fail "no $file"
   if ldd "$file" | grep -e "not found" -e "$build"; then fail "$file needs libraries of the build folder"; fi
   if readelf -d "$file" | grep -e "PATH.*$root" -e "PATH.*$build"; then fail "$file looks into the build folder"; fi
@@ -71,10 +75,12 @@ clean fxdyn run robot.toml --out out
 clean fxdyn verify out
 clean fxdyn export robot.toml --out out --to sdf
 [ -s out/tables.hpp ] && [ -s out/report.html ] || fail "no tables or no report"
-if [ -d "$usr/lib/python3" ]; then
-  clean PYTHONPATH="$usr/lib/python3/dist-packages" python3 -B -c '
+if [ "${#modules[@]}" -gt 0 ]; then
+  clean PYTHONPATH="$packages" /usr/bin/python3 -B -c '
 import fxdyn
 assert fxdyn.__file__.startswith("'"$usr"'"), fxdyn.__file__
-result = fxdyn.identify("robot.toml", "identified")
-assert len(result["model"]["joints"]) == 2'
+assert len(fxdyn.run("robot.toml", "from_python")["model"]["joints"]) == 2'
+  for file in model.json metrics.json diagnosis.json tables.bin report.html; do
+    cmp "out/$file" "from_python/$file" || fail "the module of Python writes another $file"
+  done
 fi
