@@ -304,7 +304,7 @@ std::vector<Scored> best_of_each(const ArrangementEvidence& evidence, const Arra
   return best;
 }
 
-/// A URDF without masses explains next to any torque a little better in some other way, or with a spring as well.
+/// A URDF without masses explains nearly any torque a little better in some other way, or with a spring as well.
 bool is_doubtful(const ArrangementFinding& finding, double nats, const ArrangementOptions& options) {
   if (nats > options.vague_gain) return false;
   const bool spring = std::any_of(finding.others.begin(), finding.others.end(), [&](const ArrangementMove& other) {

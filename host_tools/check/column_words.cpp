@@ -260,7 +260,7 @@ void add_others(const ArrangementFinding& finding, const MoveWords& words, const
     out.text += fmt::format("; or {}", words.what(other));
     if (const std::string fix = words.fix(other, other.result); !fix.empty()) out.fix += "\nor " + fix;
   }
-  if (unnamed > 0) out.text += fmt::format("; or one of {} less likely changes, see --json", unnamed);
+  if (unnamed > 0) out.text += fmt::format("; or one of {} less likely changes, see `fxdyn check --json`", unnamed);
 }
 
 }  // namespace

@@ -61,7 +61,6 @@ class Diagnoser {
     // A change beside a baseline is something or other; without one every joint may lack all that it is asked for.
     task_.settings.most = 4 + joints() * (models_.has_baseline ? 1 : task_.settings.max_effects);
     logs_ = sessions(data_.logs, baseline_, session_, options.session);
-    note_windows(options.session);
     for (std::size_t j = 0; j < joints(); ++j) {
       if (!still_[j]) continue;
       for (const std::string_view effect : joint_effect_names()) {
@@ -153,13 +152,6 @@ class Diagnoser {
 
  private:
   Retrial retrial() const { return {models_.current, logs_, still_, task_}; }
-  void note_windows(const SessionOptions& options) {
-    if (logs_.size() == data_.logs.size() + baseline_.size()) return;
-    notes_.push_back(
-        fmt::format("the logs are longer than a diagnosis needs: it looks at {} windows of {:g} s, spread evenly over "
-                    "them; everything else uses the whole logs",
-                    logs_.size(), options.window_s));
-  }
   void note_who_judges() {
     const auto judges = [](const ProcessedLog& log) { return log.role == Role::validate; };
     if (data_.logs.size() > 1 && std::none_of(data_.logs.begin(), data_.logs.end(), judges)) {

@@ -371,14 +371,18 @@ std::vector<FreeCurve> add_free_curves(Models& models, const std::vector<Session
     for (FreeCurve& curve : found) curve.id = put(models, curve.effect);
     refit(models, logs, white(n), 4, only);
   };
+  // A fit that took no step leaves heights of 0: then there is nothing to draw.
+  const auto drop_flat = [&] {
+    return std::erase_if(found, [&](const FreeCurve& curve) { return is_flat(models, curve); }) > 0;
+  };
   while (!found.empty()) {
     fit({});
-    // A fit that took no step leaves heights of 0: then there is nothing to draw.
-    if (std::erase_if(found, [&](const FreeCurve& curve) { return is_flat(models, curve); }) > 0) continue;
+    if (drop_flat()) continue;
     std::vector<bool> harmed = harmed_by(models, before, logs);
     if (is_any(harmed)) {
       // What a curve does not explain goes to the base parameters, which its joint has in common with others.
       fit(joints_with(found, n));
+      if (drop_flat()) continue;
       harmed = harmed_by(models, before, logs);
     }
     if (!is_any(harmed)) return found;

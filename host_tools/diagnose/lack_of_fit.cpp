@@ -163,14 +163,25 @@ VectorXd residual_with_background(const Linearised& problem, std::size_t joint, 
   return e - background->part(problem.solver().extra_residual(joint, fit));
 }
 
+/// A residual where the encoder shows which way the joint moves, else zero: friction of an unknown sign repeats with
+/// the motion, and is no structure of the robot.
+VectorXd without_doubt(const Linearised& problem, std::size_t joint, VectorXd residual) {
+  for (Index row = 0; row < residual.size(); ++row) {
+    if (problem.noise().is_doubtful(joint, row)) residual[row] = 0;
+  }
+  return residual;
+}
+
 /// What of a residual repeats or wanders: the clearer of the two.
 /// @param with_healthy the residual with the healthy session's rows in it
-TimeStructure in_time(const Linearised& problem, const VectorXd& residual, const std::vector<std::size_t>& blocks,
-                      const VectorXd& with_healthy) {
+TimeStructure in_time(const Linearised& problem, std::size_t joint, const VectorXd& residual,
+                      const std::vector<std::size_t>& blocks, const VectorXd& with_healthy) {
   const LackOfFitOptions& options = problem.options().lack_of_fit;
-  TimeStructure out = spectral_lines(problem.logs(), problem.blocks(), residual, blocks, options);
+  TimeStructure out =
+      spectral_lines(problem.logs(), problem.blocks(), without_doubt(problem, joint, residual), blocks, options);
   if (!problem.has_baseline()) return out;
-  const TimeStructure slow = slow_changes(problem.logs(), problem.blocks(), with_healthy, blocks, options);
+  const TimeStructure slow =
+      slow_changes(problem.logs(), problem.blocks(), without_doubt(problem, joint, with_healthy), blocks, options);
   return {std::min(out.p, slow.p), std::max(out.share, slow.share)};
 }
 
@@ -321,7 +332,7 @@ LackOfFit lack_of_fit(const Linearised& problem, std::size_t joint, const Linear
   out.state_p = test.smallest_chance();
   if (out.state_p < problem.options().lack_of_fit.state && test.expect_encoder_errors())
     out.state_p = test.smallest_chance();
-  out.time_p = in_time(problem, residual, problem.blocks().fit, residual).p;
+  out.time_p = in_time(problem, joint, residual, problem.blocks().fit, residual).p;
   return out;
 }
 
@@ -353,7 +364,7 @@ double structured_share(const Linearised& problem, std::size_t joint, const Line
   if (healthy) return of_state;
   // What the state does not explain may still repeat or wander.
   const VectorXd rest = 2 * count < 3 * all.rank() ? e : e - f * all.coefficients(all.coordinates(mine));
-  const double of_time = in_time(problem, rest, blocks, rest + (residual - e)).share;
+  const double of_time = in_time(problem, joint, rest, blocks, rest + (residual - e)).share;
   return of_state + (1 - of_state) * std::clamp(of_time, 0.0, 1.0);
 }
 

@@ -66,13 +66,6 @@ struct SessionOptions {
   double position_samples = 8;
   /// Hz; .. and at least that; theory: the drive's tick of 2 ms, at which effects with memory have to hold
   double thinned_hz = 500;
-  /// rows of all logs, times joints; what a diagnosis has room for. Longer recordings are looked at in windows; hand:
-  /// twice what 160 s of six joints and as much of a baseline are, some 1.5 GB
-  double most_rows = 120'000;
-  /// s; length of such a window; hand: a few reversals of a slow motion
-  double window_s = 20;
-  /// s; before and after it, at least; what effects with memory were before the window fades; hand
-  double run_in_s = 1;
   /// periods of the cut-off; dropped at both ends, where the filter swings; hand
   double edge_periods = 3;
   /// s; train logs or baseline at least, after filtering; hand

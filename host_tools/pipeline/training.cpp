@@ -103,13 +103,15 @@ void Trainer::choose_base(Training& out) {
     if (asked.physical) base_bodies_ = possible_model(project_, base_, data_.logs).bodies;
     return;
   }
-  fitter_.polish();  // a prior of the bodies moves the shapes, too
+  fitter_.polish();  // shapes as well: what a prior knows of the bodies moves them, too
   fit_anew(out);
   const StageErrors refitted = errors_(out.model, "bls");
   if (diagnosed_is_better(refitted)) {
     const std::string note = "training: the diagnosed model stays as it was, a new fit is worse on the validate logs";
     if (std::find(data_.notes.begin(), data_.notes.end(), note) == data_.notes.end()) data_.notes.push_back(note);
     if (asked.physical) base_bodies_ = possible_model(project_, base_, data_.logs).bodies;
+    fitter_.set_designs(kept_.design());
+    follow(diagnosed_);
     return;
   }
   base_ = out.model;

@@ -59,7 +59,7 @@ Arrangement right_for(const Project& right, const Project& wrong) {
 /// By how much another change explains the samples better.
 double behind(const ArrangementEvidence& evidence, const Arrangement& right) {
   ArrangementOptions any;  // also what is too little to be reported
-  any.vague_leaves = 1;
+  any.vague_gain = 0;
   const double of_right = test::nats_with_a_spring(evidence, right);
   double most = 0;
   for (const ArrangementFinding& finding : find_mistakes(evidence, any))

@@ -19,12 +19,14 @@ constexpr std::size_t joint = 1;
 class StructureInAResidual : public testing::Test {
  protected:
   /// Looks at two joints of a log whose torque has f(q, t) more at one.
+  /// @param noise of the positions [rad], as far as the diagnosis knows
   template <class F>
-  void look(F f) {
+  void look(F f, double noise = 0) {
     const IdentifiedModel model = test::fitted_puma();
     SessionLog entry = test::small_session_log(model, Role::train, 1);
     for (Index k = 0; k < entry.log.samples(); ++k)
       entry.log.tau(k, joint) += f(entry.log.q(k, static_cast<Index>(joint)), entry.log.t[k]);
+    if (noise > 0) entry.log.filter.position_noise.assign(6, noise);
     const std::vector<SessionLog> logs{entry};
     const Linearised problem(test::around(model), logs, test::no_whitening());
     const LinearFit fit = problem.solver().solve(problem.nuisance());
@@ -59,6 +61,12 @@ TEST_F(StructureInAResidual, AHumIsAMatterOfTime) {
   EXPECT_LT(here_.time_p, 1e-6);
   EXPECT_GT(here_.state_p, 1e-8);
   EXPECT_FALSE(elsewhere_.structured({}));
+}
+
+// Friction repeats with the motion. Where its sign is not known, so does the error that this makes.
+TEST_F(StructureInAResidual, AHumIsNoneWhereTheEncoderShowsNoDirection) {
+  look([](double, double t) { return 0.2 * std::sin(2 * std::numbers::pi * 6.3 * t); }, 0.1);
+  EXPECT_EQ(here_.time_p, 1);
 }
 
 TEST(FamiliesOfFeatures, FollowOneAnother) {
