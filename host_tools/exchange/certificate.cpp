@@ -20,11 +20,11 @@ namespace {
 /// Sums over logs, joint by joint.
 struct Totals {
   double samples = 0;
-  Eigen::VectorXd cannot_say, in_motion, but_load, file, model, sliding, misread, largest;
+  Eigen::VectorXd cannot_say, in_motion, without_load, file, model, sliding, misread, largest;
   explicit Totals(Eigen::Index n)
       : cannot_say(Eigen::VectorXd::Zero(n)),
         in_motion(cannot_say),
-        but_load(cannot_say),
+        without_load(cannot_say),
         file(cannot_say),
         model(cannot_say),
         sliding(cannot_say),
@@ -38,7 +38,8 @@ Eigen::MatrixXd as_recorded(const Eigen::MatrixXd& tau, const IdentifiedModel& m
 }
 
 /// What the file would lose if it had the model's own load friction: the rest of the model minus the rest of the file.
-Eigen::MatrixXd lost_but_load(const SimpleRobot& meant, const IdentifiedModel& model, const ProcessedLog& log) {
+Eigen::MatrixXd lost_without_load_friction(const SimpleRobot& meant, const IdentifiedModel& model,
+                                           const ProcessedLog& log) {
   SimpleRobot rest = meant;
   rest.joints = meant.beside_load;
   const ModelValue plain = without_load_friction(model);
@@ -75,7 +76,7 @@ void add_log(Totals& sum, const ExportFormat& format, const std::filesystem::pat
   sum.cannot_say += squares(full - written, log);
   sum.in_motion += squares(where_sliding(full - written, model, log), log);
   if (!meant.beside_load.empty())
-    sum.but_load += squares(where_sliding(lost_but_load(meant, model, log), model, log), log);
+    sum.without_load += squares(where_sliding(lost_without_load_friction(meant, model, log), model, log), log);
   for (Eigen::Index j = 0; j < full.cols(); ++j) {
     const auto i = static_cast<std::size_t>(j);
     sum.file[j] += samples * of_file[i].rmse * of_file[i].rmse;
@@ -114,7 +115,8 @@ Certificate certify(const ExportFormat& format, const std::filesystem::path& fil
                                         : left_out(model, j, format.has_armature, format.has_stribeck, format.has_load,
                                                    format.has_dry_friction);
     if (format.friction_model != nullptr) joint.friction_model = format.friction_model(meant.joints[j]);
-    if (meant.joints[j].load.model > 0) joint.cannot_say_but_load = std::sqrt(sum.but_load[k] / sum.samples);
+    if (meant.joints[j].load.model > 0)
+      joint.cannot_say_without_load_friction = std::sqrt(sum.without_load[k] / sum.samples);
     joint.cannot_say_in_motion = std::sqrt(sum.in_motion[k] / sum.samples);
     joint.cannot_say = std::sqrt(sum.cannot_say[k] / sum.samples);
     joint.file_rmse = std::sqrt(sum.file[k] / sum.samples);
@@ -148,7 +150,8 @@ nlohmann::json to_json(const Certificate& certificate) {
                     {"armature", joint.written->armature}});
     }
     if (!joint.friction_model.empty()) entry["friction_model"] = joint.friction_model;
-    if (joint.cannot_say_but_load) entry["cannot_say_but_load"] = *joint.cannot_say_but_load;
+    if (joint.cannot_say_without_load_friction)
+      entry["cannot_say_without_load_friction"] = *joint.cannot_say_without_load_friction;
     joints.push_back(std::move(entry));
   }
   return {{"schema", "fxdyn.certificate/1"},    {"format", certificate.format},
@@ -162,7 +165,7 @@ std::string certificate_table(const Certificate& certificate) {
   bool with_load = false, with_model = false;  // columns that only some formats and robots need
   for (const JointCertificate& joint : certificate.joints) {
     width = std::max(width, joint.name.size());
-    with_load |= joint.cannot_say_but_load.has_value();
+    with_load |= joint.cannot_say_without_load_friction.has_value();
     with_model |= !joint.friction_model.empty();
   }
   std::string out = fmt::format(
@@ -170,20 +173,21 @@ std::string certificate_table(const Certificate& certificate) {
       certificate.file, certificate.reader, certificate.role);
   const auto line = [&](const std::string& name, const std::array<std::string, 5>& numbers, const std::string& unit,
                         const std::string& friction, const std::string& effects) {
-    const auto& [lost, in_motion, but_load, file, of_model] = numbers;
+    const auto& [lost, in_motion, without_load, file, of_model] = numbers;
     out += fmt::format("  {:<{}}{:>12}{:>11}", name, width, lost, in_motion);
-    if (with_load) out += fmt::format("{:>10}", but_load);
+    if (with_load) out += fmt::format("{:>23}", without_load);
     out += fmt::format("{:>10}{:>10}  {:<5}", file, of_model, unit);
     if (with_model) out += fmt::format("{:<10}", friction);
     out += effects + "\n";
   };
   const auto number = [](double value) { return fmt::format("{:.4g}", value); };
-  line("joint", {"can't say", "in motion", "but load", "file", "model"}, "", "friction", "effects left out");
+  line("joint", {"can't say", "in motion", "without load friction", "file", "model"}, "", "friction",
+       "effects left out");
   for (const JointCertificate& joint : certificate.joints) {
     line(joint.name,
          {number(joint.cannot_say), number(joint.cannot_say_in_motion),
-          joint.cannot_say_but_load ? number(*joint.cannot_say_but_load) : "-", number(joint.file_rmse),
-          number(joint.model_rmse)},
+          joint.cannot_say_without_load_friction ? number(*joint.cannot_say_without_load_friction) : "-",
+          number(joint.file_rmse), number(joint.model_rmse)},
          joint.unit, joint.friction_model,
          joint.left_out.empty() ? "none" : fmt::format("{}", fmt::join(joint.left_out, ", ")));
   }

@@ -29,7 +29,7 @@ struct JointCertificate {
   /// What would be left of it if the file were right wherever the joint turns round or stands.
   double cannot_say_in_motion = 0;
   /// What would be left of that if the file had the model's own load friction; nothing: the joint has none in the file.
-  std::optional<double> cannot_say_but_load;
+  std::optional<double> cannot_say_without_load_friction;
   double file_rmse = 0;      ///< of measured minus file
   double model_rmse = 0;     ///< of measured minus model
   double misread = 0;        ///< largest |read back - meant| where friction slides

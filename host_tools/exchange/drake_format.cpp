@@ -35,7 +35,7 @@ double number_or(const TiXmlElement* element, const char* attribute, double othe
   return text == nullptr ? otherwise : std::strtod(text, nullptr);
 }
 
-/// Those that a transmission moves.
+/// Name of the joint that the transmission moves; empty: it has none.
 std::string joint_of(const TiXmlElement& transmission) {
   const TiXmlElement* joint = transmission.FirstChildElement("joint");
   return joint == nullptr ? "" : name_of(*joint);

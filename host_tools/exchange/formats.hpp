@@ -19,13 +19,13 @@ struct ReplayedTorque {
   Eigen::MatrixXd sliding;
 };
 
-/// A format of simulators. A new one is a file with two functions and a line in formats.cpp.
+/// A format of simulators. A new one is a file with two functions and an entry in formats.cpp.
 struct ExportFormat {
-  const char* name;    ///< what follows --to
-  const char* help;    ///< what it is
-  const char* file;    ///< name of the file that is written
-  const char* reader;  ///< whose library reads it back
-  bool has_armature;   ///< it knows a rotor's inertia
+  const char* name;           ///< what follows --to
+  const char* help;           ///< what it is
+  const char* file;           ///< name of the file that is written
+  const char* reader;         ///< whose library reads it back
+  bool has_armature = false;  ///< it knows a rotor's inertia
   /// @throws InputError, DataError: the format can't hold this robot
   void (*write)(const SimpleRobot& robot, const std::filesystem::path& file);
   /// The file as its own library reads it, over a motion of the robot that is expected in it.
@@ -40,7 +40,7 @@ struct ExportFormat {
   bool whole_model = false;
   /// What the format calls the friction of a joint that is written so; nullptr: it has one form only.
   std::string (*friction_model)(const SimpleJoint& said) = nullptr;
-  bool has_dry_friction = true;
+  bool has_dry_friction = true;  ///< it knows friction that does not grow with the speed
 };
 
 std::span<const ExportFormat> export_formats();

@@ -110,11 +110,17 @@ MatrixXd columns_of(const Sliding& at, int model, const VectorXd& last) {
   return out;
 }
 
+/// x and its normal equations: gram x = projection.
+struct LeastSquares {
+  MatrixXd gram;
+  VectorXd projection;
+  double size = 0;  ///< norm of the right side
+};
+
 /// Least squares with 0 <= x <= most, one unknown after another (Hildreth 1957).
-VectorXd bounded(const MatrixXd& columns, const VectorXd& right, const VectorXd& most) {
-  const MatrixXd gram = columns.transpose() * columns;
-  const VectorXd projection = columns.transpose() * right;
-  VectorXd x = VectorXd::Zero(columns.cols());
+VectorXd bounded(const LeastSquares& squares, const VectorXd& most) {
+  const auto& [gram, projection, size] = squares;
+  VectorXd x = VectorXd::Zero(gram.cols());
   for (int round = 0; round < 20000; ++round) {
     double moved = 0;
     for (Index i = 0; i < x.size(); ++i) {
@@ -123,7 +129,27 @@ VectorXd bounded(const MatrixXd& columns, const VectorXd& right, const VectorXd&
       moved = std::max(moved, std::fabs(to - x[i]) * std::sqrt(gram(i, i)));
       x[i] = to;
     }
-    if (moved <= 1e-12 * right.norm()) break;
+    if (moved <= 1e-12 * size) break;
+  }
+  return x;
+}
+
+/// The same with share x <= sum as well: what the shares have to cost for that (the constraint's multiplier), by
+/// bisection.
+VectorXd bounded(const LeastSquares& squares, const VectorXd& most, const VectorXd& share, double sum) {
+  const auto at_price = [&](double price) {
+    return bounded({squares.gram, squares.projection - price * share, squares.size}, most);
+  };
+  VectorXd x = at_price(0);
+  if (share.dot(x) <= sum) return x;
+  double low = 0, high = squares.projection.cwiseAbs().maxCoeff();
+  for (x = at_price(high); share.dot(x) > sum; x = at_price(high)) high *= 2;
+  for (int i = 0; i < 40; ++i) {  // 1e-12 of it
+    const double price = 0.5 * (low + high);
+    const VectorXd other = at_price(price);
+    const bool enough = share.dot(other) <= sum;
+    (enough ? high : low) = price;
+    if (enough) x = other;
   }
   return x;
 }
@@ -140,16 +166,22 @@ BamFit fit_bam(const Sliding& at, int model, const LoadFrictionOptions& options)
   if (model < 5) most[At::external] = most[At::external_low] = options.most;
   // The square of a torque is no more of it either, up to the largest one: few samples tell these two.
   most[At::external_quad] = options.most / at.external.abs().maxCoeff();
-  most[At::motor_quad] = options.most / at.motor.abs().maxCoeff();
+  const double largest = at.motor.abs().maxCoeff();
+  most[At::motor_quad] = options.most / largest;
   for (Index i = 0; i < At::all; ++i) {
     if (!is_in(model, i)) most[i] = 0;
   }
+  VectorXd share = VectorXd::Zero(At::all);  // of the motor's torque where it is largest
+  share[At::motor] = share[At::motor_low] = 1;
+  share[At::motor_quad] = largest;
   BamFit out{model, VectorXd::Constant(At::all, options.most), 0};
   for (int round = 0; round < 20; ++round) {  // the signs within |..| settle
     const MatrixXd columns = columns_of(at, model, out.x);
     const VectorXd before = out.x;
-    out.x = bounded(columns, at.friction.matrix(), most);
-    out.left = (at.friction.matrix() - columns * out.x).squaredNorm();
+    const VectorXd right = at.friction.matrix();
+    out.x = bounded({columns.transpose() * columns, columns.transpose() * right, right.norm()}, most, share,
+                    2 * options.most);
+    out.left = (right - columns * out.x).squaredNorm();
     if (model < 5 || (out.x - before).norm() <= 1e-9 * out.x.norm()) break;
   }
   return out;

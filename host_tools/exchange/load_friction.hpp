@@ -20,6 +20,7 @@ struct LoadFrictionOptions {
   double worth = 0.9;
   /// Most of the motor's torque that friction takes, always and at low speed, each [-]: below BAM's own bound of 0.5,
   /// as a joint whose two shares reach 1 holds itself; hand. Also of m6's squares, at the largest torque of the logs.
+  /// The two and the square of the motor's torque may reach twice that together.
   double most = 0.45;
 };
 

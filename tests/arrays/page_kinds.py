@@ -8,6 +8,7 @@ statistics, several row groups, lists as of LeRobot."""
 import csv
 import gzip
 import itertools
+import json
 import os
 import pathlib
 import struct
@@ -340,19 +341,32 @@ def refused_files(rows):
     yield 'levels', parquet(flat(rows, nullable=True), OldLevels()), 'levels in an encoding of old'
 
 
+def compared(folder):
+    """How many files each test says that it compared: none if it was skipped or the filter matched nothing."""
+    suites = json.loads((folder / 'results.json').read_text())['testsuites']
+    return {test['name']: int(test.get('files', 0)) for suite in suites for test in suite['testsuite']}
+
+
 def main():
     rows = truth()
     with tempfile.TemporaryDirectory() as name:
-        folder = pathlib.Path(name)
+        folder, to_read, to_refuse = pathlib.Path(name), 0, 0
         (folder / 'refused').mkdir()
         for file, content in read_files(rows):
             (folder / f'{file}.parquet').write_bytes(content)
+            to_read += 1
         for file, content, words in refused_files(rows):
             (folder / f'refused/{file}.parquet').write_bytes(content)
             (folder / f'refused/{file}.txt').write_text(words)
-        print(len(list(folder.glob('*.parquet'))), 'files to be read,', len(list(folder.glob('refused/*.txt'))), 'to be refused')
-        return subprocess.run([sys.argv[1], '--gtest_filter=PageKinds.*', '--gtest_brief=1'],
-                              env=dict(os.environ, FXDYN_PAGE_KINDS=name)).returncode
+            to_refuse += 1
+        result = subprocess.run([sys.argv[1], '--gtest_filter=PageKinds.*', '--gtest_brief=1', f'--gtest_output=json:{name}/results.json'],
+                                env=dict(os.environ, FXDYN_PAGE_KINDS=name)).returncode
+        expected, got = {'EveryNumberIsTheWritersOwn': to_read, 'WhatIsNotReadIsNamed': to_refuse}, compared(folder)
+        print(f'{to_read} files were written to be read, {to_refuse} to be refused; compared: {got}')
+        if 0 in expected.values() or got != expected:
+            print('FAILED: not every file was compared')
+            return 1
+        return result
 
 
 if __name__ == '__main__':

@@ -352,6 +352,7 @@ TEST(PageKinds, EveryNumberIsTheWritersOwn) {
   const auto all = page_kinds("");
   if (all.empty()) GTEST_SKIP() << "page_kinds.py gives the folder";
   const Log as_csv = truth();
+  int compared = 0;  // page_kinds.py knows how many it should be
   for (const auto& file : all) {
     SCOPED_TRACE(file.filename());
     const std::string name = file.filename();
@@ -363,6 +364,7 @@ TEST(PageKinds, EveryNumberIsTheWritersOwn) {
       EXPECT_TRUE(log.q == as_csv.q.cast<float>().cast<double>());
       EXPECT_TRUE(log.dq == as_csv.dq.cast<float>().cast<double>());
       EXPECT_TRUE(log.tau == as_csv.tau.cast<float>().cast<double>());
+      ++compared;
       continue;
     }
     const Log log = read(file);
@@ -372,18 +374,23 @@ TEST(PageKinds, EveryNumberIsTheWritersOwn) {
     EXPECT_TRUE(log.q == as_csv.q.middleRows(first, count));
     EXPECT_TRUE(log.dq == as_csv.dq.middleRows(first, count));
     EXPECT_TRUE(log.tau == as_csv.tau.middleRows(first, count));
+    ++compared;
   }
+  testing::Test::RecordProperty("files", compared);
 }
 
 TEST(PageKinds, WhatIsNotReadIsNamed) {
   const auto all = page_kinds("refused");
   if (all.empty()) GTEST_SKIP() << "page_kinds.py gives the folder";
+  int refused = 0;
   for (const auto& file : all) {
     std::ifstream text(std::filesystem::path(file).replace_extension(".txt"));
     std::string words;
     std::getline(text, words);
     test::expect_refused(file, {words}, [&] { read(file); });
+    ++refused;
   }
+  testing::Test::RecordProperty("files", refused);
 }
 
 /// What writers/run_parquet.sh has written.

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """export_replay_test.py FXDYN: a simulated arm whose spring no simulator's joint can say, from its logs to the formats
 without a library here. robot_replay.py reads the files and replays the held-out log: the loss is the certificate's, and
-errors of sign, unit and side of the gear are seen."""
+errors of sign, unit and side of the gear in the files are seen. Then a trajectory with its torque, as it is."""
 import csv
 import json
 import math
@@ -244,7 +244,7 @@ def check_loaded(work, models):
             check('load_friction' in usd[j]['left_out'] and 'load_friction' not in bam[j]['left_out'], f'{of}: {bam[j]} {usd[j]}')
             # not all: the motor's torque, which BAM's load is made of, has friction and rotor in it
             check(lost < 0.95 * usd[j]['cannot_say_in_motion'], f'{of}: {lost} N m are lost, USD loses {usd[j]}')
-            check(bam[j]['cannot_say_but_load'] < 0.2 * lost, f'{of}: the load is what is lost: {bam[j]}')
+            check(bam[j]['cannot_say_without_load_friction'] < 0.2 * lost, f'{of}: the load is what is lost: {bam[j]}')
         for key, what, how in numbers_that_can_be_wrong(joint, said[joint]):
             torque = read_or_refused(held_out, bodies, read, changed(path, rf'"{joint}".*?"{key}": ', how))
             off = math.inf if torque is None else held_out.rms(torque, right)[j]
@@ -305,11 +305,6 @@ def check_trajectory(work):
     check(all(abs(points[k]['t'] - log[k]['t']) < 1e-9 for k in middle), 'time counts from the first point')
     for key, (off, most) in trajectory_off(points, log, truth, middle).items():
         check(off < most, f'{key}: off by {off}, {most} at most')
-    for key, (_, most) in trajectory_off(points, log, truth, middle).items():
-        for what, how in ERRORS.items():
-            wrong = [{**point, key[0]: [how(x) if j == key[1] else x for j, x in enumerate(point[key[0]])]} for point in points]
-            off = trajectory_off(wrong, log, truth, middle)[key][0]
-            check(off > most, f'{key}: {what} shows: off by {off}')
 
 
 def trajectory_off(points, log, truth, middle):

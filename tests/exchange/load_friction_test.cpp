@@ -179,10 +179,10 @@ TEST_F(BamLoad, AModelsLoadFrictionIsWritten) {
     EXPECT_LT(said.cannot_say, 0.8 * lost.cannot_say) << "m" << robot.joints[0].load.model;
     EXPECT_EQ(said.friction_model, fmt::format("m{}", robot.joints[0].load.model));
     EXPECT_EQ(lost.friction_model, stribeck > 0 ? "m2" : "m1");
-    EXPECT_FALSE(lost.cannot_say_but_load.has_value());
+    EXPECT_FALSE(lost.cannot_say_without_load_friction.has_value());
     // With the model's own load friction nothing would be lost but the turn of the sign, three of its widths away.
-    ASSERT_TRUE(said.cannot_say_but_load.has_value());
-    EXPECT_LT(*said.cannot_say_but_load, 0.05 * said.cannot_say_in_motion);
+    ASSERT_TRUE(said.cannot_say_without_load_friction.has_value());
+    EXPECT_LT(*said.cannot_say_without_load_friction, 0.05 * said.cannot_say_in_motion);
     EXPECT_LE(said.cannot_say_in_motion, said.cannot_say);
   }
 }
@@ -246,6 +246,26 @@ TEST_F(BamLoad, SquaresTakeNoMoreOfATorqueThanOtherNumbersMay) {
   EXPECT_LE(load.external_quad * mass * gravity * centre, any.most * 1.01);  // the log may not reach the horizontal
 }
 
+/// A joint holds itself once friction takes all of the motor's torque: always, at low speed, and by its square.
+TEST_F(BamLoad, SharesOfTheMotorsTorqueStayBelowAllOfIt) {
+  set_effects(0.4, 0.5);
+  Log fast = test::exact_log(model, Role::train, 1);
+  fast.ddq *= 5;  // so that the motor's torque is far from the external one
+  fast.tau = predict(model, fast.q, fast.dq, fast.ddq, fast.step_s);
+  train = test::processed({fast});
+  const double largest = predict(model, train[0]).cwiseAbs().maxCoeff();
+  const auto sum_of = [&](double most) {
+    SimpleRobot robot = simple_robot(model, model.robot, true, train, {}, true);
+    fit_load_friction(robot, model, train, {}, {.worth = 10, .most = most});
+    const GearFriction load = robot.joints[0].load;
+    EXPECT_EQ(load.model, 6);
+    return load.motor + load.motor_stribeck + load.motor_quad * largest;
+  };
+  EXPECT_LT(sum_of(LoadFrictionOptions{}.most), 1);
+  // Bounded one by one, their sum would be 2.2 and 3 times as much as each may be.
+  for (const double most : {0.1, 0.02}) EXPECT_NEAR(sum_of(most), 2 * most, 1e-6 * most);
+}
+
 TEST_F(BamLoad, TheCertificateNamesTheModelAndWhatTheLoadCosts) {
   set_effects(0.15, 0.5);
   const SimpleRobot robot = fitted();
@@ -254,11 +274,11 @@ TEST_F(BamLoad, TheCertificateNamesTheModelAndWhatTheLoadCosts) {
   const JointCertificate& joint = certificate.joints[0];
   const nlohmann::json json = to_json(certificate).at("joints")[0];
   EXPECT_EQ(json.at("friction_model"), joint.friction_model);
-  EXPECT_EQ(json.at("cannot_say_but_load").get<double>(), *joint.cannot_say_but_load);
+  EXPECT_EQ(json.at("cannot_say_without_load_friction").get<double>(), *joint.cannot_say_without_load_friction);
   EXPECT_EQ(json.at("cannot_say_in_motion").get<double>(), joint.cannot_say_in_motion);
   const std::string table = certificate_table(certificate);
-  for (const std::string& word : {std::string("but load"), std::string("friction"), joint.friction_model,
-                                  fmt::format("{:.4g}", *joint.cannot_say_but_load)})
+  for (const std::string& word : {std::string("without load friction"), std::string("friction"), joint.friction_model,
+                                  fmt::format("{:.4g}", *joint.cannot_say_without_load_friction)})
     EXPECT_NE(table.find(word), std::string::npos) << word << "\n" << table;
 }
 

@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 """solver_test.py FXDYN: a simulated arm, from its logs to a plug-in of inverse_dynamics_solver. The written package is
 compiled against the interface alone (ROS is not here) and evaluated over the held-out log: its terms are those of the
-true arm, by formulas of the test's own, and its loss is the certificate's."""
+true arm, by formulas of the test's own, and its loss is the certificate's. Errors in the written tables and source show."""
 import json
 import math
 import pathlib
+import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -142,8 +144,10 @@ def compiled(package, work):
     for name, text in STUBS.items():
         (work / name).parent.mkdir(parents=True, exist_ok=True)
         (work / name).write_text(text)
-    run('g++', '-std=c++20', '-O1', '-Wall', '-Wextra', '-Werror', '-I', work, '-I', root, '-isystem', '/usr/include/eigen3',
-        '-I', package / 'src', package / 'src/solver.cpp', work / 'main.cpp', '-o', work / 'solver')
+    flags = ('-std=c++20', '-O1', '-Wall', '-Wextra', '-Werror', '-I', work, '-I', root, '-isystem', '/usr/include/eigen3')
+    if not (work / 'main.o').exists():
+        run('g++', *flags, '-c', work / 'main.cpp', '-o', work / 'main.o')
+    run('g++', *flags, '-I', package / 'src', package / 'src/solver.cpp', work / 'main.o', '-o', work / 'solver')
     return work / 'solver'
 
 
@@ -192,20 +196,54 @@ def terms_off(states, terms, right):
     return {name: rms(values) for name, values in off.items()}
 
 
-def check_terms(program, states, terms, urdf):
-    right = true_terms(states, urdf)
+def check_terms(states, terms, right):
     for name, off in terms_off(states, terms, right).items():
         check(off < MOST_OFF[name], f'{name}: off by {off}')
-    gear = 50
-    for name in ('gravity', 'coriolis', 'inertia', 'friction'):
-        for what, factor in {'another sign': -1, '57.3 times': 57.3, 'a 57.3th': 1 / 57.3, "the motor's side": 1 / gear}.items():
-            wrong = [{**term, name: [factor * x for x in term[name]]} for term in terms]
-            off = terms_off(states, wrong, right)[name]
-            check(off > MOST_OFF[name], f'{name}: {what} shows: off by {off}')
-    for k, what in enumerate(('positions', 'velocities')):  # read as degrees
-        turned = [[x * math.pi / 180 if at // 2 == k else x for at, x in enumerate(state)] for state in states]
-        off = terms_off(states, evaluated(program, turned)[0], right)
-        check(any(off[name] > MOST_OFF[name] for name in ('gravity', 'friction')), f'{what} in degrees show: {off}')
+
+
+# Errors in what is written. Numbers of tables.hpp and the terms that have to show them; no two of a group share a term.
+NUMBERS = [
+    {r'\n *(-?\d+), // elbow: viscous': ('friction',), r'\n *(-?\d+), -?\d+, // elbow: spring': ('gravity',),
+     r'\{-?\d+, \{-?\d+, -?\d+, -?\d+\}, (-?\d+),[^\n]*// link 2': ('inertia',)},
+    {r'\n *(-?\d+), // elbow: coulomb': ('friction',),
+     r'\{-?\d+, \{(-?\d+), [^\n]*// link 2': ('gravity', 'coriolis', 'inertia')},
+]
+# 57.3 times as much does not fit the tables.
+ERRORS = {'another sign': lambda x: -x, 'a 57.3th': math.radians, "the motor's side": lambda x: x / 50}
+# Of solver.cpp: what stands there, what may stand there by mistake, and the terms that have to show it.
+MISTAKES = [
+    ('return x;', 'return x * (3.14159265358979 / 180);', ('gravity', 'coriolis', 'inertia', 'friction')),
+    ('return x;', 'return x.reverse();', ('gravity', 'coriolis', 'inertia', 'friction')),
+    ('terms_.torque_without_friction(', 'terms_.torque(', ('sum',)),
+]
+
+
+def check_errors_in_the_package(package, work, states, right):
+    """Each is written into a copy of the package, which is compiled and evaluated as the package itself."""
+    copy = work / 'with_error'
+    shutil.copytree(package, copy)
+
+    def check_shown(shown, what):
+        off = terms_off(states, evaluated(compiled(copy, work), states)[0], right)
+        for term in shown:
+            check(off[term] > MOST_OFF[term], f'{what} shows in {term}: {off}')
+
+    tables, source = copy / 'src/tables.hpp', copy / 'src/solver.cpp'
+    text = tables.read_text()
+    for what, how in ERRORS.items():
+        for group in NUMBERS:
+            wrong = text
+            for place in group:
+                found = re.search(place, wrong)
+                wrong = wrong[:found.start(1)] + str(round(how(int(found.group(1))))) + wrong[found.end(1):]
+            tables.write_text(wrong)
+            check_shown([term for terms in group.values() for term in terms], f'{list(group)} {what}')
+    tables.write_text(text)
+    text = source.read_text()
+    for stands, mistake, shown in MISTAKES:
+        check(text.count(stands) == 1, f'{stands} stands once')
+        source.write_text(text.replace(stands, mistake))
+        check_shown(shown, mistake)
 
 
 with tempfile.TemporaryDirectory() as name:
@@ -238,7 +276,9 @@ with tempfile.TemporaryDirectory() as name:
     check(refused == 'fxdyn_arm_solver: 3 joints instead of 2: shoulder, elbow', refused)
     check('limited' not in warned, 'within the limits')
     check('limited' in evaluated(program, [[9, 0, 0, 0, 0, 0]])[2], 'a state beyond the limits')
-    check_terms(program, states, terms, work / 'arm.urdf')
+    right = true_terms(states, work / 'arm.urdf')
+    check_terms(states, terms, right)
+    check_errors_in_the_package(package, work, states, right)
     truth = {row['t']: row for row in replay.rows(work / 'logs/a.truth.csv')}
     for j, joint in enumerate(certificate['joints']):
         # What the path after a reversal was worth, and nothing at the joint without it.
