@@ -100,6 +100,24 @@ TEST(Training, AModelThatTheTrainLogsWouldSpoilStays) {
             1e-6);
 }
 
+TEST(Training, ARefusedFitLeavesNoShapesBehind) {
+  std::vector<EffectFit> effects = friction(), warm = friction();
+  effects.push_back(test::effect_fit("stribeck", {0.3}, {3}));
+  warm.push_back(test::effect_fit("stribeck", {0.6}, {3}));
+  const IdentifiedModel plant = test::model_of(test::pendulum(), effects);
+  std::vector<Log> logs = test::train_and_validate(plant, 0.01);
+  logs[0] = test::exact_log(test::model_of(test::pendulum(), warm), Role::train, 1);
+  Work work(plant, std::move(logs), effects);
+  work.diagnosed = Work(plant, test::train_and_validate(plant, 0.01), effects).diagnosed;
+  Progress progress;
+  ResumeFile none;
+  Trainer trainer(work.project, work.data, work.diagnosed, work.errors(), progress);
+  const Training training = trainer.run(none);
+  EXPECT_EQ(training.model.joints[0].find("stribeck")->shape[0], 0.3);
+  EXPECT_EQ(trainer.fitter().design(0).find("stribeck")->shape[0], 0.3);
+  EXPECT_EQ(trainer.fitter().design(0).sign_width, work.diagnosed.joints[0].sign_width);
+}
+
 TEST(Training, ABlsLearnsWhatNoEffectExplains) {
   std::vector<EffectFit> effects = friction();
   effects.push_back(test::effect_fit("stribeck", {0.3}, {3}));
