@@ -6,11 +6,13 @@ namespace {
 
 std::vector<Fold> whole_logs(const Blocks& blocks) {
   std::vector<Fold> out;
-  for (std::size_t l = 0; l < blocks.of_log.size(); ++l) {
-    if (!blocks.of_log[l].fits) return {};
-    if (blocks.of_log[l].healthy) continue;
+  for (const Block& block : blocks.all) {
+    if (!block.fits) return {};
+    const bool cut = &block != blocks.all.data() && (&block - 1)->log == block.log;
+    if (block.healthy || cut) continue;
     Fold& fold = out.emplace_back();
-    for (std::size_t b = 0; b < blocks.all.size(); ++b) (blocks.all[b].log == l ? fold.judge : fold.fit).push_back(b);
+    for (std::size_t b = 0; b < blocks.all.size(); ++b)
+      (blocks.all[b].log == block.log ? fold.judge : fold.fit).push_back(b);
   }
   if (out.size() < 2) out.clear();
   return out;
@@ -28,19 +30,25 @@ std::vector<std::size_t> Blocks::fit_of(bool healthy) const {
 
 Blocks make_blocks(const std::vector<SessionLog>& logs) {
   Blocks out;
-  std::vector<LogUse> uses;
-  uses.reserve(logs.size());
-  for (const SessionLog& entry : logs)
-    uses.push_back({.rows = entry.log.rows(), .fits = entry.fits, .judges = !entry.healthy});
   Eigen::Index first = 0;
   for (std::size_t l = 0; l < logs.size(); ++l) {
-    out.of_log.push_back({l, first, uses[l].rows, logs[l].healthy, logs[l].fits});
-    first += uses[l].rows;
+    out.of_log.push_back({l, first, logs[l].log.rows(), logs[l].healthy, logs[l].fits});
+    first += out.of_log.back().count;
+  }
+  const std::vector<std::vector<std::size_t>> recordings = by_recording(logs);
+  std::vector<LogUse> uses;
+  uses.reserve(recordings.size());
+  for (const std::vector<std::size_t>& windows : recordings) {
+    LogUse& use = uses.emplace_back();
+    use.fits = logs[windows.front()].fits;
+    use.judges = !logs[windows.front()].healthy;
+    for (const std::size_t l : windows) use.rows += out.of_log[l].count;
   }
   const std::vector<LogPart> parts = parts_of(uses, LeaveOut::part_of_each);
   for (std::size_t b = 0; b < parts.size(); ++b) {
-    const SessionLog& entry = logs[parts[b].log];
-    out.all.push_back({parts[b].log, parts[b].rows.first, parts[b].rows.count, entry.healthy, entry.fits});
+    const std::size_t log = recordings[parts[b].log].front();
+    const SessionLog& entry = logs[log];
+    out.all.push_back({log, parts[b].rows.first, parts[b].rows.count, entry.healthy, entry.fits});
     if (entry.fits) out.fit.push_back(b);
   }
   out.folds = folds_of(uses, parts, LeaveOut::part_of_each);

@@ -10,17 +10,18 @@ namespace fxdyn::diagnosis {
 
 /// Rows that are used or left out together.
 struct Block {
-  std::size_t log = 0;
+  std::size_t log = 0;  ///< the recording's first
   Eigen::Index first = 0, count = 0;
   bool healthy = false, fits = true;
 };
 
 /// The rows of all logs, one after the other, as blocks and folds. With validate logs there is one fold, which they
-/// judge, and a block is a log. Else today's logs are cut: a fold is a part of each of them, judged by a fit of all
-/// others; or a whole log is, where the others' motion shows enough to predict it (Linearised decides).
+/// judge, and a block is a recording (a log, or all of its windows). Else today's logs are cut: a fold is a part of
+/// each of them, judged by a fit of all others; or a whole log is, where the others' motion shows enough to predict it
+/// (Linearised decides).
 struct Blocks {
   std::vector<Block> all;
-  std::vector<Block> of_log;     ///< by log: all of its rows
+  std::vector<Block> of_log;     ///< by log or window: all of its rows
   std::vector<std::size_t> fit;  ///< blocks that fit coefficients
   std::vector<Fold> folds;       ///< places in `all`
   /// Where no log validates and several fit: a log each, judged by a fit of the others.

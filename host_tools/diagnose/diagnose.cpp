@@ -19,6 +19,7 @@
 #include "host_tools/diagnose/recording_faults.hpp"
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/diagnose/sessions.hpp"
+#include "host_tools/diagnose/time_curve.hpp"
 #include "host_tools/diagnose/verdict.hpp"
 #include "host_tools/effects/braking.hpp"
 #include "host_tools/effects/effects.hpp"
@@ -27,6 +28,7 @@
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/error.hpp"
+#include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {
 namespace {
@@ -61,6 +63,7 @@ class Diagnoser {
     // A change beside a baseline is something or other; without one every joint may lack all that it is asked for.
     task_.settings.most = 4 + joints() * (models_.has_baseline ? 1 : task_.settings.max_effects);
     logs_ = sessions(data_.logs, baseline_, session_, options.session);
+    note_windows(options.session);
     for (std::size_t j = 0; j < joints(); ++j) {
       if (!still_[j]) continue;
       for (const std::string_view effect : joint_effect_names()) {
@@ -152,6 +155,15 @@ class Diagnoser {
 
  private:
   Retrial retrial() const { return {models_.current, logs_, still_, task_}; }
+  void note_windows(const SessionOptions& options) {
+    const auto is_window = [](const SessionLog& entry) { return entry.continues || entry.log.ran_s > 0; };
+    const auto windows = std::count_if(logs_.begin(), logs_.end(), is_window);
+    if (windows == 0) return;
+    notes_.push_back(
+        fmt::format("the logs are longer than the search for effects needs: it looks at {} windows of {:g} s, spread "
+                    "evenly over them; figures are of the whole logs",
+                    windows, options.window_s));
+  }
   void note_who_judges() {
     const auto judges = [](const ProcessedLog& log) { return log.role == Role::validate; };
     if (data_.logs.size() > 1 && std::none_of(data_.logs.begin(), data_.logs.end(), judges)) {
@@ -182,7 +194,8 @@ class Diagnoser {
     mark_named(model, outcome);
     return finished(model);
   }
-  /// What is left without a name gets a curve, by joint. It says which variable, and where.
+  /// What is left without a name gets a curve, by joint. It says which variable, and where: of the motion, or else of
+  /// time.
   std::vector<std::optional<CurveResult>> curves_of_the_rest(const Outcome& outcome, const Gate& gate) const {
     std::vector<std::optional<CurveResult>> out(joints());
     Models models = with_findings(outcome);
@@ -190,6 +203,11 @@ class Diagnoser {
     for (std::size_t j = 0; j < joints(); ++j) without[j] = without[j] || (!outcome.structured(j) && !gate.remains[j]);
     for (const FreeCurve& curve : add_free_curves(models, logs_, without))
       out[curve.effect.joint] = drawn(models, curve, logs_);
+    // What comes and goes by itself passes for noise that remembers, wherever nothing else is left.
+    const Linearised problem(models, logs_, plain());
+    parallel_for(joints(), [&](std::size_t j) {
+      if (!still_[j] && !out[j]) out[j] = time_curve(problem, j);
+    });
     return out;
   }
   /// The model has the curves that are told of, where validate logs confirm each: beyond the motion that fitted it, a
@@ -198,7 +216,7 @@ class Diagnoser {
     if (task_.settings.max_effects == 0) return;  // the BLS is to learn what is left
     std::vector<JointDiagnosis>& told = result.report.joints;
     std::vector<bool> without = still_;
-    for (std::size_t j = 0; j < joints(); ++j) without[j] = without[j] || !told[j].curve;
+    for (std::size_t j = 0; j < joints(); ++j) without[j] = without[j] || !told[j].curve || !told[j].curve->of_motion();
     const VectorXd before = plain_error(result.model, logs_);
     if (before.sum() == 0) return;
     Models models = with_findings(outcome);
@@ -459,13 +477,21 @@ Diagnosis diagnose(const Project& project, GateData& given, const std::vector<Pr
         "not_excited: no joint moves in the train logs by more than its encoder's noise; record logs in which they do");
   }
   check_baseline_moves(project.robot, given, given_baseline);
-  GateData data = given;
-  std::vector<ProcessedLog> baseline = given_baseline;
-  leave_out(data.logs, still);
-  leave_out(baseline, still);
+  // Logs may fill the memory: a copy only where a joint of them is left out.
+  const bool changes = std::find(still.begin(), still.end(), true) != still.end();
+  GateData changed;
+  std::vector<ProcessedLog> changed_baseline;
+  if (changes) {
+    changed = given;
+    changed_baseline = given_baseline;
+    leave_out(changed.logs, still);
+    leave_out(changed_baseline, still);
+  }
+  GateData& data = changes ? changed : given;
+  const std::vector<ProcessedLog>& baseline = changes ? changed_baseline : given_baseline;
   Diagnoser diagnoser(project, data, baseline, test, still, progress, options, finish);
   Diagnosis result = diagnoser.run();
-  given.notes = data.notes;
+  if (changes) given.notes = changed.notes;
   given.notes.insert(given.notes.end(), diagnoser.notes().begin(), diagnoser.notes().end());
   progress.done();
   return result;

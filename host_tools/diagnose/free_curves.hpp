@@ -33,7 +33,4 @@ std::vector<FreeCurve> add_free_curves(Models& models, const std::vector<Session
 /// the logs that fit. The deviation counts what twelve heights can't follow, too.
 CurveResult drawn(const Models& models, const FreeCurve& curve, const std::vector<SessionLog>& logs);
 
-/// Where the curve is off its median; without shares of gap and time.
-GapRegion place_of(const CurveResult& curve);
-
 }  // namespace fxdyn::diagnosis

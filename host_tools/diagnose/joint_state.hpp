@@ -15,6 +15,7 @@ struct JointState {
   bool there = false;        ///< an effect is there for sure, and its name is not established
   bool likely = false;       ///< effects that are not sure enough for the model
   bool impacts = false;      ///< shorter than the torque's band shows
+  bool wanders = false;      ///< something comes and goes with time
   bool bends = false;        ///< a link encoder shows a deflection without a name
 };
 Verdict verdict_of(const JointState& state);

@@ -66,6 +66,15 @@ struct SessionOptions {
   double position_samples = 8;
   /// Hz; .. and at least that; theory: the drive's tick of 2 ms, at which effects with memory have to hold
   double thinned_hz = 500;
+  /// rows of all logs, times joints; what a diagnosis has room for. Longer recordings are looked at in windows; hand:
+  /// 400 s of six joints at 25 rows a second, half a gigabyte
+  double most_rows = 60'000;
+  /// s; of all logs together that stay, however many rows a second they have; hand: 160 s and as much of a baseline
+  double least_kept_s = 320;
+  /// s; length of such a window; hand: a few reversals of a slow motion
+  double window_s = 20;
+  /// s; before and after it, at least; what effects with memory were before the window fades; hand
+  double run_in_s = 1;
   /// periods of the cut-off; dropped at both ends, where the filter swings; hand
   double edge_periods = 3;
   /// s; train logs or baseline at least, after filtering; hand
@@ -174,6 +183,14 @@ struct CurveOptions {
   double height = 1;
   /// share of the error's power on what judges; a curve takes away; hand: for less twelve numbers are too many
   double least_share = 0.1;
+  /// share of the error's power that a curve over time takes away, beyond what one of the healthy session does; hand:
+  /// offsets and friction of sound robots that wander a little had up to 0.09 on tuning seeds
+  double least_share_in_time = 0.15;
+  /// s; a curve over time is judged by stretches of it that it did not fit; hand: noise that remembers half a second
+  /// does not reach across
+  double left_out_s = 2;
+  /// s; from one of its knots to the next, at least; hand: half of that
+  double finest_s = 1;
 };
 
 /// Impacts that are shorter than the torque's band shows.

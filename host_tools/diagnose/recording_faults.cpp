@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "host_tools/diagnose/features.hpp"
 #include "host_tools/effects/effect_roles.hpp"
@@ -39,10 +38,11 @@ class FaultFits {
         sound_(problem_.solver().solve(problem_.columns_of({}))),
         sound_likelihood_(likelihood(problem_, sound_)),
         price_(std::log(std::max(problem_.solver().row_count(problem_.blocks().fit_of(false)).maxCoeff(), 2.0))) {
-    for (std::size_t l = 0; l < logs.size(); ++l) {
-      if (logs[l].healthy || !logs[l].fits) continue;
-      today_.push_back(l);
-      torque_.push_back(torque(l, 0, 0));
+    torque_.resize(logs.size());
+    for (const Windows& windows : by_recording(logs)) {
+      if (logs[windows.front()].healthy || !logs[windows.front()].fits) continue;
+      today_.push_back(windows);
+      for (const std::size_t l : windows) torque_[l] = torque(l, 0, 0);
     }
     explainable_ = explainable();
   }
@@ -69,9 +69,17 @@ class FaultFits {
   double price() const { return price_; }
 
  private:
+  /// Logs of one recording.
+  using Windows = std::vector<std::size_t>;
+
   const IdentifiedModel& model() const { return nominal_.current; }
   const SessionLog& entry(std::size_t log) const { return problem_.logs()[log]; }
-  const std::string& name(std::size_t log) const { return entry(log).log.name; }
+  const std::string& name(const Windows& recording) const { return entry(recording.front()).log.name; }
+  Windows all_of_today() const {
+    Windows out;
+    for (const Windows& windows : today_) out.insert(out.end(), windows.begin(), windows.end());
+    return out;
+  }
 
   /// Torque along a motion whose joint is moved by a constant.
   MatrixXd torque(std::size_t log, std::size_t joint, double shift) const {
@@ -153,8 +161,7 @@ class FaultFits {
     double shift = options_.first_shift;
     for (int round = 0; round < most_rounds; ++round) {
       std::vector<MatrixXd> rows = no_rows(1);
-      for (std::size_t i = 0; i < today_.size(); ++i)
-        put(today_[i], (torque(today_[i], joint, shift) - torque_[i]) / shift, 0, rows);
+      for (const std::size_t l : all_of_today()) put(l, (torque(l, joint, shift) - torque_[l]) / shift, 0, rows);
       const LinearFit fit = fit_with(std::move(rows));
       const Index at = fit.x.size() - 1;
       const double before = shift;
@@ -174,19 +181,29 @@ class FaultFits {
     }
   }
 
-  /// Lags of all of today's logs, with or without their growth: they have one recorder.
+  double begins_s(const Windows& recording) const { return problem_.motion(recording.front()).t[0]; }
+  double ends_s(const Windows& recording) const {
+    const VectorXd& t = problem_.motion(recording.back()).t;
+    return t[t.size() - 1];
+  }
+  double middle_s(const Windows& recording) const { return (begins_s(recording) + ends_s(recording)) / 2; }
+
+  /// Lags of all of today's recordings, with or without their growth: they have one recorder.
   std::vector<MatrixXd> lag_rows(bool growing) const {
     std::vector<MatrixXd> rows = no_rows((growing ? 2 : 1) * static_cast<Index>(today_.size()));
-    for (std::size_t i = 0; i < today_.size(); ++i) {
-      const Motion& motion = problem_.motion(today_[i]);
-      const MatrixXd& tau = torque_[i];
-      const Index n = tau.rows(), column = static_cast<Index>(i), count = static_cast<Index>(today_.size());
-      MatrixXd rate = MatrixXd::Zero(n, tau.cols());
-      rate.middleRows(1, n - 2) = (tau.bottomRows(n - 2) - tau.topRows(n - 2)) / (2 * motion.step_s);
-      put(today_[i], rate, column, rows);
-      if (!growing) continue;
-      const VectorXd since = (motion.t.array() - motion.t.mean()).matrix();
-      put(today_[i], since.asDiagonal() * rate, count + column, rows);
+    const auto count = static_cast<Index>(today_.size());
+    for (Index i = 0; i < count; ++i) {
+      const Windows& windows = today_[static_cast<std::size_t>(i)];
+      const double middle = middle_s(windows);
+      for (const std::size_t l : windows) {
+        const Motion& motion = problem_.motion(l);
+        const MatrixXd& tau = torque_[l];
+        const Index n = tau.rows();
+        MatrixXd rate = MatrixXd::Zero(n, tau.cols());
+        rate.middleRows(1, n - 2) = (tau.bottomRows(n - 2) - tau.topRows(n - 2)) / (2 * motion.step_s);
+        put(l, rate, i, rows);
+        if (growing) put(l, (motion.t.array() - middle).matrix().asDiagonal() * rate, count + i, rows);
+      }
     }
     return rows;
   }
@@ -201,24 +218,24 @@ class FaultFits {
     double most = 0;
     std::string complaint;
     for (Index i = 0; i < count; ++i) {
-      const std::size_t log = today_[static_cast<std::size_t>(i)];
-      const Motion& motion = problem_.motion(log);
+      const Windows& recording = today_[static_cast<std::size_t>(i)];
       const Index at = growing.x.size() - 2 * count + i;
-      const double slope = growing.x[at + count], grown = slope * (motion.t[motion.t.size() - 1] - motion.t[0]);
+      const double slope = growing.x[at + count], grown = slope * (ends_s(recording) - begins_s(recording));
       if (std::fabs(slope) < options_.deviations * deviation(growing, at + count)) continue;
-      if (std::fabs(grown) <= most || std::fabs(grown) < options_.least_drift * motion.step_s) continue;
+      if (std::fabs(grown) <= most || std::fabs(grown) < options_.least_drift * entry(recording.front()).log.step_s)
+        continue;
       most = std::fabs(grown);
       complaint = fmt::format(
           "{}: position and torque have two clocks: the lag between them changes by {:.3g} ms from start to end; "
           "record "
           "both with one clock",
-          name(log), 1e3 * most);
+          name(recording), 1e3 * most);
     }
     if (!complaint.empty()) weigh(growing, 2 * count, complaint, &constant);
   }
 
   /// Columns of an effect on the robot in some of today's logs.
-  std::vector<MatrixXd> robot_rows(const EffectInfo& effect, const std::vector<std::size_t>& logs) const {
+  std::vector<MatrixXd> robot_rows(const EffectInfo& effect, const Windows& logs) const {
     Group group;
     group.candidate = {std::string(effect.name), 0, {}};
     group.on_body = true;
@@ -233,12 +250,12 @@ class FaultFits {
   }
 
   double score_on_robot(const EffectInfo& effect) {
-    return score_of(fit_with(robot_rows(effect, today_)), static_cast<Index>(effect.linear.size()));
+    return score_of(fit_with(robot_rows(effect, all_of_today())), static_cast<Index>(effect.linear.size()));
   }
 
   void fit_load(std::size_t i) {
     const auto parameters = static_cast<Index>(load_effect().linear.size());
-    const LinearFit fit = fit_with(robot_rows(load_effect(), {today_[i]}));
+    const LinearFit fit = fit_with(robot_rows(load_effect(), today_[i]));
     const Index at = fit.x.size() - parameters;
     if (std::fabs(fit.x[at]) < options_.deviations * deviation(fit, at)) return;
     weigh(fit, parameters,
@@ -249,36 +266,36 @@ class FaultFits {
   }
 
   /// Columns of a joint's torque in some of today's logs.
-  std::vector<MatrixXd> gain_rows(const std::vector<std::size_t>& places, std::size_t joint) const {
+  std::vector<MatrixXd> gain_rows(const Windows& logs, std::size_t joint) const {
     std::vector<MatrixXd> rows = no_rows(1);
-    for (const std::size_t i : places) put(today_[i], joint, torque_[i].col(static_cast<Index>(joint)), 0, rows);
+    for (const std::size_t l : logs) put(l, joint, torque_[l].col(static_cast<Index>(joint)), 0, rows);
     return rows;
   }
   /// .. of its friction in one: all that the joint's effects do, what is viscous of it, and an offset.
-  std::vector<MatrixXd> friction_rows(std::size_t i, std::size_t joint) const {
+  std::vector<MatrixXd> friction_rows(const Windows& recording, std::size_t joint) const {
     const auto j = static_cast<Index>(joint);
-    const VectorXd dq = problem_.motion(today_[i]).dq.col(j);
     std::vector<MatrixXd> rows = no_rows(3);
-    put(today_[i], joint, torque_[i].col(j) - problem_.robot_columns(today_[i]).structural().col(j), 0, rows);
-    put(today_[i], joint, dq, 1, rows);
-    put(today_[i], joint, VectorXd::Ones(dq.size()), 2, rows);
+    for (const std::size_t l : recording) {
+      const VectorXd dq = problem_.motion(l).dq.col(j);
+      put(l, joint, torque_[l].col(j) - problem_.robot_columns(l).structural().col(j), 0, rows);
+      put(l, joint, dq, 1, rows);
+      put(l, joint, VectorXd::Ones(dq.size()), 2, rows);
+    }
     return rows;
   }
 
   /// What one joint's torque has in one log alone may look like a load.
   void fit_gain(std::size_t i, std::size_t joint) {
-    const LinearFit fit = fit_with(gain_rows({i}, joint));
+    const LinearFit fit = fit_with(gain_rows(today_[i], joint));
     const Index at = fit.x.size() - 1;
     if (std::fabs(fit.x[at]) < options_.deviations * deviation(fit, at)) return;
-    std::vector<std::size_t> all(today_.size());
-    std::iota(all.begin(), all.end(), std::size_t{0});
     weigh(
         fit, 1,
         fmt::format("{}: its torque of {} is {:.3g} times that of the other logs: another unit or gain? Correct it or "
                     "leave the log out",
                     name(today_[i]), robot_of(model()).joints[joint].name, 1 + fit.x[at]));
-    faults_.back().sound_score =
-        std::max(score_of(fit_with(gain_rows(all, joint)), 1), score_of(fit_with(friction_rows(i, joint)), 3));
+    faults_.back().sound_score = std::max(score_of(fit_with(gain_rows(all_of_today(), joint)), 1),
+                                          score_of(fit_with(friction_rows(today_[i], joint)), 3));
   }
 
   const Models& nominal_;
@@ -287,9 +304,9 @@ class FaultFits {
   LinearFit sound_;
   double sound_likelihood_, price_;
   double explainable_ = 0;
-  double on_robot_ = 0;             ///< the best score of an effect on the robot
-  std::vector<std::size_t> today_;  ///< logs that fit
-  std::vector<MatrixXd> torque_;    ///< of the nominal model, by log of today
+  double on_robot_ = 0;           ///< the best score of an effect on the robot
+  std::vector<Windows> today_;    ///< recordings that fit
+  std::vector<MatrixXd> torque_;  ///< of the nominal model, by log; empty but for today's
   std::vector<RecordingFault> faults_;
 };
 

@@ -27,11 +27,15 @@ struct RowCache {
 /// A log of one of the two sessions. Rows are decimated to `log.decimation`.
 struct SessionLog {
   ProcessedLog log;
-  bool healthy = false;   ///< of the baseline
-  bool fits = true;       ///< else it judges only (validate)
-  double age_s = 0;       ///< of the session when the log begins: what drifts has drifted so far
-  double bending_hz = 0;  ///< gears bend by the load of the motion below; 0: of all of it
+  bool healthy = false;    ///< of the baseline
+  bool fits = true;        ///< else it judges only (validate)
+  double age_s = 0;        ///< of the session when the log begins: what drifts has drifted so far
+  double bending_hz = 0;   ///< gears bend by the load of the motion below; 0: of all of it
+  bool continues = false;  ///< a later window of the same recording as the log before (in_windows())
   std::shared_ptr<RowCache> cache = std::make_shared<RowCache>();
 };
+
+/// Logs by recording: the windows of one belong together. Places in `logs`.
+std::vector<std::vector<std::size_t>> by_recording(const std::vector<SessionLog>& logs);
 
 }  // namespace fxdyn::diagnosis

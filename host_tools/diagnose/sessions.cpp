@@ -8,6 +8,7 @@
 
 #include "host_tools/diagnose/models.hpp"
 #include "host_tools/diagnose/thinning.hpp"
+#include "host_tools/diagnose/windows.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/model_parts.hpp"
 #include "host_tools/regression/encoder_noise.hpp"
@@ -92,7 +93,7 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
   for (const ProcessedLog& log : now) add(log, false, one ? windows.front()[0] : log.t[0]);
   for (const ProcessedLog& log : before) add(log, true, log.t[0]);
   keep_alike_rows(out, options);
-  return out;
+  return in_windows(std::move(out), options);
 }
 
 void check_lengths(const std::vector<SessionLog>& logs, const SessionOptions& options) {

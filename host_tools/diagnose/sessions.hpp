@@ -12,8 +12,9 @@
 
 namespace fxdyn::diagnosis {
 
-/// The logs with their ages, decimated to what the torque's band needs; and the session that those of today belong to:
-/// one where no two windows overlap in time and no pause is long, else every log starts its own.
+/// The logs with their ages, decimated to what the torque's band needs, very long ones in windows; and the session that
+/// those of today belong to: one where no two windows overlap in time and no pause is long, else every log starts its
+/// own.
 /// @param now train and validate logs @param before the healthy session's
 std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before,
                                  std::optional<Session>& session, const SessionOptions& options);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "host_tools/diagnose/curve_sentence.hpp"
 #include "host_tools/diagnose/explore.hpp"
 #include "host_tools/diagnose/free_curves.hpp"
 #include "host_tools/diagnose/gap_errors.hpp"
@@ -313,6 +314,8 @@ class ReportWriter {
     state.there = is_there(j);
     state.likely = any([](const NamedEffect& e) { return !e.established; });
     state.impacts = impacts.has_value();
+    const std::optional<CurveResult>& curve = conclusion_.curves[j];
+    state.wanders = curve && !curve->of_motion();
     state.bends = std::find(bends.begin(), bends.end(), j) != bends.end();
     out.verdict = verdict_of(state);
 
@@ -325,14 +328,14 @@ class ReportWriter {
     const bool left = out.verdict == Verdict::unexplained || out.verdict == Verdict::partly_explained;
     // What only bends leaves no gap in the torque, and noise alone has nothing to close.
     const bool of_torque = state.there || state.reached ||
-                           (left && (state.structured || state.remains || state.likely)) ||
+                           (left && (state.structured || state.remains || state.likely || state.wanders)) ||
                            any([](const NamedEffect& e) { return e.signal.empty(); });
-    const bool only_impacts = state.impacts && !changed && !state.structured;
+    const bool only_impacts = state.impacts && !changed && !state.structured && !state.wanders;
     if (only_impacts) {
       out.where = place(*impacts);
       advise(fmt::format("look at the raw torque of joint {} there; an encoder on its link would show a gap", j + 1));
     } else if (of_torque) {
-      out.where = place_of_gap(j, std::min(of.floor, of.before), left ? conclusion_.curves[j] : std::nullopt);
+      out.where = place_of_gap(j, std::min(of.floor, of.before), left ? curve : std::nullopt);
     }
     if (left && of_torque) note_doubtful_direction(j);
     if (left && !only_impacts) advise_on_gap(j, out.where.regions);
@@ -346,16 +349,31 @@ class ReportWriter {
     out.gate_after = of.gate_after;
     // On other logs than those that judged, either model may show that there is less noise.
     out.noise_floor = std::min({of.floor, of.before, of.after});
+    // What wanders passed for noise.
+    const bool hidden = state.wanders && !state.structured && !state.remains;
+    if (hidden) *out.noise_floor *= std::sqrt(1 - curve->closes);
     if (of_torque) {
       out.closure = conclusion_.gate.closure[k];
-      const Share share = left_of(conclusion_.gate.held, conclusion_.gate.gap[k], k);
-      out.left = GapLeft{share.share, share.low, share.high};
+      const Share share = diagnosis::left_of(conclusion_.gate.held, conclusion_.gate.gap[k], k);
+      out.left = hidden ? left_of(*curve, of) : GapLeft{share.share, share.low, share.high};
     }
-    if (left) out.curve = conclusion_.curves[j];
+    if (left) out.curve = curve;
     out.not_identifiable = conclusion_.outcome.not_identifiable[j];
     out.state_p = conclusion_.outcome.lack[j].state_p;
     out.time_p = conclusion_.outcome.lack[j].time_p;
     return out;
+  }
+
+  /// .. where a curve over time is all that is left.
+  static GapLeft left_of(const CurveResult& curve, const GapFigures& of) {
+    const double after = of.gate_after * of.gate_after, closed = std::max(of.gate_before * of.gate_before - after, 0.0);
+    const auto share = [&](double closes) {
+      const double left = std::clamp(closes, 0.0, 1.0) * after;
+      return left > 0 ? left / (left + closed) : 0;
+    };
+    constexpr double deviations_of_95 = 1.96;
+    const double reach = deviations_of_95 * curve.closes_std;
+    return {share(curve.closes), share(curve.closes - reach), share(curve.closes + reach)};
   }
 
   /// Where the gap of the model before sits, on the logs that fit and those that judge.

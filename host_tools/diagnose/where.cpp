@@ -297,17 +297,29 @@ Region in_frequency(const std::vector<const ProcessedLog*>& logs, const std::vec
   return best;
 }
 
+/// Times of the session's clock, or of one log's: then the others' are none.
+VectorXd times_of(const std::vector<const ProcessedLog*>& logs, const Samples& samples, const std::string& log) {
+  VectorXd out = samples.t;
+  for (std::size_t l = 0; l < logs.size() && !log.empty(); ++l) {
+    if (logs[l]->name != log) out.segment(samples.first[l], samples.rows(l)).setConstant(std::nan(""));
+  }
+  return out;
+}
+
 /// How much of the gap, and of the time, is at the place of a curve; nothing where the signal is not here.
-std::vector<Region> measured(const Samples& samples, const std::optional<GapRegion>& place) {
+std::vector<Region> measured(const std::vector<const ProcessedLog*>& logs, const Samples& samples,
+                             const std::optional<GapRegion>& place) {
   const double whole = samples.power.sum();
   if (!place || !(whole > 0)) return {};
-  for (const Signal& signal : samples.signals) {
-    if (signal.name != place->signal || signal.joint != place->joint) continue;
-    const Eigen::ArrayXd within =
-        (signal.values.array() >= place->from && signal.values.array() <= place->to).cast<double>();
-    Region out{signal.name, signal.joint, place->from, place->to, 0, within.mean()};
+  const auto at = [&](const VectorXd& values) -> std::vector<Region> {
+    const Eigen::ArrayXd within = (values.array() >= place->from && values.array() <= place->to).cast<double>();
+    Region out{place->signal, place->joint, place->from, place->to, 0, within.mean(), place->log};
     out.share = std::min(1.0, (samples.power.array() * within).sum() / whole);
     return {out};
+  };
+  if (place->signal == "t") return at(times_of(logs, samples, place->log));
+  for (const Signal& signal : samples.signals) {
+    if (signal.name == place->signal && signal.joint == place->joint) return at(signal.values);
   }
   return {};
 }
@@ -342,7 +354,7 @@ GapPlace where(const Robot& robot, std::size_t index, const std::vector<const Pr
     regions = others();
     drop_faint();
   };
-  or_else([&] { return measured(samples, of_curve); });
+  or_else([&] { return measured(logs, samples, of_curve); });
   or_else([&] { return in_time(logs, samples, options.region_chance); });
   or_else([&] { return std::vector<Region>{in_frequency(logs, error, load, noise)}; });
   GapPlace out;

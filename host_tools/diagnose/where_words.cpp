@@ -29,9 +29,14 @@ std::string words_of_time(const GapRegion& region, const std::vector<const Proce
     // Two windows of one file are two logs of one name.
     return log->name == region.log && log->t[log->first] <= region.from && region.from <= log->t[log->last - 1];
   });
-  const ProcessedLog& log = found == logs.end() ? *logs.front() : **found;
+  double first = 1e300, last = -1e300;  // of a session: from its first log to its last
+  for (const ProcessedLog* log : logs) {
+    if (found != logs.end() && log != *found) continue;
+    first = std::min(first, log->t[log->first]);
+    last = std::max(last, log->t[log->last - 1]);
+  }
   const std::string of = region.log.empty() ? "" : " of " + region.log;
-  const double first = log.t[log.first], last = log.t[log.last - 1], near_s = (last - first) / 24;
+  const double near_s = (last - first) / 24;
   const bool begins = region.from - first < near_s, ends = last - region.to < near_s;
   if (begins && !ends) return fmt::format("in the first {:.2g} s{}", region.to - first, of);
   if (ends && !begins) return fmt::format("in the last {:.2g} s{}", last - region.from, of);

@@ -326,13 +326,14 @@ ModelValue with_load_of(const ProcessedLog& log, ModelValue model) {
 
 double age_of(const IdentifiedModel& model, const ProcessedLog& log) {
   constexpr double constants_till_cold = 3;
-  if (!model.session || log.t.size() == 0) return 0;
+  if ((!model.session && log.ran_s == 0) || log.t.size() == 0) return 0;
   double longest = 0;
   for (const JointFit& joint : model.joints) {
     for (const EffectFit& fit : joint.effects) {
       if (drifts(fit.effect)) longest = std::max(longest, fit.shape[0]);
     }
   }
+  if (!model.session) return longest > 0 ? log.ran_s : 0;
   const double start = log.t[0];
   const bool belongs = start >= model.session->start_s && start <= model.session->end_s + constants_till_cold * longest;
   return longest > 0 && belongs ? start - model.session->start_s : 0;

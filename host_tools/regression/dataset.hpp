@@ -22,6 +22,7 @@ struct ProcessedLog {
   std::string name;  ///< file name for messages
   Role role = Role::train;
   double from_s = 0, to_s = 0, step_s = 0;
+  double ran_s = 0;  ///< of a part of a recording: how long that had run before [s]
   Eigen::VectorXd t;
   Eigen::MatrixXd q;                          ///< filtered at the position cut-off
   Eigen::MatrixXd measured_dq, measured_ddq;  ///< likewise; empty: differentiated from q
@@ -97,8 +98,8 @@ ProcessedLog process(Log log, const FilterFit& filter, const ProcessSettings& se
 ModelValue with_load_of(const ProcessedLog& log, ModelValue model);
 
 /// How long the robot has run when the log begins: since the start of the model's session, where the log's time stamps
-/// say that it belongs to it (up to three of the drift's time constants after its end) and the model drifts; else 0
-/// [s].
+/// say that it belongs to it (up to three of the drift's time constants after its end) and the model drifts; of a model
+/// without a session, since the recording began that the log is part of; else 0 [s].
 double age_of(const IdentifiedModel& model, const ProcessedLog& log);
 
 /// Whether each joint moves in the train logs by more than its encoder's noise.

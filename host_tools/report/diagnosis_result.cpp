@@ -135,6 +135,7 @@ json to_json(const std::optional<CurveResult>& curve) {
           {"rival", curve->rival.empty() ? json(nullptr) : json(curve->rival)},
           {"closes", curve->closes},
           {"in_model", curve->in_model},
+          {"log", curve->log.empty() ? json(nullptr) : json(curve->log)},
           {"x", x},
           {"y", y},
           {"std", std}};
@@ -156,6 +157,7 @@ std::optional<CurveResult> curve_of(const json& file) {
   if (file.at("rival").is_string()) out.rival = file.at("rival");
   out.closes = number_of(file.at("closes"));
   out.in_model = file.at("in_model");
+  if (file.value("log", json()).is_string()) out.log = file.at("log");
   for (std::size_t i = 0; i < file.at("x").size(); ++i)
     out.points.push_back(
         {number_of(file.at("x").at(i)), number_of(file.at("y").at(i)), number_of(file.at("std").at(i))});

@@ -68,8 +68,8 @@ struct CurveResult {
     double x = 0;           ///< of the variable
     double y = 0, std = 0;  ///< [N*m | N], without the nominal effects' part of it
   };
-  std::string effect;                ///< position_curve, velocity_curve, load_curve, ..
-  std::string signal;                ///< its variable: q, dq, load
+  std::string effect;                ///< position_curve, velocity_curve, load_curve, .., time_curve
+  std::string signal;                ///< its variable: q, dq, load, t
   std::size_t joint = 0;             ///< from 1: the other joint whose q it is; 0: the joint's own variable
   std::string unit;                  ///< of the variable
   bool friction = false;             ///< y is friction, and turns with the direction
@@ -78,9 +78,13 @@ struct CurveResult {
   double odds_nothing = 0;           ///< log10, on data that did not fit it
   std::optional<double> odds_rival;  ///< .. against the best curve of another variable; none: there is none
   std::string rival;
-  double closes = 0;  ///< share of the error's power, on data that did not fit it
+  double closes = 0;      ///< share of the error's power, on data that did not fit it
+  double closes_std = 0;  ///< of a curve over time; not in the file
   bool in_model = false;
+  std::string log;  ///< whose clock t is of; empty: the session's
   std::vector<Point> points;
+
+  bool of_motion() const { return signal != "t"; }
 };
 
 struct JointDiagnosis {

@@ -101,7 +101,10 @@ Chart chart_of(const CurveResult& curve, const std::string& unit) {
     y[i] = point.y;
     band[i] = deviations_of_95 * point.std;
   }
-  const std::string variable = curve.signal == "dq" ? "velocity" : curve.signal == "load" ? "load" : "position";
+  const std::string variable = curve.signal == "dq"     ? "velocity"
+                               : curve.signal == "load" ? "load"
+                               : curve.signal == "t"    ? "time"
+                                                        : "position";
   const std::string of = curve.joint > 0 ? fmt::format(" of joint {}", curve.joint) : "";
   return {fmt::format("{}{} [{}]", variable, of, curve.unit),
           fmt::format("{} [{}]", curve.friction ? "friction" : "torque", unit),

@@ -57,6 +57,8 @@ std::string curve_of(const Outside& outside) {
   if (outside.effect == "tight_spot") return "friction_over_position";
   if (outside.effect == "end_stop") return "position_curve";
   if (outside.effect == "other_position") return fmt::format("cross_position {}", outside.other + 1);
+  if (outside.effect == "square_wave" || outside.effect == "slow_wave" || outside.effect == "wandering_friction")
+    return "time_curve";
   return {};
 }
 

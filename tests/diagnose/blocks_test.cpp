@@ -55,6 +55,22 @@ TEST(BlocksOfLogs, WithoutValidateLogsAFoldIsAPartOfEveryTrainLog) {
   EXPECT_EQ(blocks.whole_logs[1].fit, (Places{0, 1, 2, 3, 4, 10}));
 }
 
+TEST(BlocksOfLogs, WindowsOfARecordingAreOne) {
+  std::vector<SessionLog> logs{log(false, true), log(false, true), log(false, true, 30), log(true, true)};
+  logs[1].continues = true;
+  const Blocks blocks = make_blocks(logs);
+  EXPECT_EQ(blocks.of_log.size(), 4U);
+  ASSERT_EQ(blocks.all.size(), 11U);
+  EXPECT_EQ(blocks.all[2].first, 40);  // a fifth of 100 rows each
+  EXPECT_EQ(blocks.all[2].count, 20);
+  EXPECT_EQ(blocks.all[5].log, 2U);
+  EXPECT_EQ(blocks.rows(), 180);
+  ASSERT_EQ(blocks.whole_logs.size(), 2U);
+  EXPECT_EQ(blocks.whole_logs[0].judge, (Places{0, 1, 2, 3, 4}));
+  logs[2].fits = false;
+  EXPECT_EQ(make_blocks(logs).all.size(), 3U);
+}
+
 TEST(BlocksOfLogs, ASingleTrainLogIsCut) {
   const Blocks blocks = make_blocks({log(false, true)});
   EXPECT_EQ(blocks.all.size(), 5U);

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <numbers>
 
 #include "host_tools/effects/identified_model.hpp"
 #include "tests/diagnose/arm_sessions.hpp"
@@ -190,6 +191,33 @@ TEST(Diagnosis, ACurveIsInTheModelWhereLogsThatDidNotFitItConfirmIt) {
   EXPECT_FALSE(curve->named);
   // What is fitted with it has the offset and the dry friction: the heights stay about zero.
   for (const double height : curve->linear) EXPECT_LT(std::fabs(height), 3);
+}
+
+/// A hose that stiffens and softens by itself, over all logs of the session.
+double hose(double t) { return 0.25 * std::sin(2 * std::numbers::pi * t / 11) + 0.1 * std::sin(0.31 * t); }
+
+TEST(Diagnosis, WhatComesAndGoesByItselfGetsACurveOverTime) {
+  const std::filesystem::path out = test::diagnose_sessions("hose", {.tamper = [](Log& log) {
+                                                              for (Eigen::Index k = 0; k < log.t.size(); ++k)
+                                                                log.tau(k, 1) += hose(log.t[k]);
+                                                            }});
+  const json joint = json::parse(read_file(out / "diagnosis.json")).at("joints").at(1);
+  EXPECT_EQ(joint.at("verdict"), "unexplained") << joint.dump(1);
+  EXPECT_TRUE(joint.at("effects").empty()) << joint.dump(1);
+  const json& curve = joint.at("curve");
+  ASSERT_TRUE(curve.is_object()) << joint.dump(1);
+  EXPECT_EQ(curve.at("effect"), "time_curve");
+  EXPECT_EQ(curve.at("signal"), "t");
+  EXPECT_EQ(curve.at("unit"), "s");
+  EXPECT_FALSE(curve.at("friction"));
+  EXPECT_FALSE(curve.at("in_model"));  // no drive knows the time
+  EXPECT_GT(curve.at("closes"), 0.7);
+  std::size_t held = 0;
+  for (std::size_t i = 0; i < curve.at("x").size(); ++i)
+    held += std::fabs(curve.at("y").at(i).get<double>() - hose(curve.at("x").at(i))) <
+            2 * curve.at("std").at(i).get<double>() + 0.02;
+  EXPECT_GT(static_cast<double>(held), 0.85 * static_cast<double>(curve.at("x").size()));
+  EXPECT_EQ(read_model(out / "model.json").joints[1].find("time_curve"), nullptr);
 }
 
 TEST(Diagnosis, WithoutSuchLogsACurveIsAnAnswerOnly) {

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host_tools/diagnose/linearised.hpp"
+#include "host_tools/report/diagnosis_result.hpp"
+
+namespace fxdyn::diagnosis {
+
+/// Rows of a joint that a curve over time is fitted to.
+struct TimedRows {
+  Eigen::VectorXd t;       ///< of the session's clock [s]
+  Eigen::VectorXd e;       ///< what the model leaves [N*m | N]
+  Eigen::VectorXd sign;    ///< tanh(dq / width), as Coulomb friction has it
+  Eigen::MatrixXd rivals;  ///< functions of the state, that may explain it as well
+};
+
+/// A curve over time: its knots, heights, and how sure it is.
+struct TimeFit {
+  double from = 0, knot_s = 0;  ///< the first knot, and from one to the next [s]
+  bool friction = false;        ///< times the direction
+  Eigen::VectorXd heights;      ///< [N*m | N]
+  Eigen::MatrixXd covariance;   ///< of them
+  double odds_nothing = 0;      ///< log10, on stretches that did not fit it
+  double closes = 0;            ///< share of the error's power that it takes away there
+  double closes_std = 0;        ///< .. by how these stretches differ
+  double square_of_rivals = 0;  ///< what functions of the state leave there, of what was there
+};
+
+/// What is left at a joint as a cubic B-spline (model/effects/curve.hpp) of the session's time, or of its time times
+/// the direction: a torque that comes and goes by itself. Knots are as near as the data ask for: the distance is a
+/// ninth of the session, or half of that, and so on, and each is judged by fits that leave out every fifth stretch in
+/// turn (CurveOptions). Rows whose errors are correlated count as one, and the number of curves tried is taken off the
+/// odds.
+/// @param size standard deviation of the heights beforehand @param row_s from one row to the next [s]
+/// @returns the best; none where there are too few rows
+std::optional<TimeFit> fit_over_time(const TimedRows& rows, double size, double row_s, const CurveOptions& options);
+
+/// Heights' factors at times, times x heights.
+Eigen::MatrixXd bumps_over_time(const TimeFit& fit, const Eigen::VectorXd& t);
+
+/// The curve of what is left at a joint over time, for the session alone: no drive knows the time at which a pump
+/// starts. None where it is not sure, where functions of the state leave less, or where the healthy session's residual
+/// wanders as much.
+/// @param problem with what was found, not whitened
+std::optional<CurveResult> time_curve(const Linearised& problem, std::size_t joint);
+
+}  // namespace fxdyn::diagnosis

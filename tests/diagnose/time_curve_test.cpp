@@ -1,0 +1,123 @@
+// A torque that comes and goes by itself gets a curve over time, whose band holds the truth; noise gets none.
+
+#include "host_tools/diagnose/time_curve.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "host_tools/support/random.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::ArrayXd;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double row_s = 0.05, noise = 0.1;
+
+/// Two minutes of rows; the joint goes to and fro in 7 s, and noise of which each row remembers a share of the last.
+struct Session {
+  explicit Session(std::uint64_t seed, double memory = 0) {
+    Random random(seed);
+    const Index count = 2400;
+    rows.t = VectorXd::LinSpaced(count, 1000, 1000 + row_s * static_cast<double>(count - 1));
+    phase = 2 * std::numbers::pi / 7 * rows.t.array();
+    rows.sign = (30 * phase.cos()).tanh();
+    rows.e.resize(count);
+    double last = 0;
+    for (double& e : rows.e) e = last = memory * last + std::sqrt(1 - memory * memory) * noise * random.normal();
+    rows.rivals.resize(count, 6);
+    for (Index k = 0; k < 3; ++k) {
+      rows.rivals.col(2 * k) = (static_cast<double>(k + 1) * phase).cos();
+      rows.rivals.col(2 * k + 1) = (static_cast<double>(k + 1) * phase).sin();
+    }
+  }
+  /// A wave of so many seconds, and another one.
+  ArrayXd wave(double period_s) const {
+    const ArrayXd turn = 2 * std::numbers::pi / period_s * rows.t.array();
+    return turn.sin() + 0.4 * (0.37 * turn).cos();
+  }
+  std::optional<TimeFit> fit() const {
+    return fit_over_time(rows, std::sqrt(rows.e.squaredNorm() / static_cast<double>(rows.e.size())), row_s, {});
+  }
+
+  TimedRows rows;
+  ArrayXd phase;
+};
+
+/// Share of the points at which two deviations hold the truth.
+double covered(const TimeFit& fit, const VectorXd& t, const ArrayXd& truth) {
+  const MatrixXd x = bumps_over_time(fit, t);
+  const ArrayXd off = (x * fit.heights).array() - truth;
+  const ArrayXd std = (x * fit.covariance).cwiseProduct(x).rowwise().sum().array().sqrt();
+  return (off.abs() < 2 * std).cast<double>().mean();
+}
+
+TEST(TimeCurve, FollowsAWaveThatNoMotionMakes) {
+  for (const double period_s : {9.0, 25.0, 80.0}) {
+    Session session(1);
+    const ArrayXd truth = 0.2 * session.wave(period_s);
+    session.rows.e += truth.matrix();
+    const auto fit = session.fit();
+    ASSERT_TRUE(fit);
+    EXPECT_FALSE(fit->friction);
+    EXPECT_GT(fit->odds_nothing, 20) << period_s;
+    EXPECT_GT(fit->square_of_rivals, 1 - fit->closes);
+    EXPECT_GT(fit->closes, 0.9 * truth.square().sum() / session.rows.e.squaredNorm());
+    EXPECT_GT(covered(*fit, session.rows.t, truth), 0.85) << period_s;
+  }
+}
+
+TEST(TimeCurve, TellsFrictionByTheDirection) {
+  Session session(2);
+  session.rows.e += (0.2 * session.wave(40) * session.rows.sign.array()).matrix();
+  const auto fit = session.fit();
+  ASSERT_TRUE(fit);
+  EXPECT_TRUE(fit->friction);
+  EXPECT_GT(fit->odds_nothing, 20);
+  EXPECT_GT(covered(*fit, session.rows.t, 0.2 * session.wave(40)), 0.85);
+}
+
+TEST(TimeCurve, NoiseOfAnyColourHasNone) {
+  for (const double memory : {0.0, 0.7, 0.9}) {
+    int sure = 0;
+    for (std::uint64_t seed = 10; seed < 60; ++seed) {
+      const auto fit = Session(seed, memory).fit();
+      sure += fit && fit->odds_nothing > 3 && fit->closes > CurveOptions{}.least_share_in_time;
+    }
+    EXPECT_EQ(sure, 0) << memory;
+  }
+}
+
+TEST(TimeCurve, AFunctionOfTheMotionIsNoneOfTime) {
+  Session session(3);
+  session.rows.e += (0.2 * (2 * session.phase).sin()).matrix();
+  const auto fit = session.fit();
+  ASSERT_TRUE(fit);
+  EXPECT_LT(fit->square_of_rivals, 1 - fit->closes);
+}
+
+TEST(TimeCurve, EndsAtItsLastKnot) {
+  TimeFit fit;
+  fit.knot_s = 2;
+  fit.heights.setOnes(12);
+  const MatrixXd x = bumps_over_time(fit, VectorXd::LinSpaced(41, -1, 19));
+  EXPECT_TRUE((x * fit.heights).isApproxToConstant(1.5, 1e-9));  // of equal heights
+}
+
+TEST(TimeCurve, TooFewRowsHaveNone) {
+  Session session(4);
+  TimedRows few;
+  few.t = session.rows.t.head(20);
+  few.e = session.rows.e.head(20);
+  few.sign = session.rows.sign.head(20);
+  EXPECT_FALSE(fit_over_time(few, noise, row_s, {}));
+  EXPECT_FALSE(fit_over_time({}, noise, row_s, {}));
+}
+
+}  // namespace
+}  // namespace fxdyn::diagnosis

@@ -1,0 +1,114 @@
+#include "host_tools/diagnose/windows.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// Seconds of two joints at 100 Hz, a row every tenth sample. The position is the time, so that a sample tells where
+/// it comes from, modulo 50 s, so that every part of it moves alike.
+SessionLog log_of(double seconds, double begins = 0) {
+  const auto samples = static_cast<Index>(100 * seconds) + 1;
+  SessionLog out;
+  out.age_s = begins;
+  ProcessedLog& log = out.log;
+  log.step_s = 0.01;
+  log.t = VectorXd::LinSpaced(samples, begins, begins + seconds);
+  log.q = log.t.unaryExpr([](double t) { return std::fmod(t, 50); }).replicate(1, 2);
+  log.tau = -log.q;
+  log.first = 30;
+  log.last = samples - 30;
+  log.decimation = 10;
+  log.saturated = {{{2000, 4000}}, {}};
+  log.to_s = seconds;
+  return out;
+}
+
+SessionOptions room_for(double rows) {
+  SessionOptions out;
+  out.most_rows = rows;
+  out.window_s = 20;
+  out.run_in_s = 1;
+  out.least_kept_s = 0;
+  return out;
+}
+
+TEST(Windows, LogsThatFitStayWhole) {
+  const auto out = in_windows({log_of(100), log_of(50)}, room_for(10'000));
+  ASSERT_EQ(out.size(), 2U);
+  EXPECT_EQ(out[0].log.samples(), 10'001);
+}
+
+// 1000 s and 400 s at 10 rows a second of two joints are 28 000 rows, of which there is room for a quarter.
+TEST(Windows, LongLogsKeepEquallyManySpreadEvenly) {
+  const auto out = in_windows({log_of(1000), log_of(400, 1000)}, room_for(7200));
+  ASSERT_EQ(out.size(), 9U + 9U);
+  Index rows = 0;
+  for (const SessionLog& entry : out) {
+    const ProcessedLog& log = entry.log;
+    rows += 2 * log.rows();
+    EXPECT_EQ(log.last - log.first, 2000);
+    EXPECT_GE(log.first, 100);
+    EXPECT_GE(log.samples() - log.last, 100);
+    EXPECT_DOUBLE_EQ(log.q(0, 1), std::fmod(log.t[0], 50));
+    EXPECT_DOUBLE_EQ(log.tau(log.last, 0), -log.q(log.last, 0));
+    EXPECT_DOUBLE_EQ(log.from_s, log.t[0]);
+    EXPECT_DOUBLE_EQ(log.to_s, log.t[log.samples() - 1]);
+    EXPECT_NEAR(entry.age_s, log.t[0], 1e-9);  // as old as the session is
+  }
+  EXPECT_LE(rows, 7200);
+  for (std::size_t w = 0; w < 9; ++w)
+    EXPECT_NEAR(out[w].log.t[out[w].log.first + 1000], 1000 * (static_cast<double>(w) + 0.5) / 9, 0.5);
+  EXPECT_NEAR(out[9].log.ran_s, out[9].log.t[0] - 1000, 1e-9);
+  EXPECT_NE(out[0].cache, out[1].cache);
+}
+
+TEST(Windows, BelongToTheirRecording) {
+  const auto out = in_windows({log_of(1000), log_of(400), log_of(30)}, room_for(5000));
+  const auto recordings = by_recording(out);
+  ASSERT_EQ(recordings.size(), 3U);
+  EXPECT_EQ(recordings[0].size(), recordings[1].size());
+  EXPECT_EQ(recordings[2], (std::vector<std::size_t>{out.size() - 1}));
+}
+
+TEST(Windows, ShortLogsStayWhole) {
+  const auto out = in_windows({log_of(1000), log_of(30)}, room_for(4000));
+  EXPECT_EQ(out.back().log.samples(), 3001);
+  EXPECT_FALSE(out.back().continues);
+  Index rows = 0;
+  for (const SessionLog& entry : out) rows += 2 * entry.log.rows();
+  EXPECT_LE(rows, 4000);
+  EXPECT_GE(rows, 3500);
+}
+
+TEST(Windows, SomeSecondsStayHoweverManyRowsTheyHave) {
+  SessionOptions options = room_for(2000);
+  options.least_kept_s = 300;
+  Index rows = 0;
+  for (const SessionLog& entry : in_windows({log_of(1000)}, options)) rows += entry.log.rows();
+  EXPECT_EQ(rows, 3000);
+}
+
+// What moves for a short while only would not be seen.
+TEST(Windows, NoneWhereAJointMovesInNone) {
+  SessionLog once = log_of(1000);
+  once.log.q.col(1).setZero();
+  once.log.q.col(1).segment(60'000, 100).setLinSpaced(0, 1);
+  EXPECT_EQ(in_windows({once}, room_for(2000)).size(), 1U);
+}
+
+TEST(Windows, WhatIsSaturatedMovesWithThem) {
+  const ProcessedLog out = part_of(log_of(100).log, 3000, 6000, 100, 2900);
+  EXPECT_EQ(out.samples(), 3000);
+  ASSERT_EQ(out.saturated[0].size(), 1U);
+  EXPECT_EQ(out.saturated[0][0], (std::array<Index, 2>{0, 1000}));
+  EXPECT_TRUE(part_of(log_of(100).log, 5000, 6000, 100, 900).saturated[0].empty());
+}
+
+}  // namespace
+}  // namespace fxdyn::diagnosis
