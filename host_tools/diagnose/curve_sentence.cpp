@@ -47,7 +47,9 @@ std::string sentence_of(const CurveResult& curve, const Bump& bump, const Robot&
   const std::string size = fmt::format("{:.2g} {}", std::fabs(bump.height), robot.joints[joint].torque_unit());
   if (bump.both_ways) {
     return fmt::format("{} changes by {} between {:.2f} and {:.2f} {}{}", what, size, bump.from, bump.to, curve.unit,
-                       curve.joint > 0 ? fmt::format(" of joint {}", curve.joint) : "");
+                       curve.joint > 0      ? fmt::format(" of joint {}", curve.joint)
+                       : !curve.log.empty() ? " of " + curve.log
+                                            : "");
   }
   std::vector<const ProcessedLog*> shown;
   for (const SessionLog& log : logs) {

@@ -127,25 +127,27 @@ void back_to_start(Outcome& outcome, const Models& start, const std::vector<Sess
   add_deviations(found, *outcome.problem);
 }
 
+void Dilution::add(const VectorXd& e, double row_s) {
+  square_ += e.squaredNorm();
+  const auto span = std::min<Index>(e.size(), whole(2 / row_s));
+  for (Index lag = 1; lag < span; ++lag)
+    lagged_ += 2 * (1 - static_cast<double>(lag) / static_cast<double>(span)) *
+               e.head(e.size() - lag).dot(e.tail(e.size() - lag));
+}
+
 VectorXd diluted_weights(const Linearised& problem) {
   std::vector<Index> columns = problem.columns_of(in_model(problem));
   const LinearFit fit = problem.solver().solve(columns);
   VectorXd weights = problem.solver().weights();
   for (std::size_t j = 0; j < problem.joints(); ++j) {
     const VectorXd e = problem.solver().residual(j, fit);
-    double r0 = 0, sum = 0;
+    Dilution dilution;
     for (const std::size_t i : problem.blocks().fit) {
       const Block& b = problem.blocks().all[i];
-      const VectorXd x = e.segment(b.first, b.count);
-      r0 += x.squaredNorm();
-      // Bartlett's window over two seconds
       const ProcessedLog& log = problem.logs()[b.log].log;
-      const auto span = std::min<Index>(b.count, whole(2 / (log.step_s * static_cast<double>(log.decimation))));
-      for (Index lag = 1; lag < span; ++lag)
-        sum += 2 * (1 - static_cast<double>(lag) / static_cast<double>(span)) *
-               x.head(b.count - lag).dot(x.tail(b.count - lag));
+      dilution.add(e.segment(b.first, b.count), log.step_s * static_cast<double>(log.decimation));
     }
-    if (r0 > 0) weights[static_cast<Index>(j)] /= std::max(1.0, 1 + sum / r0);
+    weights[static_cast<Index>(j)] /= dilution.value();
   }
   return weights;
 }

@@ -18,9 +18,20 @@ void add_deviations(Models& models, const Linearised& problem);
 /// effect, those by which the least known of its shapes is off 0.
 std::vector<double> deviations_off_nothing(const Linearised& problem, const std::vector<std::size_t>& groups);
 
-/// One over the variances of the joints' residuals, less where these have structure: neighbouring rows then say the
-/// same, and a column counts as the residual's slowest part does,
+/// How many rows of a residual say what one says,
 ///   variance of a mean / that of white noise = S(0) / r(0) (Bartlett's window over two seconds).
+class Dilution {
+ public:
+  /// @param e neighbouring rows @param row_s from one to the next [s]
+  void add(const Eigen::VectorXd& e, double row_s);
+  double value() const { return square_ > 0 ? std::max(1.0, 1 + lagged_ / square_) : 1; }
+
+ private:
+  double square_ = 0, lagged_ = 0;
+};
+
+/// One over the variances of the joints' residuals, less where these have structure: neighbouring rows then say the
+/// same, and a column counts as the residual's slowest part does (Dilution).
 Eigen::VectorXd diluted_weights(const Linearised& problem);
 
 /// For a search of which no name is left: the models that it began with, with their standard deviations. What the

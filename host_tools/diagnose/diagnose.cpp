@@ -15,11 +15,11 @@
 #include "host_tools/diagnose/gate.hpp"
 #include "host_tools/diagnose/harmless.hpp"
 #include "host_tools/diagnose/healthy_session.hpp"
+#include "host_tools/diagnose/left_curves.hpp"
 #include "host_tools/diagnose/nominal_model.hpp"
 #include "host_tools/diagnose/recording_faults.hpp"
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/diagnose/sessions.hpp"
-#include "host_tools/diagnose/time_curve.hpp"
 #include "host_tools/diagnose/verdict.hpp"
 #include "host_tools/effects/braking.hpp"
 #include "host_tools/effects/effects.hpp"
@@ -112,19 +112,11 @@ class Diagnoser {
     add_deviations(before, Linearised(before, logs_));
     result.nominal = before.current;
 
-    Outcome outcome = explore(models_, logs_, task_, 2, progress_);
-    refuse_faulty_recordings(start, outcome);
-    std::optional<Outcome> released = with_free_background(outcome, logs_);
-    const std::vector<EffectCandidate> named = named_in(outcome);
-    Gate gate = pass(outcome, models_.current, logs_, still_);
-    if (released) take_if_better(outcome, gate, std::move(*released), retrial());
-    search_again(named, outcome, gate, retrial(), progress_);
-    if (refit_links(outcome)) gate = pass(outcome, models_.current, logs_, still_);
-    weigh_evidence(outcome, gate);
-    if (settle_rivals(outcome, gate, retrial(), progress_) && refit_links(outcome)) {
-      gate = pass(outcome, models_.current, logs_, still_);
-      weigh_evidence(outcome, gate);
-    }
+    Gate gate;
+    Outcome outcome = found_effects(start, gate);
+    // What wanders may have got the name of an effect, and hides others.
+    const Curves wandering = take_off_what_wanders(outcome, gate, still_, logs_);
+    if (is_any(wandering)) outcome = found_effects(start, gate);
     const std::vector<Likely> likely = set_aside(outcome, gate, models_.current, logs_, still_);
     result.nominal = finished(result.nominal);
     const IdentifiedModel judged_against = deflections_.found.empty() ? result.nominal : finished(models_.current);
@@ -136,7 +128,7 @@ class Diagnoser {
       result.model = concluded(outcome, gate);
     }
     if (models_.has_baseline) add_notes(changed_parameters(*outcome.problem));
-    const auto curves = curves_of_the_rest(outcome, gate);
+    const Curves curves = curves_of_the_rest(outcome, gate, still_, wandering, logs_);
     const auto impacts = find_impacts(result.model, data_.logs, outcome.models.healthy, baseline_, options().impact);
     result.report = verdicts({result.nominal, result.model, outcome, gate, likely, deflections_, impacts, curves,
                               still_, data_.logs, test_});
@@ -194,21 +186,23 @@ class Diagnoser {
     mark_named(model, outcome);
     return finished(model);
   }
-  /// What is left without a name gets a curve, by joint. It says which variable, and where: of the motion, or else of
-  /// time.
-  std::vector<std::optional<CurveResult>> curves_of_the_rest(const Outcome& outcome, const Gate& gate) const {
-    std::vector<std::optional<CurveResult>> out(joints());
-    Models models = with_findings(outcome);
-    std::vector<bool> without = still_;
-    for (std::size_t j = 0; j < joints(); ++j) without[j] = without[j] || (!outcome.structured(j) && !gate.remains[j]);
-    for (const FreeCurve& curve : add_free_curves(models, logs_, without))
-      out[curve.effect.joint] = drawn(models, curve, logs_);
-    // What comes and goes by itself passes for noise that remembers, wherever nothing else is left.
-    const Linearised problem(models, logs_, plain());
-    parallel_for(joints(), [&](std::size_t j) {
-      if (!still_[j] && !out[j]) out[j] = time_curve(problem, j);
-    });
-    return out;
+  /// What the logs show beside the nominal model, and what the data that fitted nothing say of it.
+  /// @param start for faults of the recordings
+  Outcome found_effects(const Models& start, Gate& gate) {
+    Outcome outcome = explore(models_, logs_, task_, 2, progress_);
+    refuse_faulty_recordings(start, outcome);
+    std::optional<Outcome> released = with_free_background(outcome, logs_);
+    const std::vector<EffectCandidate> named = named_in(outcome);
+    gate = pass(outcome, models_.current, logs_, still_);
+    if (released) take_if_better(outcome, gate, std::move(*released), retrial());
+    search_again(named, outcome, gate, retrial(), progress_);
+    if (refit_links(outcome)) gate = pass(outcome, models_.current, logs_, still_);
+    weigh_evidence(outcome, gate);
+    if (settle_rivals(outcome, gate, retrial(), progress_) && refit_links(outcome)) {
+      gate = pass(outcome, models_.current, logs_, still_);
+      weigh_evidence(outcome, gate);
+    }
+    return outcome;
   }
   /// The model has the curves that are told of, where validate logs confirm each: beyond the motion that fitted it, a
   /// curve is a guess.
@@ -236,12 +230,6 @@ class Diagnoser {
     if (is_worse_anywhere(result.model, with) || !std::all_of(curves.begin(), curves.end(), falls)) return;
     result.model = std::move(with);
     for (const FreeCurve& curve : curves) told[curve.effect.joint].curve->in_model = true;
-  }
-  /// With what is likely only as what is established.
-  static Models with_findings(const Outcome& outcome) {
-    Models models = outcome.models;
-    for (const Finding& finding : outcome.found) effect_of(models.current, finding.id).named = true;
-    return models;
   }
   static EffectFit& effect_of(IdentifiedModel& model, const EffectId& id) {
     return id.body ? model.body[id.effect] : model.joints[id.joint].effects[id.effect];

@@ -71,6 +71,8 @@ struct SessionOptions {
   double most_rows = 60'000;
   /// s; of all logs together that stay, however many rows a second they have; hand: 160 s and as much of a baseline
   double least_kept_s = 320;
+  /// share of its range in the logs; a joint that moves less in the windows would not be known: then none are cut; hand
+  double least_in_windows = 0.1;
   /// s; length of such a window; hand: a few reversals of a slow motion
   double window_s = 20;
   /// s; before and after it, at least; what effects with memory were before the window fades; hand
@@ -183,9 +185,6 @@ struct CurveOptions {
   double height = 1;
   /// share of the error's power on what judges; a curve takes away; hand: for less twelve numbers are too many
   double least_share = 0.1;
-  /// share of the error's power that a curve over time takes away, beyond what one of the healthy session does; hand:
-  /// offsets and friction of sound robots that wander a little had up to 0.09 on tuning seeds
-  double least_share_in_time = 0.15;
   /// s; a curve over time is judged by stretches of it that it did not fit; hand: noise that remembers half a second
   /// does not reach across
   double left_out_s = 2;

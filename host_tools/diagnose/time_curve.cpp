@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "host_tools/diagnose/curve_sentence.hpp"
+#include "host_tools/diagnose/deviations.hpp"
 #include "host_tools/diagnose/features.hpp"
 #include "host_tools/diagnose/finding.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/effects/model_parts.hpp"
+#include "host_tools/logs/log.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "model/effects/curve.hpp"
 #include "model/numbers.hpp"
@@ -21,17 +24,22 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr std::size_t turns = 5;
-/// Numeric choices: knots at most, and points drawn between two of them.
-constexpr Index most_pieces = 300, points_a_piece = 4;
+/// Numeric choices: knots at most, and points drawn a piece.
+constexpr Index most_pieces = 300, points_a_piece = 2;
+/// What is left of data without noise is rounding: this share of their power.
+constexpr double rounding = 1e-14;
 /// Rows a coefficient at least.
 constexpr double fewest_rows = 5;
 
-/// Sums of products of some rows' columns by the stretch of time that they are in, every fifth together.
+/// Sums of products of some rows' columns by the stretch of time that they are in, every fifth or so together.
 class FoldSums {
  public:
   FoldSums(const MatrixXd& x, const TimedRows& rows, double stretch_s) {
-    for (Index i = 0; i < rows.t.size(); ++i)
-      rows_[static_cast<std::size_t>(std::floor((rows.t[i] - rows.t[0]) / stretch_s)) % turns].push_back(i);
+    for (Index i = 0; i < rows.t.size(); ++i) {
+      // One more each time: a motion that repeats itself would be left out at one phase.
+      const auto stretch = static_cast<std::size_t>(std::floor((rows.t[i] - rows.t[0]) / stretch_s));
+      rows_[(stretch + stretch / turns) % turns].push_back(i);
+    }
     whole_.gram.setZero(x.cols(), x.cols());
     whole_.projection.setZero(x.cols());
     for (std::size_t k = 0; k < turns; ++k) {
@@ -99,17 +107,10 @@ class FoldSums {
   Sums whole_{{}, {}, 0};
 };
 
-/// How many rows' errors say what one says: Bartlett's window over two seconds, as in diluted_weights().
-double dilution(const VectorXd& e, double row_s) {
-  const auto span = std::min<Index>(e.size(), static_cast<Index>(std::lround(2 / row_s)));
-  double sum = 0;
-  for (Index lag = 1; lag < span; ++lag)
-    sum += 2 * (1 - static_cast<double>(lag) / static_cast<double>(span)) *
-           e.head(e.size() - lag).dot(e.tail(e.size() - lag));
-  return std::max(1.0, 1 + sum / std::max(e.squaredNorm(), 1e-300));
-}
-
 double mean_square(const VectorXd& e) { return e.squaredNorm() / static_cast<double>(std::max<Index>(e.size(), 1)); }
+
+/// Where the curve is drawn: both ends of every piece, and between them.
+Index points_of(const TimeFit& fit) { return points_a_piece * (fit.heights.size() - 3) + 1; }
 
 MatrixXd columns_of(const TimeFit& fit, const TimedRows& rows) {
   MatrixXd out = bumps_over_time(fit, rows.t);
@@ -117,51 +118,44 @@ MatrixXd columns_of(const TimeFit& fit, const TimedRows& rows) {
   return out;
 }
 
-/// Logs of one clock: all of today's session, or the longest recording of either session.
-std::vector<std::size_t> logs_of_one_clock(const Linearised& problem, bool healthy) {
-  std::vector<std::size_t> out;
-  Index longest = 0;
-  for (const std::vector<std::size_t>& windows : by_recording(problem.logs())) {
-    if (problem.logs()[windows.front()].healthy != healthy) continue;
-    Index rows = 0;
-    for (const std::size_t l : windows) rows += problem.blocks().of_log[l].count;
-    if (!healthy && problem.models().current->session) {
-      out.insert(out.end(), windows.begin(), windows.end());
-    } else if (rows > longest) {
-      longest = rows;
-      out = windows;
-    }
-  }
-  std::sort(out.begin(), out.end(),
-            [&](std::size_t a, std::size_t b) { return problem.motion(a).t[0] < problem.motion(b).t[0]; });
+/// Those that judge are fitted too: their errors would be of another kind.
+std::vector<std::size_t> all_blocks(const Linearised& problem) {
+  std::vector<std::size_t> out(problem.blocks().all.size());
+  std::iota(out.begin(), out.end(), std::size_t{0});
   return out;
 }
 
-/// Rows where the encoder shows which way the joint moves.
-/// @param state rivals of all rows
-TimedRows rows_of(const Linearised& problem, std::size_t joint, const std::vector<std::size_t>& logs,
-                  const MatrixXd& state) {
-  const LinearFit fit = problem.solver().solve(problem.columns_of(in_model(problem)));
-  const VectorXd e = problem.solver().residual(joint, fit);
-  const double width = joints_of(problem.models().current)[joint].sign_width;
-  std::vector<double> t, sign;
-  std::vector<Index> kept;
-  for (const std::size_t l : logs) {
-    const ProcessedLog& log = problem.logs()[l].log;
-    const Block& block = problem.blocks().of_log[l];
-    const VectorXd times = log.decimate(problem.motion(l).t);
-    const VectorXd dq = log.decimate(problem.motion(l).dq.col(static_cast<Index>(joint)));
-    for (Index i = 0; i < block.count; ++i) {
-      if (problem.noise().is_doubtful(joint, block.first + i)) continue;
-      kept.push_back(block.first + i);
-      t.push_back(times[i]);
-      sign.push_back(std::tanh(dq[i] / width));
-    }
+/// Windows of each recording of a session that share a clock, in the order of their times.
+std::vector<std::vector<std::size_t>> clocks_of(const Linearised& problem, bool healthy) {
+  std::vector<std::vector<std::size_t>> out;
+  const bool one = !healthy && problem.models().current->session;
+  for (const std::vector<std::size_t>& windows : by_recording(problem.logs())) {
+    if (problem.logs()[windows.front()].healthy != healthy) continue;
+    if (!one || out.empty()) out.emplace_back();
+    out.back().insert(out.back().end(), windows.begin(), windows.end());
   }
-  const auto vector = [](const std::vector<double>& of) {
-    return VectorXd(Eigen::Map<const VectorXd>(of.data(), static_cast<Index>(of.size())));
-  };
-  return {vector(t), e(kept), vector(sign), state(kept, Eigen::all)};
+  for (std::vector<std::size_t>& logs : out) {
+    std::sort(logs.begin(), logs.end(),
+              [&](std::size_t a, std::size_t b) { return problem.motion(a).t[0] < problem.motion(b).t[0]; });
+  }
+  return out;
+}
+
+/// Drawn where there are rows, without what an offset, or dry friction, is of it: that is nominal.
+void draw(const TimeFit& fit, const TimedRows& rows, CurveResult& to) {
+  const Index points = points_of(fit);
+  const VectorXd t =
+      VectorXd::LinSpaced(points, fit.from, fit.from + fit.knot_s * static_cast<double>(fit.heights.size() - 3));
+  MatrixXd x = bumps_over_time(fit, t);
+  x.rowwise() -= bumps_over_time(fit, rows.t).colwise().mean().eval();
+  const VectorXd y = x * fit.heights;
+  const VectorXd variance = (x * fit.covariance).cwiseProduct(x).rowwise().sum();
+  const double *begin = rows.t.data(), *end = begin + rows.t.size(), *next = begin;
+  for (Index i = 0; i < points; ++i) {
+    next = std::lower_bound(next, end, t[i]);
+    const bool near = (next != end && *next - t[i] < fit.knot_s) || (next != begin && t[i] - *(next - 1) < fit.knot_s);
+    if (near) to.points.push_back({t[i], y[i], std::sqrt(std::max(variance[i], 0.0) + fit.misfit)});
+  }
 }
 
 }  // namespace
@@ -180,9 +174,34 @@ MatrixXd bumps_over_time(const TimeFit& fit, const VectorXd& t) {
   return out;
 }
 
+namespace {
+
+/// Variance of what the curve can't follow: that of the residual's means between two drawn points, less what noise
+/// makes of them.
+double misfit(const TimeFit& fit, const TimedRows& rows, const VectorXd& residual, double diluted) {
+  const auto bins = points_of(fit);
+  VectorXd sum = VectorXd::Zero(bins), count = VectorXd::Zero(bins);
+  for (Index i = 0; i < residual.size(); ++i) {
+    const auto bin = std::clamp<Index>(
+        static_cast<Index>((rows.t[i] - fit.from) / fit.knot_s * static_cast<double>(points_a_piece)), 0, bins - 1);
+    sum[bin] += residual[i] * (fit.friction ? rows.sign[i] : 1);
+    count[bin] += fit.friction ? rows.sign[i] * rows.sign[i] : 1;
+  }
+  double of_means = 0, used = 0;
+  for (Index bin = 0; bin < bins; ++bin) {
+    if (!(count[bin] > 0)) continue;
+    of_means += sum[bin] * sum[bin] / count[bin];
+    used += 1;
+  }
+  const double noise = std::max(0.0, residual.squaredNorm() - of_means) / std::max(count.sum() - used, 1.0);
+  return std::max(0.0, of_means - used * noise * diluted) / std::max(count.sum(), 1.0);
+}
+
+}  // namespace
+
 std::optional<TimeFit> fit_over_time(const TimedRows& rows, double size, double row_s, const CurveOptions& options) {
   const Index count = rows.t.size();
-  if (count == 0) return {};
+  if (count == 0 || !(rows.e.squaredNorm() > 0) || !(size > 0)) return {};
   const double seconds = rows.t[count - 1] - rows.t[0];
   std::optional<TimeFit> best;
   double least = 1e300, tried = 0;
@@ -208,9 +227,12 @@ std::optional<TimeFit> fit_over_time(const TimedRows& rows, double size, double 
   const MatrixXd x = columns_of(*best, rows);
   const FoldSums sums(x, rows, options.left_out_s);
   best->heights = sums.coefficients(prior);
-  const double diluted = dilution(sums.errors(prior, x, rows.e), row_s);
+  Dilution dilution;
+  dilution.add(sums.errors(prior, x, rows.e), row_s);
+  const double diluted = dilution.value();
   best->covariance = sums.covariance(prior, diluted * least / static_cast<double>(count));
-  best->closes = 1 - least / sums.square();
+  best->closes = std::min(1.0, 1 - least / sums.square());
+  best->misfit = misfit(*best, rows, rows.e - x * best->heights, diluted);
   best->closes_std = sums.deviation(prior);
   best->odds_nothing =
       static_cast<double>(count) / diluted * std::log(sums.square() / least) / variances_per_decade - std::log10(tried);
@@ -223,26 +245,75 @@ std::optional<TimeFit> fit_over_time(const TimedRows& rows, double size, double 
   return best;
 }
 
-std::optional<CurveResult> time_curve(const Linearised& problem, std::size_t joint) {
-  const Options& options = problem.options();
-  const std::vector<std::size_t> logs = logs_of_one_clock(problem, false);
-  if (logs.empty()) return {};
-  MatrixXd state = features(problem, joint);
+TimeCurves::TimeCurves(const Linearised& problem)
+    : problem_(problem),
+      fit_(problem.solver().solve(problem.columns_of(in_model(problem)), all_blocks(problem))),
+      clocks_(clocks_of(problem, false)) {
+  const auto rows = [&](const std::vector<std::size_t>& logs) {
+    Index sum = 0;
+    for (const std::size_t l : logs) sum += problem.blocks().of_log[l].count;
+    return sum;
+  };
+  for (const std::vector<std::size_t>& recording : clocks_of(problem, true)) {
+    if (rows(recording) > rows(healthy_)) healthy_ = recording;
+  }
+}
+
+/// Rows where the encoder shows which way the joint moves. @param state rivals of all rows
+TimedRows TimeCurves::rows_of(const std::vector<std::size_t>& logs, std::size_t joint, const MatrixXd& state) const {
+  const VectorXd e = problem_.solver().residual(joint, fit_);
+  const double width = joints_of(problem_.models().current)[joint].sign_width;
+  std::vector<double> t, sign;
+  std::vector<Index> kept;
+  for (const std::size_t l : logs) {
+    const ProcessedLog& log = problem_.logs()[l].log;
+    const Block& block = problem_.blocks().of_log[l];
+    const VectorXd times = log.decimate(problem_.motion(l).t);
+    const VectorXd dq = log.decimate(problem_.motion(l).dq.col(static_cast<Index>(joint)));
+    for (Index i = 0; i < block.count; ++i) {
+      if (problem_.noise().is_doubtful(joint, block.first + i)) continue;
+      kept.push_back(block.first + i);
+      t.push_back(times[i]);
+      sign.push_back(std::tanh(dq[i] / width));
+    }
+  }
+  const auto vector = [](const std::vector<double>& of) {
+    return VectorXd(Eigen::Map<const VectorXd>(of.data(), static_cast<Index>(of.size())));
+  };
+  return {vector(t), e(kept), vector(sign), state(kept, Eigen::all)};
+}
+
+std::vector<CurveResult> TimeCurves::at(std::size_t joint) const {
+  const auto j = static_cast<Index>(joint);
+  if (!(fit_.square[j] > rounding * problem_.solver().rows(joint).y.squaredNorm())) return {};
+  MatrixXd state = features(problem_, joint);
   state.conservativeResize(Eigen::NoChange, state.cols() - time_features);
-  const SessionLog& first = problem.logs()[logs.front()];
+  std::vector<CurveResult> out;
+  for (const std::vector<std::size_t>& clock : clocks_) {
+    if (std::optional<CurveResult> curve = over(clock, joint, rows_of(clock, joint, state)))
+      out.push_back(std::move(*curve));
+  }
+  std::sort(out.begin(), out.end(),
+            [](const CurveResult& a, const CurveResult& b) { return a.odds_nothing > b.odds_nothing; });
+  return out;
+}
+
+std::optional<CurveResult> TimeCurves::over(const std::vector<std::size_t>& clock, std::size_t joint,
+                                            const TimedRows& rows) const {
+  const Options& options = problem_.options();
+  const SessionLog& first = problem_.logs()[clock.front()];
   const double row_s = first.log.step_s * static_cast<double>(first.log.decimation);
-  const double size = options.curve.height / std::sqrt(problem.solver().weights()[static_cast<Index>(joint)]);
-  const TimedRows rows = rows_of(problem, joint, logs, state);
+  const double size = options.curve.height / std::sqrt(problem_.solver().weights()[static_cast<Index>(joint)]);
   const std::optional<TimeFit> fit = fit_over_time(rows, size, row_s, options.curve);
-  if (!fit || fit->odds_nothing < options.gate.established || fit->closes < options.curve.least_share_in_time ||
-      fit->square_of_rivals < 1 - fit->closes)
-    return {};
-  if (problem.has_baseline()) {
-    const MatrixXd no_rivals(problem.blocks().rows(), 0);
-    const TimedRows before = rows_of(problem, joint, logs_of_one_clock(problem, true), no_rivals);
+  const auto counts = [&](double share) { return share >= options.gate.beyond_noise * (1 - share); };
+  const bool is_sure = fit && fit->odds_nothing >= options.gate.established && counts(fit->closes) &&
+                       fit->square_of_rivals >= 1 - fit->closes;
+  if (!is_sure) return {};
+  if (!healthy_.empty()) {
+    const TimedRows before = rows_of(healthy_, joint, MatrixXd(problem_.blocks().rows(), 0));
     const std::optional<TimeFit> healthy = fit_over_time(before, size, row_s, options.curve);
     const double also = healthy ? std::max(0.0, healthy->closes) * mean_square(before.e) / mean_square(rows.e) : 0;
-    if (fit->closes - also < options.curve.least_share_in_time) return {};
+    if (!counts(fit->closes - also)) return {};
   }
   CurveResult out;
   out.effect = "time_curve";
@@ -252,16 +323,27 @@ std::optional<CurveResult> time_curve(const Linearised& problem, std::size_t joi
   out.odds_nothing = fit->odds_nothing;
   out.closes = fit->closes;
   out.closes_std = fit->closes_std;
-  if (!problem.models().current->session) out.log = first.log.name;
-  const Index pieces = fit->heights.size() - 3, points = points_a_piece * pieces + 1;
-  const VectorXd t = VectorXd::LinSpaced(points, fit->from, fit->from + fit->knot_s * static_cast<double>(pieces));
-  MatrixXd x = bumps_over_time(*fit, t);
-  x.rowwise() -= x.colwise().mean().eval();  // an offset, or dry friction, is nominal
-  const VectorXd y = x * fit->heights;
-  const VectorXd variance = (x * fit->covariance).cwiseProduct(x).rowwise().sum();
-  for (Index i = 0; i < points; ++i) out.points.push_back({t[i], y[i], std::sqrt(std::max(variance[i], 0.0))});
-  tell(out, robot_of(problem.models().current), joint, problem.logs());
+  if (clocks_.size() > 1) out.log = first.log.name;
+  draw(*fit, rows, out);
+  tell(out, robot_of(problem_.models().current), joint, problem_.logs());
   return out;
+}
+
+void take_off(const CurveResult& curve, std::size_t joint, double sign_width, std::vector<SessionLog>& logs) {
+  const auto n = static_cast<Index>(curve.points.size()), j = static_cast<Index>(joint);
+  VectorXd x(n), y(n);
+  for (Index i = 0; i < n; ++i) {
+    x[i] = curve.points[static_cast<std::size_t>(i)].x;
+    y[i] = curve.points[static_cast<std::size_t>(i)].y;
+  }
+  for (SessionLog& entry : logs) {
+    ProcessedLog& log = entry.log;
+    const bool is_of = curve.log.empty() || curve.log == log.name;
+    if (entry.healthy || !is_of || log.t[log.last - 1] < x[0] || log.t[log.first] > x[n - 1]) continue;
+    VectorXd torque = interpolate(y, x, log.t.cwiseMax(x[0]).cwiseMin(x[n - 1])).col(0);
+    if (curve.friction) torque.array() *= (log.joint_velocity(j) / sign_width).array().tanh();
+    log.tau.col(j) -= torque;
+  }
 }
 
 }  // namespace fxdyn::diagnosis

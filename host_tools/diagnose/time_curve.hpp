@@ -27,6 +27,7 @@ struct TimeFit {
   double odds_nothing = 0;      ///< log10, on stretches that did not fit it
   double closes = 0;            ///< share of the error's power that it takes away there
   double closes_std = 0;        ///< .. by how these stretches differ
+  double misfit = 0;            ///< variance of what it can't follow
   double square_of_rivals = 0;  ///< what functions of the state leave there, of what was there
 };
 
@@ -42,10 +43,29 @@ std::optional<TimeFit> fit_over_time(const TimedRows& rows, double size, double 
 /// Heights' factors at times, times x heights.
 Eigen::MatrixXd bumps_over_time(const TimeFit& fit, const Eigen::VectorXd& t);
 
-/// The curve of what is left at a joint over time, for the session alone: no drive knows the time at which a pump
-/// starts. None where it is not sure, where functions of the state leave less, or where the healthy session's residual
-/// wanders as much.
-/// @param problem with what was found, not whitened
-std::optional<CurveResult> time_curve(const Linearised& problem, std::size_t joint);
+/// Curves of what is left over time, for the session alone: no drive knows the time at which a pump starts.
+class TimeCurves {
+ public:
+  /// @param problem with what was found, not whitened; has to live as long
+  explicit TimeCurves(const Linearised& problem);
+  /// Those of a joint, the surest first: one of the session, or of each recording where they share no clock. None that
+  /// is not sure, of which functions of the state leave less, or where the healthy session's residual wanders as much.
+  /// Safe from several threads.
+  std::vector<CurveResult> at(std::size_t joint) const;
+
+ private:
+  std::optional<CurveResult> over(const std::vector<std::size_t>& clock, std::size_t joint,
+                                  const TimedRows& rows) const;
+  TimedRows rows_of(const std::vector<std::size_t>& logs, std::size_t joint, const Eigen::MatrixXd& state) const;
+
+  const Linearised& problem_;
+  LinearFit fit_;
+  std::vector<std::vector<std::size_t>> clocks_;  ///< today's logs that share one
+  std::vector<std::size_t> healthy_;              ///< windows of the healthy session's longest recording
+};
+
+/// Takes a curve over time off the torque of the logs that it is of.
+/// @param sign_width of the joint's Coulomb friction [rad/s | m/s]
+void take_off(const CurveResult& curve, std::size_t joint, double sign_width, std::vector<SessionLog>& logs);
 
 }  // namespace fxdyn::diagnosis

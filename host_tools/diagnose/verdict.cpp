@@ -8,7 +8,6 @@
 
 #include "host_tools/diagnose/curve_sentence.hpp"
 #include "host_tools/diagnose/explore.hpp"
-#include "host_tools/diagnose/free_curves.hpp"
 #include "host_tools/diagnose/gap_errors.hpp"
 #include "host_tools/diagnose/where.hpp"
 #include "host_tools/diagnose/where_words.hpp"
@@ -338,7 +337,12 @@ class ReportWriter {
       out.where = place_of_gap(j, std::min(of.floor, of.before), left ? curve : std::nullopt);
     }
     if (left && of_torque) note_doubtful_direction(j);
-    if (left && !only_impacts) advise_on_gap(j, out.where.regions);
+    if (state.wanders) {
+      advise(fmt::format("joint {}: note what switches on and off nearby, and record the same motion at another time",
+                         j + 1));
+    } else if (left && !only_impacts) {
+      advise_on_gap(j, out.where.regions);
+    }
     if (state.bends) {
       notes_.push_back(
           fmt::format("{}: the deflection that the link encoder shows is none that has a name", joint_of(j).name));
@@ -349,13 +353,13 @@ class ReportWriter {
     out.gate_after = of.gate_after;
     // On other logs than those that judged, either model may show that there is less noise.
     out.noise_floor = std::min({of.floor, of.before, of.after});
-    // What wanders passed for noise.
-    const bool hidden = state.wanders && !state.structured && !state.remains;
-    if (hidden) *out.noise_floor *= std::sqrt(1 - curve->closes);
+    // What wanders was taken off before anything was judged, and is no noise.
+    if (state.wanders) *out.noise_floor *= std::sqrt(1 - curve->closes);
     if (of_torque) {
       out.closure = conclusion_.gate.closure[k];
       const Share share = diagnosis::left_of(conclusion_.gate.held, conclusion_.gate.gap[k], k);
-      out.left = hidden ? left_of(*curve, of) : GapLeft{share.share, share.low, share.high};
+      out.left = GapLeft{share.share, share.low, share.high};
+      if (state.wanders) out.left = more_of(*out.left, left_of(*curve, of));
     }
     if (left) out.curve = curve;
     out.not_identifiable = conclusion_.outcome.not_identifiable[j];
@@ -364,7 +368,10 @@ class ReportWriter {
     return out;
   }
 
-  /// .. where a curve over time is all that is left.
+  static GapLeft more_of(const GapLeft& a, const GapLeft& b) {
+    return {std::max(a.share, b.share), std::max(a.low, b.low), std::max(a.high, b.high)};
+  }
+  /// .. of what wanders.
   static GapLeft left_of(const CurveResult& curve, const GapFigures& of) {
     const double after = of.gate_after * of.gate_after, closed = std::max(of.gate_before * of.gate_before - after, 0.0);
     const auto share = [&](double closes) {

@@ -25,13 +25,9 @@ std::string between(const GapRegion& region, const std::string& unit) {
 /// A log's first or last seconds, where the interval begins or ends within a class of 24 of its end; else a time of its
 /// clock.
 std::string words_of_time(const GapRegion& region, const std::vector<const ProcessedLog*>& logs) {
-  const auto found = std::find_if(logs.begin(), logs.end(), [&](const ProcessedLog* log) {
-    // Two windows of one file are two logs of one name.
-    return log->name == region.log && log->t[log->first] <= region.from && region.from <= log->t[log->last - 1];
-  });
   double first = 1e300, last = -1e300;  // of a session: from its first log to its last
   for (const ProcessedLog* log : logs) {
-    if (found != logs.end() && log != *found) continue;
+    if (!region.log.empty() && log->name != region.log) continue;
     first = std::min(first, log->t[log->first]);
     last = std::max(last, log->t[log->last - 1]);
   }

@@ -11,8 +11,8 @@ using Eigen::ArrayXd;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-/// A joint that moves in the windows by less than this share of its whole range would be told by next to nothing.
-constexpr double least_motion = 0.1;
+/// Of many logs each may keep little: no window is shorter.
+constexpr double shortest_window_s = 4;
 
 /// Rows that a recording may keep, so that all together keep `room`: those that have fewer stay whole.
 double most_rows_each(const std::vector<SessionLog>& logs, double room) {
@@ -32,8 +32,9 @@ double most_rows_each(const std::vector<SessionLog>& logs, double room) {
 void cut(const SessionLog& entry, double most, const SessionOptions& options, std::vector<SessionLog>& out) {
   const ProcessedLog& log = entry.log;
   const auto samples_of = [&](double seconds) { return static_cast<Index>(std::lround(seconds / log.step_s)); };
-  const Index whole = log.last - log.first, length = std::max<Index>(1, samples_of(options.window_s));
+  const Index whole = log.last - log.first;
   const auto kept = static_cast<Index>(std::lround(most * static_cast<double>(log.decimation)));
+  const Index length = std::max(samples_of(shortest_window_s), std::min(samples_of(options.window_s), kept));
   const Index count = std::max<Index>(1, kept / length);
   if (whole <= kept || count * length >= whole) {
     out.push_back(entry);
@@ -68,9 +69,9 @@ ArrayXd ranges(const std::vector<SessionLog>& logs, bool healthy) {
   return high - low;
 }
 
-bool all_move(const std::vector<SessionLog>& windows, const std::vector<SessionLog>& logs) {
+bool all_move(const std::vector<SessionLog>& windows, const std::vector<SessionLog>& logs, double least) {
   for (const bool healthy : {false, true}) {
-    if (!(ranges(windows, healthy) >= least_motion * ranges(logs, healthy)).all()) return false;
+    if (!(ranges(windows, healthy) >= least * ranges(logs, healthy)).all()) return false;
   }
   return true;
 }
@@ -134,7 +135,7 @@ std::vector<SessionLog> in_windows(std::vector<SessionLog> logs, const SessionOp
   const double most = most_rows_each(logs, room);
   std::vector<SessionLog> out;
   for (const SessionLog& entry : logs) cut(entry, most, options, out);
-  return all_move(out, logs) ? out : logs;
+  return all_move(out, logs, options.least_in_windows) ? out : logs;
 }
 
 }  // namespace fxdyn::diagnosis

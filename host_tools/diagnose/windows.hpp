@@ -8,10 +8,10 @@
 namespace fxdyn::diagnosis {
 
 /// Recordings that are longer than a diagnosis has room for, as windows: parts of equal length, spread evenly over each
-/// of them. Slow changes show in them as in the whole, and memory and time no longer grow with the length. The longest
-/// recordings give up rows first: all that are cut keep the same number, and shorter ones stay whole. Every window is a
-/// log of its own, as old as the session is when it begins; those of one recording follow each other, and all but the
-/// first continue it.
+/// of them. Slow changes show in them as in the whole, and what the search takes no longer grows with the length. The
+/// longest recordings give up rows first: all that are cut keep the same number, and shorter ones stay whole. Every
+/// window is a log of its own, as old as the session is when it begins; those of one recording follow each other, and
+/// all but the first continue it.
 /// @param logs with the decimation that they are to have @returns them as they are, where there is room for all, or
 /// where some joint moves in no window by a tenth of what it moves in its session
 std::vector<SessionLog> in_windows(std::vector<SessionLog> logs, const SessionOptions& options);

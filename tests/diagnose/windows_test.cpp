@@ -86,6 +86,13 @@ TEST(Windows, ShortLogsStayWhole) {
   EXPECT_GE(rows, 3500);
 }
 
+TEST(Windows, ManyLogsKeepLittleEach) {
+  std::vector<SessionLog> logs(60, log_of(60));
+  const auto out = in_windows(logs, room_for(60 * 2 * 80));  // 8 s each
+  EXPECT_EQ(out.size(), 60U);
+  for (const SessionLog& entry : out) EXPECT_EQ(entry.log.rows(), 80);
+}
+
 TEST(Windows, SomeSecondsStayHoweverManyRowsTheyHave) {
   SessionOptions options = room_for(2000);
   options.least_kept_s = 300;

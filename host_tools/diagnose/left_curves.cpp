@@ -1,0 +1,80 @@
+#include "host_tools/diagnose/left_curves.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "host_tools/diagnose/free_curves.hpp"
+#include "host_tools/diagnose/time_curve.hpp"
+#include "host_tools/effects/model_parts.hpp"
+#include "host_tools/support/parallel.hpp"
+
+namespace fxdyn::diagnosis {
+namespace {
+
+using AllCurves = std::vector<std::vector<CurveResult>>;
+
+/// By joint.
+AllCurves over_time(const Models& models, const std::vector<SessionLog>& logs, const std::vector<bool>& still) {
+  AllCurves out(still.size());
+  const Linearised problem(models, logs, std::vector<Eigen::VectorXd>(still.size(), Eigen::VectorXd::Zero(1)));
+  const TimeCurves curves(problem);
+  parallel_for(still.size(), [&](std::size_t j) {
+    if (!still[j]) out[j] = curves.at(j);
+  });
+  return out;
+}
+
+/// Adds the curves of the motion to the models. @returns them
+Curves of_motion(Models& models, const Outcome& outcome, const Gate& gate, const std::vector<bool>& still,
+                 const std::vector<SessionLog>& logs) {
+  Curves out(still.size());
+  std::vector<bool> without = still;
+  for (std::size_t j = 0; j < still.size(); ++j)
+    without[j] = without[j] || (!outcome.structured(j) && !gate.remains[j]);
+  for (const FreeCurve& curve : add_free_curves(models, logs, without))
+    out[curve.effect.joint] = drawn(models, curve, logs);
+  return out;
+}
+
+}  // namespace
+
+bool is_any(const Curves& curves) {
+  return std::any_of(curves.begin(), curves.end(), [](const auto& curve) { return curve.has_value(); });
+}
+
+Models with_findings(const Outcome& outcome) {
+  Models models = outcome.models;
+  for (const Finding& finding : outcome.found) {
+    const EffectId& id = finding.id;
+    (id.body ? body_of(models.current)[id.effect] : joints_of(models.current)[id.joint].effects[id.effect]).named =
+        true;
+  }
+  return models;
+}
+
+Curves curves_of_the_rest(const Outcome& outcome, const Gate& gate, const std::vector<bool>& still,
+                          const Curves& wandering, const std::vector<SessionLog>& logs) {
+  Models models = with_findings(outcome);
+  Curves out = of_motion(models, outcome, gate, still, logs);
+  for (std::size_t j = 0; j < still.size(); ++j) {
+    if (wandering[j]) out[j] = wandering[j];
+  }
+  return out;
+}
+
+Curves take_off_what_wanders(const Outcome& outcome, const Gate& gate, const std::vector<bool>& still,
+                             std::vector<SessionLog>& logs) {
+  Curves out(still.size());
+  Models models = with_findings(outcome);
+  AllCurves all = over_time(models, logs, still);
+  if (std::all_of(all.begin(), all.end(), [](const auto& of_joint) { return of_joint.empty(); })) return out;
+  const Curves known = of_motion(models, outcome, gate, still, logs);
+  for (std::size_t j = 0; j < still.size(); ++j) {
+    if (known[j] || all[j].empty()) continue;
+    for (const CurveResult& curve : all[j]) take_off(curve, j, joints_of(models.current)[j].sign_width, logs);
+    out[j] = std::move(all[j].front());
+  }
+  return out;
+}
+
+}  // namespace fxdyn::diagnosis
