@@ -75,11 +75,6 @@ class FoldSums {
     return out;
   }
   double square() const { return whole_.square; }
-  VectorXd coefficients(double prior) const { return solve(prior, whole_.gram, whole_.projection); }
-  /// @param variance of the noise, of a row that counts as one
-  MatrixXd covariance(double prior, double variance) const {
-    return variance * SymmetricSolver(with(prior, whole_.gram)).inverse();
-  }
 
  private:
   struct Sums {
@@ -226,13 +221,20 @@ std::optional<TimeFit> fit_over_time(const TimedRows& rows, double size, double 
   if (!best) return {};
   const MatrixXd x = columns_of(*best, rows);
   const FoldSums sums(x, rows, options.left_out_s);
-  best->heights = sums.coefficients(prior);
   Dilution dilution;
   dilution.add(sums.errors(prior, x, rows.e), row_s);
   const double diluted = dilution.value();
-  best->covariance = sums.covariance(prior, diluted * least / static_cast<double>(count));
+  // What was fitted before has some of the curve, which the residual lacks: with X its columns and C their covariance,
+  // x is (1 - X C X^T) x to it.
+  MatrixXd shown = x;
+  if (rows.nominal.cols() > 0) shown -= rows.nominal * (rows.covariance * (rows.nominal.transpose() * x));
+  MatrixXd gram = x.transpose() * shown;
+  gram.diagonal().array() += prior;
+  const MatrixXd inverse = SymmetricSolver(gram).inverse();
+  best->heights = inverse * (x.transpose() * rows.e);
+  best->covariance = diluted * least / static_cast<double>(count) * inverse;
   best->closes = std::min(1.0, 1 - least / sums.square());
-  best->misfit = misfit(*best, rows, rows.e - x * best->heights, diluted);
+  best->misfit = misfit(*best, rows, rows.e - shown * best->heights, diluted);
   best->closes_std = sums.deviation(prior);
   best->odds_nothing =
       static_cast<double>(count) / diluted * std::log(sums.square() / least) / variances_per_decade - std::log10(tried);
@@ -248,6 +250,7 @@ std::optional<TimeFit> fit_over_time(const TimedRows& rows, double size, double 
 TimeCurves::TimeCurves(const Linearised& problem)
     : problem_(problem),
       fit_(problem.solver().solve(problem.columns_of(in_model(problem)), all_blocks(problem))),
+      covariance_(SymmetricSolver(fit_.information).inverse()),
       clocks_(clocks_of(problem, false)) {
   const auto rows = [&](const std::vector<std::size_t>& logs) {
     Index sum = 0;
@@ -280,7 +283,20 @@ TimedRows TimeCurves::rows_of(const std::vector<std::size_t>& logs, std::size_t 
   const auto vector = [](const std::vector<double>& of) {
     return VectorXd(Eigen::Map<const VectorXd>(of.data(), static_cast<Index>(of.size())));
   };
-  return {vector(t), e(kept), vector(sign), state(kept, Eigen::all)};
+  return {vector(t), e(kept), vector(sign), state(kept, Eigen::all), {}, {}, kept};
+}
+
+std::pair<MatrixXd, MatrixXd> TimeCurves::nominal_of(std::size_t joint) const {
+  const JointRows& rows = problem_.solver().rows(joint);
+  std::vector<Index> local, whole;
+  for (std::size_t i = 0; i < fit_.columns.size(); ++i) {
+    const Index place = rows.place(fit_.columns[i]);
+    if (place < 0) continue;
+    local.push_back(place);
+    whole.push_back(static_cast<Index>(i));
+  }
+  const double weight = problem_.solver().weights()[static_cast<Index>(joint)];
+  return {rows.x(Eigen::all, local), weight * covariance_(whole, whole)};
 }
 
 std::vector<CurveResult> TimeCurves::at(std::size_t joint) const {
@@ -288,10 +304,13 @@ std::vector<CurveResult> TimeCurves::at(std::size_t joint) const {
   if (!(fit_.square[j] > rounding * problem_.solver().rows(joint).y.squaredNorm())) return {};
   MatrixXd state = features(problem_, joint);
   state.conservativeResize(Eigen::NoChange, state.cols() - time_features);
+  const auto [columns, covariance] = nominal_of(joint);
   std::vector<CurveResult> out;
   for (const std::vector<std::size_t>& clock : clocks_) {
-    if (std::optional<CurveResult> curve = over(clock, joint, rows_of(clock, joint, state)))
-      out.push_back(std::move(*curve));
+    TimedRows rows = rows_of(clock, joint, state);
+    rows.nominal = columns(rows.place, Eigen::all);
+    rows.covariance = covariance;
+    if (std::optional<CurveResult> curve = over(clock, joint, rows)) out.push_back(std::move(*curve));
   }
   std::sort(out.begin(), out.end(),
             [](const CurveResult& a, const CurveResult& b) { return a.odds_nothing > b.odds_nothing; });

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "host_tools/diagnose/linearised.hpp"
@@ -12,10 +13,13 @@ namespace fxdyn::diagnosis {
 
 /// Rows of a joint that a curve over time is fitted to.
 struct TimedRows {
-  Eigen::VectorXd t;       ///< of the session's clock [s]
-  Eigen::VectorXd e;       ///< what the model leaves [N*m | N]
-  Eigen::VectorXd sign;    ///< tanh(dq / width), as Coulomb friction has it
-  Eigen::MatrixXd rivals;  ///< functions of the state, that may explain it as well
+  Eigen::VectorXd t;                  ///< of the session's clock [s]
+  Eigen::VectorXd e;                  ///< what the model leaves [N*m | N]
+  Eigen::VectorXd sign;               ///< tanh(dq / width), as Coulomb friction has it
+  Eigen::MatrixXd rivals;             ///< functions of the state, that may explain it as well
+  Eigen::MatrixXd nominal{};          ///< columns that were fitted before: they have taken some of a curve, too
+  Eigen::MatrixXd covariance{};       ///< .. of their coefficients, over the variance of the noise
+  std::vector<Eigen::Index> place{};  ///< of each among the rows of the problem
 };
 
 /// A curve over time: its knots, heights, and how sure it is.
@@ -57,9 +61,12 @@ class TimeCurves {
   std::optional<CurveResult> over(const std::vector<std::size_t>& clock, std::size_t joint,
                                   const TimedRows& rows) const;
   TimedRows rows_of(const std::vector<std::size_t>& logs, std::size_t joint, const Eigen::MatrixXd& state) const;
+  /// What was fitted before, of the joint: columns of all rows, and their covariance over the noise's variance.
+  std::pair<Eigen::MatrixXd, Eigen::MatrixXd> nominal_of(std::size_t joint) const;
 
   const Linearised& problem_;
   LinearFit fit_;
+  Eigen::MatrixXd covariance_;                    ///< of its coefficients
   std::vector<std::vector<std::size_t>> clocks_;  ///< today's logs that share one
   std::vector<std::size_t> healthy_;              ///< windows of the healthy session's longest recording
 };

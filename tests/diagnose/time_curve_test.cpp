@@ -49,10 +49,11 @@ struct Session {
   ArrayXd phase;
 };
 
-/// Share of the points at which two deviations hold the truth.
-double covered(const TimeFit& fit, const VectorXd& t, const ArrayXd& truth) {
-  const MatrixXd x = bumps_over_time(fit, t);
-  const ArrayXd off = (x * fit.heights).array() - truth;
+/// Share of the points at which two deviations hold the truth. @param without_mean as curves are drawn
+double covered(const TimeFit& fit, const VectorXd& t, const ArrayXd& truth, bool without_mean = false) {
+  MatrixXd x = bumps_over_time(fit, t);
+  if (without_mean) x.rowwise() -= x.colwise().mean().eval();
+  const ArrayXd off = (x * fit.heights).array() - truth + (without_mean ? truth.mean() : 0);
   const ArrayXd std = (x * fit.covariance).cwiseProduct(x).rowwise().sum().array().sqrt();
   return (off.abs() < 2 * std).cast<double>().mean();
 }
@@ -70,6 +71,39 @@ TEST(TimeCurve, FollowsAWaveThatNoMotionMakes) {
     EXPECT_GT(fit->closes, 0.9 * truth.square().sum() / session.rows.e.squaredNorm());
     EXPECT_GT(covered(*fit, session.rows.t, truth), 0.85) << period_s;
   }
+}
+
+/// Columns that wander, as those of a slow motion do.
+MatrixXd wandering_columns(Index rows, Index columns, std::uint64_t seed) {
+  Random random(seed);
+  MatrixXd out(rows, columns);
+  for (Index c = 0; c < columns; ++c) {
+    double last = 0;
+    for (double& x : out.col(c)) x = last = 0.97 * last + random.normal();
+  }
+  return out;
+}
+
+// Columns that were fitted before have taken some of the wave.
+TEST(TimeCurve, GetsBackWhatOtherColumnsTook) {
+  double with = 0, without = 0;
+  constexpr int seeds = 8;
+  for (int seed = 0; seed < seeds; ++seed) {
+    Session session(5 + static_cast<std::uint64_t>(seed));
+    const ArrayXd truth = 0.2 * session.wave(40);
+    session.rows.e += truth.matrix();
+    const MatrixXd columns = wandering_columns(session.rows.t.size(), 15, 100 + static_cast<std::uint64_t>(seed));
+    session.rows.covariance = (columns.transpose() * columns).inverse();
+    session.rows.e -= columns * (session.rows.covariance * (columns.transpose() * session.rows.e));
+    const auto lacking = session.fit();
+    session.rows.nominal = columns;
+    const auto whole = session.fit();
+    ASSERT_TRUE(lacking && whole);
+    without += covered(*lacking, session.rows.t, truth, true) / seeds;
+    with += covered(*whole, session.rows.t, truth, true) / seeds;
+  }
+  EXPECT_LT(without, 0.8);
+  EXPECT_GT(with, 0.9);
 }
 
 TEST(TimeCurve, TellsFrictionByTheDirection) {
