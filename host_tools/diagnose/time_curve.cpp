@@ -9,6 +9,7 @@
 #include "host_tools/diagnose/deviations.hpp"
 #include "host_tools/diagnose/features.hpp"
 #include "host_tools/diagnose/finding.hpp"
+#include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/effects/model_parts.hpp"
 #include "host_tools/logs/log.hpp"

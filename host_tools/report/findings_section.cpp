@@ -137,6 +137,7 @@ std::string findings_section(const ReportInput& input, const nlohmann::json&) {
   const Index points = std::clamp<Index>(most_points / std::max<Index>(1, static_cast<Index>(all.size())), 150, 400);
   const std::vector<Joint>& joints = robot_of(input.fitted).joints;
   std::vector<std::vector<Chart>> charts;
+  charts.reserve(all.size() + curved.size());
   for (const FindingPicture& one : all) charts.push_back(charts_of(one, joints[one.joint].torque_unit(), points));
   for (const JointDiagnosis& joint : curved) charts.push_back({chart_of(*joint.curve, joint.unit)});
   const std::vector<std::string> pictures = draw(charts, 2);

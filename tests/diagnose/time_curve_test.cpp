@@ -20,8 +20,8 @@ using Eigen::VectorXd;
 constexpr double row_s = 0.05, noise = 0.1;
 
 /// Two minutes of rows; the joint goes to and fro in 7 s, and noise of which each row remembers a share of the last.
-struct Session {
-  explicit Session(std::uint64_t seed, double memory = 0) {
+struct Minutes {
+  explicit Minutes(std::uint64_t seed, double memory = 0) {
     Random random(seed);
     const Index count = 2400;
     rows.t = VectorXd::LinSpaced(count, 1000, 1000 + row_s * static_cast<double>(count - 1));
@@ -60,7 +60,7 @@ double covered(const TimeFit& fit, const VectorXd& t, const ArrayXd& truth, bool
 
 TEST(TimeCurve, FollowsAWaveThatNoMotionMakes) {
   for (const double period_s : {9.0, 25.0, 80.0}) {
-    Session session(1);
+    Minutes session(1);
     const ArrayXd truth = 0.2 * session.wave(period_s);
     session.rows.e += truth.matrix();
     const auto fit = session.fit();
@@ -89,7 +89,7 @@ TEST(TimeCurve, GetsBackWhatOtherColumnsTook) {
   double with = 0, without = 0;
   constexpr int seeds = 8;
   for (int seed = 0; seed < seeds; ++seed) {
-    Session session(5 + static_cast<std::uint64_t>(seed));
+    Minutes session(5 + static_cast<std::uint64_t>(seed));
     const ArrayXd truth = 0.2 * session.wave(40);
     session.rows.e += truth.matrix();
     const MatrixXd columns = wandering_columns(session.rows.t.size(), 15, 100 + static_cast<std::uint64_t>(seed));
@@ -107,7 +107,7 @@ TEST(TimeCurve, GetsBackWhatOtherColumnsTook) {
 }
 
 TEST(TimeCurve, TellsFrictionByTheDirection) {
-  Session session(2);
+  Minutes session(2);
   session.rows.e += (0.2 * session.wave(40) * session.rows.sign.array()).matrix();
   const auto fit = session.fit();
   ASSERT_TRUE(fit);
@@ -120,7 +120,7 @@ TEST(TimeCurve, NoiseOfAnyColourHasNone) {
   for (const double memory : {0.0, 0.7, 0.9}) {
     int sure = 0;
     for (std::uint64_t seed = 10; seed < 60; ++seed) {
-      const auto fit = Session(seed, memory).fit();
+      const auto fit = Minutes(seed, memory).fit();
       sure += fit && fit->odds_nothing > 3 && fit->closes > 0.2;
     }
     EXPECT_EQ(sure, 0) << memory;
@@ -128,7 +128,7 @@ TEST(TimeCurve, NoiseOfAnyColourHasNone) {
 }
 
 TEST(TimeCurve, AFunctionOfTheMotionIsNoneOfTime) {
-  Session session(3);
+  Minutes session(3);
   session.rows.e += (0.2 * (2 * session.phase).sin()).matrix();
   const auto fit = session.fit();
   ASSERT_TRUE(fit);
@@ -178,7 +178,7 @@ TEST(TimeCurve, IsTakenOffTheLogsThatItIsOf) {
 }
 
 TEST(TimeCurve, TooFewRowsHaveNone) {
-  Session session(4);
+  Minutes session(4);
   TimedRows few;
   few.t = session.rows.t.head(20);
   few.e = session.rows.e.head(20);
