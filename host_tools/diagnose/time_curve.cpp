@@ -243,7 +243,7 @@ std::optional<TimeFit> fit_over_time(const TimedRows& rows, double size, double 
   best->square_of_rivals = 1;
   if (rows.rivals.cols() == 0) return best;
   const FoldSums rivals(rows.rivals, rows, options.left_out_s);
-  for (double times = 1; times <= 1000; times *= 10)
+  for (const double times : {1.0, 10.0, 100.0, 1000.0})
     best->square_of_rivals = std::min(best->square_of_rivals, rivals.left(times * prior) / sums.square());
   return best;
 }
