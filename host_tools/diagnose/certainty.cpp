@@ -159,13 +159,14 @@ std::optional<Outcome> with_free_background(const Outcome& outcome, const std::v
   return out;
 }
 
-void take_if_better(Outcome& outcome, Gate& gate, Outcome other, const Retrial& retrial) {
+bool take_if_better(Outcome& outcome, Gate& gate, Outcome other, const Retrial& retrial) {
   Gate of_other = pass(other, retrial.nominal, retrial.logs, retrial.still);
   const VectorXd before = judged_error(outcome.models, retrial.logs);
   const VectorXd after = judged_error(other.models, retrial.logs);
-  if (!errs_less(before, after, outcome.models.options.gate)) return;
+  if (!errs_less(before, after, outcome.models.options.gate)) return false;
   outcome = std::move(other);
   gate = std::move(of_other);
+  return true;
 }
 
 std::vector<EffectCandidate> named_in(const Outcome& outcome) {

@@ -36,9 +36,10 @@ struct Retrial {
 /// for is in the model, both sessions say better what it was than the healthy one alone. What only grew stays held: the
 /// finding is what came on top. None: nothing else was held.
 std::optional<Outcome> with_free_background(const Outcome& outcome, const std::vector<SessionLog>& logs);
-/// Judges another outcome of the same search, and takes it where it errs less on what judges. @param gate of the
-/// outcome
-void take_if_better(Outcome& outcome, Gate& gate, Outcome other, const Retrial& retrial);
+/// Judges another outcome of the same search, and takes it where it errs less on what judges.
+/// @param gate of the outcome
+/// @returns whether it took it
+bool take_if_better(Outcome& outcome, Gate& gate, Outcome other, const Retrial& retrial);
 
 /// The effects of an outcome's findings.
 std::vector<EffectCandidate> named_in(const Outcome& outcome);

@@ -116,7 +116,7 @@ class Diagnoser {
     Outcome outcome = found_effects(start, gate);
     // What wanders may have got the name of an effect, and hides others.
     const Curves wandering = take_off_what_wanders(outcome, gate, still_, logs_);
-    if (is_any(wandering)) outcome = found_effects(start, gate);
+    if (is_any(wandering)) search_without(start, outcome, gate);
     const std::vector<Likely> likely = set_aside(outcome, gate, models_.current, logs_, still_);
     result.nominal = finished(result.nominal);
     const IdentifiedModel judged_against = deflections_.found.empty() ? result.nominal : finished(models_.current);
@@ -203,6 +203,14 @@ class Diagnoser {
       weigh_evidence(outcome, gate);
     }
     return outcome;
+  }
+  /// Again, on logs that have lost what wanders. Names of before stay only where the data that judge miss them.
+  void search_without(const Models& start, Outcome& outcome, Gate& gate) {
+    Outcome first = std::move(outcome);
+    outcome = found_effects(start, gate);
+    refit(first.models, logs_, first.whitening, 8);
+    first.look_again(logs_);
+    if (take_if_better(outcome, gate, std::move(first), retrial())) weigh_evidence(outcome, gate);
   }
   /// The model has the curves that are told of, where validate logs confirm each: beyond the motion that fitted it, a
   /// curve is a guess.
