@@ -15,6 +15,7 @@ struct Rotor {
   std::size_t joint = 0;
   Eigen::VectorXd in_base;      ///< base parameters of a rotor of 1 kg m^2 (kg)
   double inertia = 0, std = 0;  ///< known beforehand, from a link encoder; std 0: it is not
+  double most = 1e300;          ///< what it can be, of least_inertia() [kg m^2 | kg]
 };
 
 /// The base parameters of a model as a set of columns, without their grouping.

@@ -71,8 +71,8 @@ std::vector<Group> dictionary(const Linearised& problem, const std::vector<Effec
   for (std::size_t j = 0; j < n; ++j) {
     const VectorXd in_base = hidden_rotor(problem.log_columns().current(), j);
     if (in_base.size() == 0) continue;
-    rotors[j] = std::make_shared<const Rotor>(Rotor{j, in_base});
     inertia[j] = least_inertia(problem.log_columns().current(), j, positions);
+    rotors[j] = std::make_shared<const Rotor>(Rotor{.joint = j, .in_base = in_base, .most = inertia[j]});
   }
   for (const EffectInfo& info : effect_infos()) {
     if (!info.sought() || info.of_spectrum()) continue;

@@ -8,6 +8,7 @@
 #include "host_tools/diagnose/explore.hpp"
 #include "host_tools/diagnose/harmless.hpp"
 #include "host_tools/diagnose/refit.hpp"
+#include "host_tools/diagnose/without.hpp"
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
@@ -21,24 +22,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-/// The model without some of its named effects. Leaving out their columns is not enough where they work on what others
-/// do, as those columns are of a model that has the effect: inertias seen through a gear that bends may do its work.
-std::unique_ptr<Linearised> without(const Outcome& outcome, const std::vector<SessionLog>& logs,
-                                    const Linearised& problem, const std::vector<std::size_t>& groups) {
-  Models models = outcome.models;
-  std::vector<EffectId> ids;
-  ids.reserve(groups.size());
-  for (const std::size_t g : groups) ids.push_back(problem.groups()[g].id);
-  while (!ids.empty()) {
-    const EffectId gone = ids.back();
-    ids.pop_back();
-    take_back(models, ids, gone);
-  }
-  auto out = std::make_unique<Linearised>(models, logs, problem.noise().whitening());
-  out->solver().set_weights(problem.solver().weights());
-  return out;
-}
 
 /// Rows of one stretch, in seconds: neighbouring errors say the same.
 constexpr double stretch_s = 2;
@@ -70,8 +53,8 @@ VectorXd judged(const Linearised& problem, const std::vector<std::size_t>& group
 /// .. of a model with all that it has.
 VectorXd judged(const Linearised& problem, const Fold& fold) { return judged(problem, in_model(problem), fold); }
 
-HeldOut hold_out(const Outcome& outcome, const std::vector<SessionLog>& logs, const Linearised& problem,
-                 const std::vector<MatrixXd>& features, const std::vector<std::size_t>& groups) {
+HeldOut hold_out(const Linearised& problem, const std::vector<MatrixXd>& features,
+                 const std::vector<std::size_t>& groups) {
   const auto n = static_cast<Index>(problem.joints());
   const VectorXd& w = problem.solver().weights();
   const std::vector<Index> with = problem.columns_of(groups);
@@ -79,7 +62,7 @@ HeldOut hold_out(const Outcome& outcome, const std::vector<SessionLog>& logs, co
   out.before = out.after = out.leftover = out.excess = out.rows = VectorXd::Zero(n);
   out.alone.assign(groups.size(), VectorXd::Zero(n));
   out.stretches.resize(problem.joints());
-  const std::unique_ptr<Linearised> plain = groups.empty() ? nullptr : without(outcome, logs, problem, groups);
+  const std::unique_ptr<Linearised> plain = groups.empty() ? nullptr : without(problem, groups);
   const Linearised& before = plain ? *plain : problem;
   const Fold fitted{problem.blocks().fit, problem.blocks().fit_of(false)};
   out.fitted_before = judged(before, fitted).cwiseProduct(w);
@@ -107,10 +90,8 @@ HeldOut hold_out(const Outcome& outcome, const std::vector<SessionLog>& logs, co
   for (std::size_t i = 0; i < groups.size(); ++i) {
     std::vector<std::size_t> others = groups;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
-    const EffectInfo& info = *find_effect(problem.groups()[groups[i]].candidate.effect);
-    const bool works_on_others = info.acts_on != ActsOn::torque || info.needs_structural || info.needs_total;
     std::unique_ptr<Linearised> less;
-    if (works_on_others && !others.empty()) less = without(outcome, logs, problem, {groups[i]});
+    if (works_on_others(problem.groups()[groups[i]]) && !others.empty()) less = without(problem, {groups[i]});
     for (const Fold& fold : problem.blocks().folds) {
       const VectorXd squares = others.empty() ? judged(before, fold)
                                : less         ? judged(*less, fold)
@@ -124,13 +105,13 @@ HeldOut hold_out(const Outcome& outcome, const std::vector<SessionLog>& logs, co
 
 /// Where structure remains, what counts is the error in the whole band: whitening would weigh it by how fast it is.
 HeldOut judge(const Outcome& outcome, const std::vector<SessionLog>& logs, const std::vector<std::size_t>& groups) {
-  HeldOut held = hold_out(outcome, logs, *outcome.problem, outcome.features, groups);
+  HeldOut held = hold_out(*outcome.problem, outcome.features, groups);
   if (!outcome.structured()) return held;
   const std::size_t n = outcome.lack.size();
   const Linearised problem(outcome.models, logs, std::vector<VectorXd>(n, VectorXd::Zero(1)));
   std::vector<MatrixXd> in_band(n);
   parallel_for(n, [&](std::size_t j) { in_band[j] = features(problem, j, problem.models().has_baseline); });
-  const HeldOut band = hold_out(outcome, logs, problem, in_band, groups);
+  const HeldOut band = hold_out(problem, in_band, groups);
   // As torques: weights are of this outcome's own residual.
   held.plain_before = band.before.cwiseQuotient(problem.solver().weights());
   held.plain_after = band.after.cwiseQuotient(problem.solver().weights());
@@ -157,7 +138,7 @@ PlainErrors judged_plainly(const Outcome& outcome, const std::vector<SessionLog>
   const std::vector<std::size_t>& groups = gate.groups;
   const std::size_t n = outcome.lack.size();
   const Linearised with(outcome.models, logs, std::vector<VectorXd>(n, VectorXd::Zero(1)));
-  const std::unique_ptr<Linearised> plain = without(outcome, logs, with, groups);
+  const std::unique_ptr<Linearised> plain = without(with, groups);
   PlainErrors out{VectorXd::Zero(static_cast<Index>(n)), VectorXd::Zero(static_cast<Index>(n))};
   for (const Fold& fold : with.blocks().folds) {
     out.before += judged(*plain, fold);

@@ -57,18 +57,42 @@ Linearised::Linearised(const Models& models, const std::vector<SessionLog>& logs
 }
 
 bool Linearised::predicts(const std::vector<Fold>& folds) const {
+  return std::all_of(folds.begin(), folds.end(),
+                     [&](const Fold& fold) { return predicts_nuisance(fold) && shows_named(fold); });
+}
+
+bool Linearised::predicts_nuisance(const Fold& fold) const {
   MatrixXd none, fit, judge;
   VectorXd projection;
   solver_->normal(nuisance(), {}, none, projection);  // priors
-  for (const Fold& fold : folds) {
-    solver_->normal(nuisance(), fold.fit, fit, projection);
-    solver_->normal(nuisance(), fold.judge, judge, projection);
-    // Variance of the prediction, in noise variances, mean of the judge's rows.
-    const double variance =
-        (SymmetricSolver(fit).inverse() * (judge - none)).trace() / solver_->row_count(fold.judge).sum();
-    if (!(variance <= 1)) return false;
-  }
-  return true;
+  solver_->normal(nuisance(), fold.fit, fit, projection);
+  solver_->normal(nuisance(), fold.judge, judge, projection);
+  // Variance of the prediction, in noise variances, mean of the judge's rows.
+  return (SymmetricSolver(fit).inverse() * (judge - none)).trace() <= solver_->row_count(fold.judge).sum();
+}
+
+bool Linearised::shows_named(const Fold& fold) const {
+  const auto squares = [&](const Group& group, const std::vector<std::size_t>& of) {
+    double sum = 0;
+    for (std::size_t j = 0; j < joints(); ++j) {
+      const JointRows& rows = solver_->rows(j);
+      const double weight = solver_->weights()[static_cast<Index>(j)];
+      VectorXd torque = VectorXd::Zero(rows.x.rows());
+      for (Index c = group.first; c < group.first + group.count; ++c) {
+        const Index local = rows.place(c);
+        if (local >= 0) torque += rows.x.col(local) * unknowns_.all[static_cast<std::size_t>(c)].value;
+      }
+      for (const std::size_t b : of) {
+        const Block& block = blocks().all[b];
+        sum += weight * torque.segment(block.first, block.count).squaredNorm();
+      }
+    }
+    return sum;
+  };
+  return std::all_of(unknowns_.named.begin(), unknowns_.named.end(), [&](const Group& group) {
+    const double shown = squares(group, fold.fit);
+    return shown >= options().gate.least_shown * (shown + squares(group, fold.judge));
+  });
 }
 
 void Linearised::whiten(std::size_t joint) {

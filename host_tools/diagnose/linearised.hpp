@@ -69,8 +69,12 @@ class Linearised {
  private:
   void whiten(std::size_t joint);
   void add_background(std::size_t joint);
-  /// Whether a fit of the others predicts what each fold's judge shows of the nuisance to within the noise.
+  /// Whether each fold's judge may judge a fit of the others.
   bool predicts(const std::vector<Fold>& folds) const;
+  /// .. predicts what the judge shows of the nuisance to within the noise.
+  bool predicts_nuisance(const Fold& fold) const;
+  /// .. has enough of each named effect. One that a single log excites is judged by parts of it.
+  bool shows_named(const Fold& fold) const;
   bool rotor_is_separated(std::size_t joint, const std::vector<std::size_t>& groups) const;
 
   LogColumns log_columns_;

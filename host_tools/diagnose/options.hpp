@@ -164,6 +164,9 @@ struct GateOptions {
   /// 1; hand: in the place of a stop or a square wave they closed 0.72 and 0.82, beside a small bump a true pair closes
   /// more
   double several_closure = 0.95;
+  /// share of an effect's power; logs that fit show, else parts of each log judge; hand: a tenth of its amplitude, at
+  /// which what the model lacks may hide it
+  double least_shown = 0.01;
   /// share of the noise's power; structure that is more remains, however small a part of the gap it is; hand: 12 % more
   /// error than noise
   double beyond_noise = 0.25;

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <memory>
 
 #include "host_tools/diagnose/curve_squares.hpp"
 #include "host_tools/diagnose/features.hpp"
+#include "host_tools/diagnose/without.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/support/parallel.hpp"
@@ -112,6 +115,14 @@ class AtJoint {
     }
     return left;
   }
+  /// Around a model without some groups, where one of them works on what others do; else null.
+  const Linearised* relinearised(const std::vector<std::size_t>& gone) const {
+    const auto works = [&](std::size_t g) { return works_on_others(problem_.groups()[g]); };
+    if (std::none_of(gone.begin(), gone.end(), works)) return nullptr;
+    std::unique_ptr<Linearised>& around = around_[gone];
+    if (!around) around = diagnosis::without(problem_, gone);
+    return around.get();
+  }
   Deviance judged(const std::vector<std::size_t>& groups) const { return judged(groups, {}, {}); }
   /// The deviance of all folds, with curves of the size that suits them best.
   /// @param nothing the deviance without them: they are at most as large as what is there
@@ -119,8 +130,11 @@ class AtJoint {
                   const Deviance& nothing) const {
     const MatrixXd curves = curves_.of(families);
     std::vector<PredictiveDeviance> folds;
-    for (const Fold& fold : problem_.blocks().folds)
-      folds.emplace_back(problem_, joint_, problem_.columns_of(groups), curves, fold);
+    const Linearised* around = relinearised(without(groups));
+    const Linearised& problem = around != nullptr ? *around : problem_;
+    const std::vector<Index> columns =
+        around != nullptr ? around->columns_of(in_model(*around)) : problem_.columns_of(groups);
+    for (const Fold& fold : problem_.blocks().folds) folds.emplace_back(problem, joint_, columns, curves, fold);
     double precision = weight_ / std::max(1.0, nothing.square / rows_);
     Deviance best;
     for (int i = 0; i < (families.empty() ? 1 : sizes); ++i, precision *= finer) {
@@ -170,6 +184,7 @@ class AtJoint {
   double rows_ = 0;
   std::vector<std::size_t> variable_;  ///< by own group: a family
   std::vector<OwnEvidence> evidence_;
+  mutable std::map<std::vector<std::size_t>, std::unique_ptr<Linearised>> around_;  ///< by what is left out
 };
 
 /// -2 ln likelihood of what judges, but for a constant: of each joint rows times ln of the squares.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host_tools/diagnose/base_parameters.hpp"
 #include "host_tools/diagnose/dictionary.hpp"
 #include "host_tools/diagnose/gain.hpp"
 #include "host_tools/diagnose/load_places.hpp"
@@ -170,8 +171,9 @@ std::optional<Refined> refined(const Linearised& problem, const LinearFit& besid
                     first_ratio(problem, start.candidate, index), least, most);
     }
   }
-  const double inertia = search.group().rotor_inertia;
-  if (inertia > 0) search.search([](Group& group) -> double& { return group.rotor_inertia; }, 1.25, 0, 1.1 * inertia);
+  if (search.group().rotor_inertia > 0) {
+    search.search([](Group& group) -> double& { return group.rotor_inertia; }, 1.25, 0, search.group().rotor->most);
+  }
   return search.result();
 }
 

@@ -107,12 +107,26 @@ class Refit {
     VectorXd projection;
     solver.normal(around_->unknown_columns(), solver.blocks().fit, gram, projection);
     LinearFit fit;
-    fit.columns = free();
+    const std::vector<Index> all = free();
+    fit.columns = all;
     VectorXd x = values_of(*around_);
-    for (const Index c : fit.columns) x[c] = 0;
-    projection -= gram * x;
-    fit.information = gram(fit.columns, fit.columns);
-    fit.x = SymmetricSolver(fit.information).solve(VectorXd(projection(fit.columns)));
+    // What would leave its range ends there, and the others are fitted beside that.
+    for (std::vector<Index> beyond;;) {
+      for (const Index c : fit.columns) x[c] = 0;
+      const VectorXd rest = projection - gram * x;
+      x(fit.columns) = SymmetricSolver(gram(fit.columns, fit.columns)).solve(VectorXd(rest(fit.columns)));
+      beyond.clear();
+      for (const Index c : fit.columns) {
+        const double most = around_->unknowns()[static_cast<std::size_t>(c)].most();
+        if (x[c] <= most) continue;
+        x[c] = most;
+        beyond.push_back(c);
+      }
+      if (beyond.empty()) break;
+      std::erase_if(fit.columns, [&](Index c) { return std::find(beyond.begin(), beyond.end(), c) != beyond.end(); });
+    }
+    fit.columns = all;
+    fit.x = x(all);
     return fit;
   }
   /// Columns of the unknowns that are not held.

@@ -135,6 +135,7 @@ class Builder {
     const JointFit& joint = joints_of(now_)[u.joint];
     u.kind = Unknown::Kind::rotor;
     u.in_base = rotor->in_base;
+    u.upper = rotor->most;
     u.prior = rotor->inertia;
     u.prior_std = rotor->std > 0 ? rotor->std
                                  : models_.options.prior.rotor * joint.rated_torque / std::max(joint.ddq_limit, 1e-9);
@@ -249,10 +250,13 @@ void add_to(IdentifiedModel& model, const Unknown& u, double step) {
     case Unknown::Kind::base:
       add_to_base(model, u.index, step);
       return;
-    case Unknown::Kind::rotor:
-      value_of(model, u) += step;
-      take_from_base(model, u.in_base, step);
+    case Unknown::Kind::rotor: {
+      double& inertia = value_of(model, u);
+      const double risen = std::min(inertia + step, u.upper) - inertia;
+      inertia += risen;
+      take_from_base(model, u.in_base, risen);
       return;
+    }
     case Unknown::Kind::width: {
       double& width = joints_of(model)[u.joint].sign_width;
       width = std::max(width * std::exp(step), u.lower);

@@ -36,11 +36,13 @@ struct Unknown {
   std::size_t healthy_effect = 0;                ///< the same in the healthy model
   bool body = false;                             ///< effect of IdentifiedModel::body
   bool change = false;                           ///< what the current session has more than the healthy one
-  double lower = 0, upper = 1e300;               ///< shape: its bounds; width: at least
+  double lower = 0, upper = 1e300;               ///< shape: its bounds; width: at least; rotor: at most
   Eigen::VectorXd in_base{};                     ///< rotor: see Rotor
   double value = 0;                              ///< in the model; 0 for logarithms, whose steps are fitted
   double prior = 0, prior_std = 0;               ///< std 0: none
 
+  /// What `value` can be.
+  double most() const { return kind == Kind::rotor ? upper : 1e300; }
   bool is_logarithm() const { return kind == Kind::shape || kind == Kind::width; }
 };
 

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "host_tools/regression/row_ranges.hpp"
+#include "tests/diagnose/small_problem.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
@@ -78,6 +79,24 @@ TEST(BlocksOfLogs, ASingleTrainLogIsCut) {
   ASSERT_EQ(blocks.folds.size(), 5U);
   EXPECT_EQ(blocks.folds[2].fit, (Places{0, 1, 3, 4}));
   EXPECT_EQ(blocks.folds[2].judge, (Places{2}));
+}
+
+/// Folds around a model with effects at PUMA's second joint, which moves in the second of two train logs by a share
+/// of its motion in the first.
+std::size_t folds(const std::vector<EffectFit>& effects, double share) {
+  Models models = test::around(test::fitted_puma());
+  for (const EffectFit& effect : effects) models.current->joints[1].effects.push_back(effect);
+  std::vector<SessionLog> logs;
+  for (const std::uint64_t seed : {1, 2}) logs.push_back(test::small_session_log(models.current, Role::train, seed));
+  logs[1].log.q.col(1) *= share;
+  return Linearised(models, logs, test::no_whitening()).blocks().folds.size();
+}
+
+TEST(BlocksOfLogs, AnEffectThatOneLogAloneExcitesIsJudgedByPartsOfIt) {
+  const EffectFit cubic = test::named_effect("viscous_cubic", {}, {0.5});
+  EXPECT_EQ(folds({cubic}, 1), 2U);
+  EXPECT_EQ(folds({cubic}, 0.4), 5U);
+  EXPECT_EQ(folds({}, 0.4), 2U);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <functional>
 
 #include "host_tools/diagnose/features.hpp"
+#include "host_tools/diagnose/refit.hpp"
 #include "tests/diagnose/small_problem.hpp"
 
 namespace fxdyn::diagnosis {
@@ -68,6 +69,21 @@ TEST(EvidenceOfItsOwn, DoesNotSpeakForANameThatOnlyResemblesWhatIsMissing) {
   const auto own = evidence([](const ArrayXd&, const ArrayXd& other) -> ArrayXd { return 3 * wave(other); },
                             {test::named_effect("viscous_cubic", {}, {0.05})});
   EXPECT_LT(own[0].gain, 16);
+}
+
+// The inertia of a joint that carries one link is the same in every position. Seen through a gear that bends, it may do
+// the gear's work: what speaks for the gear is against a model without it.
+TEST(EvidenceOfItsOwn, SpeaksForAGearThatAnInertiaSeenThroughItImitates) {
+  Models models = test::around(test::fitted_puma(1));
+  models.current->joints[0].effects.push_back(test::named_effect("elasticity", {0.02}, {0.3}));
+  bring_rotor(models, {.joint = 0, .in_base = hidden_rotor(models.current, 0)}, 0.1);
+  std::vector<SessionLog> logs;
+  for (const auto& [role, seed] : {std::pair{Role::train, 1}, std::pair{Role::validate, 2}})
+    logs.push_back(test::small_session_log(models.current, role, static_cast<std::uint64_t>(seed)));
+  const Linearised problem(models, logs, test::no_whitening(1));
+  const std::vector<OwnEvidence> own = own_evidence(problem, in_model(problem), {features(problem, 0)});
+  EXPECT_GT(own[0].gain, 100);
+  EXPECT_GT(own[0].form, 0.9);
 }
 
 // A bump over a tenth of the range: three ripples close a part of it, a free curve of the position all.

@@ -6,7 +6,9 @@
 
 #include <functional>
 
+#include "host_tools/diagnose/base_parameters.hpp"
 #include "host_tools/diagnose/plain_error.hpp"
+#include "host_tools/effects/effects.hpp"
 #include "tests/diagnose/small_problem.hpp"
 
 namespace fxdyn::diagnosis {
@@ -57,6 +59,32 @@ TEST(Refit, OfSomeJointsLeavesAllElseAsItIs) {
   EXPECT_EQ(offset(models.current, 0), offset(nominal, 0));
   for (std::size_t c = 0; c < nominal.base.size(); ++c)
     EXPECT_EQ(models.current->base[c].value, nominal.base[c].value) << c;
+}
+
+/// A PUMA whose first joint has friction in proportion to the link's load, in which the rotor has no part.
+Models with_rotor(Rotor rotor, double inertia) {
+  Models models = test::around(test::fitted_puma());
+  models.current->joints[0].effects.push_back(test::named_effect("load_friction", {}, {0.3}));
+  rotor.in_base = hidden_rotor(models.current, 0);
+  bring_rotor(models, rotor, inertia);
+  return models;
+}
+
+// What such a fit leaves is what one leaves that knows the rotor.
+TEST(Refit, ARotorHasNoMoreThanTheJointsInertia) {
+  constexpr double least = 0.3;
+  const IdentifiedModel robot = with_rotor({}, 2.5).current;
+  const std::vector<SessionLog> logs{test::small_session_log(robot, Role::train, 1),
+                                     test::small_session_log(robot, Role::validate, 2)};
+  const auto fitted = [&](const Rotor& rotor) {
+    Models models = with_rotor(rotor, least);
+    refit(models, logs, test::no_whitening(), 8);
+    return std::pair(rotor_of(models.current->joints[0])->linear[0], plain_error(models.current, logs)[0]);
+  };
+  EXPECT_NEAR(fitted({}).first, 2.5, 0.1);
+  const auto [inertia, left] = fitted({.most = least});
+  EXPECT_EQ(inertia, least);
+  EXPECT_LT(left, 1.01 * fitted({.inertia = least, .std = 1e-6}).second);
 }
 
 }  // namespace

@@ -9,9 +9,11 @@
 
 namespace fxdyn::test {
 
-/// A PUMA 560 as an identification gives it: base parameters, and a little friction.
-inline IdentifiedModel fitted_puma() {
-  IdentifiedModel model = plant_of(read_urdf(puma560));
+/// A PUMA 560, or the first of its joints, as an identification gives it: base parameters, and a little friction.
+inline IdentifiedModel fitted_puma(std::size_t joints = 6) {
+  Robot robot = read_urdf(puma560);
+  robot.joints.resize(joints);
+  IdentifiedModel model = plant_of(robot);
   const BaseSet base = find_base(to_dh(model.robot));
   Eigen::VectorXd standard(base.grouping.cols());
   for (std::size_t i = 0; i < model.inertia.size(); ++i) {
@@ -45,7 +47,7 @@ inline diagnosis::SessionLog small_session_log(const IdentifiedModel& robot, Rol
   diagnosis::SessionLog out;
   out.log = small_log(robot, role, seed, 0.25);
   out.log.filter.encoder_step = out.log.filter.position_noise = std::vector<double>(robot.joints.size(), 0.0);
-  out.log.torque_noise = Eigen::VectorXd::Constant(6, 0.03);  // 0.1 N*m white, up to 10 of 125 Hz
+  out.log.torque_noise = Eigen::VectorXd::Constant(out.log.tau.cols(), 0.03);  // 0.1 N*m white, up to 10 of 125 Hz
   out.log.decimation = 10;
   out.healthy = role == Role::baseline;
   out.fits = role != Role::validate;
@@ -67,6 +69,8 @@ inline EffectFit named_effect(std::string name, std::vector<double> shape, std::
 }
 
 /// White: the noise of small_log() is.
-inline std::vector<Eigen::VectorXd> no_whitening() { return std::vector<Eigen::VectorXd>(6, Eigen::VectorXd::Zero(1)); }
+inline std::vector<Eigen::VectorXd> no_whitening(std::size_t joints = 6) {
+  return std::vector<Eigen::VectorXd>(joints, Eigen::VectorXd::Zero(1));
+}
 
 }  // namespace fxdyn::test
