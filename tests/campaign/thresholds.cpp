@@ -66,7 +66,6 @@ std::vector<Threshold> of_the_judges() {
       {"gate.least_share_in_structure", "share", place<gate, &GateOptions::least_share_in_structure>},
       {"gate.worse", "-", place<gate, &GateOptions::worse>},
       {"gate.worse_fitted", "-", place<gate, &GateOptions::worse_fitted>},
-      {"gate.least_shown", "share", place<gate, &GateOptions::least_shown>},
       {"gate.beyond_noise", "share", place<gate, &GateOptions::beyond_noise>},
       {"gate.several_closure", "share", place<gate, &GateOptions::several_closure>},
       {"gate.least_closure", "share", place<gate, &GateOptions::least_closure>},
