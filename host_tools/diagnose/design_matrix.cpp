@@ -106,7 +106,9 @@ class Derivatives {
     double value = u.kind == Unknown::Kind::shape ? 1.0 : std::max(std::fabs(u.value), 1e-6);
     if (u.kind == Unknown::Kind::rotor) value = std::max(value, u.prior_std);
     double step = difference * value;
-    if (u.kind == Unknown::Kind::shape && fit.shape[u.index] * std::exp(step) > u.upper) step = -step;
+    const bool leaves = u.kind == Unknown::Kind::shape ? fit.shape[u.index] * std::exp(step) > u.upper
+                                                       : u.kind == Unknown::Kind::rotor && u.value + step > u.upper;
+    if (leaves) step = -step;
     add_to(more, u, step);
     if (find_effect(fit.effect)->acts_on == ActsOn::torque && u.kind != Unknown::Kind::rotor && !bends_slowly_) {
       out[u.joint] = columns_.robot(log_).own_slope(more, u.joint, step);

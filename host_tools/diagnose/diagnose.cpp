@@ -207,10 +207,13 @@ class Diagnoser {
   /// Again, on logs that have lost what wanders. Names of before stay only where the data that judge miss them.
   void search_without(const Models& start, Outcome& outcome, Gate& gate) {
     Outcome first = std::move(outcome);
+    Deflections bent = deflections_;
     outcome = found_effects(start, gate);
     refit(first.models, logs_, first.whitening, 8);
     first.look_again(logs_);
-    if (take_if_better(outcome, gate, std::move(first), retrial())) weigh_evidence(outcome, gate);
+    if (!take_if_better(outcome, gate, std::move(first), retrial())) return;
+    deflections_ = std::move(bent);
+    weigh_evidence(outcome, gate);
   }
   /// The model has the curves that are told of, where validate logs confirm each: beyond the motion that fitted it, a
   /// curve is a guess.

@@ -176,7 +176,7 @@ void choose_time_constants(Outcome& outcome, const std::vector<SessionLog>& logs
         fit.shape[0] = std::clamp(found * factor, 0.1, 1e4);
         const Linearised problem(outcome.models, logs, outcome.whitening);
         double sum = 0;
-        for (const Fold& fold : problem.blocks().folds) sum += judged(problem, fold)[static_cast<Index>(j)];
+        for (const Fold& fold : problem.comparing()) sum += judged(problem, fold)[static_cast<Index>(j)];
         if (sum >= least) continue;
         least = sum;
         best = fit.shape[0];
@@ -429,7 +429,7 @@ VectorXd judged_error(const Models& models, const std::vector<SessionLog>& logs)
   if (out.size() > 0) return out;
   const Linearised problem(models, logs, whole_band(joints_of(models.current).size()));
   out = VectorXd::Zero(static_cast<Index>(joints_of(models.current).size()));
-  for (const Fold& fold : problem.blocks().folds) out += judged(problem, fold);
+  for (const Fold& fold : problem.comparing()) out += judged(problem, fold);
   return out;
 }
 

@@ -53,12 +53,15 @@ Linearised::Linearised(const Models& models, const std::vector<SessionLog>& logs
   const std::vector<std::size_t>& structured = log_columns_.background();
   parallel_for(structured.size(), [&](std::size_t k) { add_background(structured[k]); });
   solver_->estimate_weights();
-  if (!blocks.whole_logs.empty() && predicts(blocks.whole_logs)) solver_->judge_by(blocks.whole_logs);
+  comparing_ = this->blocks().folds;
+  const std::vector<Fold>& whole = blocks.whole_logs;
+  if (whole.empty() || !all_of(whole, &Linearised::predicts_nuisance)) return;
+  comparing_ = whole;
+  if (all_of(whole, &Linearised::shows_named)) solver_->judge_by(whole);
 }
 
-bool Linearised::predicts(const std::vector<Fold>& folds) const {
-  return std::all_of(folds.begin(), folds.end(),
-                     [&](const Fold& fold) { return predicts_nuisance(fold) && shows_named(fold); });
+bool Linearised::all_of(const std::vector<Fold>& folds, bool (Linearised::*holds)(const Fold&) const) const {
+  return std::all_of(folds.begin(), folds.end(), [&](const Fold& fold) { return (this->*holds)(fold); });
 }
 
 bool Linearised::predicts_nuisance(const Fold& fold) const {

@@ -35,6 +35,8 @@ class Linearised {
   /// The parts. Rows of the solver are whitened, and without the background.
   const LogColumns& log_columns() const { return log_columns_; }
   const Blocks& blocks() const { return solver_->blocks(); }
+  /// Folds that compare models: the same ones, whatever effects they have. Those of blocks() judge this model alone.
+  const std::vector<Fold>& comparing() const { return comparing_; }
   const NoiseModel& noise() const { return noise_; }
   /// Null: the joint has none.
   const Background* background(std::size_t joint) const { return background_[joint].get(); }
@@ -69,9 +71,8 @@ class Linearised {
  private:
   void whiten(std::size_t joint);
   void add_background(std::size_t joint);
-  /// Whether each fold's judge may judge a fit of the others.
-  bool predicts(const std::vector<Fold>& folds) const;
-  /// .. predicts what the judge shows of the nuisance to within the noise.
+  bool all_of(const std::vector<Fold>& folds, bool (Linearised::*holds)(const Fold&) const) const;
+  /// Whether a fit of the others predicts what a fold's judge shows of the nuisance to within the noise.
   bool predicts_nuisance(const Fold& fold) const;
   /// .. has enough of each named effect. One that a single log excites is judged by parts of it.
   bool shows_named(const Fold& fold) const;
@@ -81,6 +82,7 @@ class Linearised {
   Unknowns unknowns_;
   std::vector<Group> groups_;
   std::unique_ptr<BlockSolver> solver_;
+  std::vector<Fold> comparing_;
   NoiseModel noise_;
   std::vector<std::unique_ptr<Background>> background_;  ///< per joint
   mutable std::once_flag load_made_;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <mutex>
 
 #include "host_tools/diagnose/curve_squares.hpp"
 #include "host_tools/diagnose/features.hpp"
@@ -119,8 +120,11 @@ class AtJoint {
   const Linearised* relinearised(const std::vector<std::size_t>& gone) const {
     const auto works = [&](std::size_t g) { return works_on_others(problem_.groups()[g]); };
     if (std::none_of(gone.begin(), gone.end(), works)) return nullptr;
+    static std::mutex one_at_a_time;  // what problems of the same logs share is made once
     std::unique_ptr<Linearised>& around = around_[gone];
-    if (!around) around = diagnosis::without(problem_, gone);
+    if (around) return around.get();
+    const std::lock_guard lock(one_at_a_time);
+    around = diagnosis::without(problem_, gone);
     return around.get();
   }
   Deviance judged(const std::vector<std::size_t>& groups) const { return judged(groups, {}, {}); }

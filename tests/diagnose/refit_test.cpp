@@ -76,15 +76,18 @@ TEST(Refit, ARotorHasNoMoreThanTheJointsInertia) {
   const IdentifiedModel robot = with_rotor({}, 2.5).current;
   const std::vector<SessionLog> logs{test::small_session_log(robot, Role::train, 1),
                                      test::small_session_log(robot, Role::validate, 2)};
-  const auto fitted = [&](const Rotor& rotor) {
-    Models models = with_rotor(rotor, least);
+  const auto fitted = [&](const Rotor& rotor, double start) {
+    Models models = with_rotor(rotor, start);
     refit(models, logs, test::no_whitening(), 8);
     return std::pair(rotor_of(models.current->joints[0])->linear[0], plain_error(models.current, logs)[0]);
   };
-  EXPECT_NEAR(fitted({}).first, 2.5, 0.1);
-  const auto [inertia, left] = fitted({.most = least});
-  EXPECT_EQ(inertia, least);
-  EXPECT_LT(left, 1.01 * fitted({.inertia = least, .std = 1e-6}).second);
+  EXPECT_NEAR(fitted({}, least).first, 2.5, 0.1);
+  const double known = fitted({.inertia = least, .std = 1e-6}, least).second;
+  for (const double start : {0.1, least}) {
+    const auto [inertia, left] = fitted({.most = least}, start);
+    EXPECT_EQ(inertia, least) << start;
+    EXPECT_LT(left, 1.01 * known) << start;
+  }
 }
 
 }  // namespace
