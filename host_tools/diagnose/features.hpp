@@ -32,5 +32,8 @@ struct Family {
 /// friction over the own position, random features (none of a family), friction over a session's rows in their order.
 /// Those that know nothing but the motion come first.
 std::vector<Family> families(std::size_t joints);
+/// Places in families().
+constexpr std::size_t place_of_own_position(std::size_t joints) { return joints > 1 ? joints : 0; }
+constexpr std::size_t place_of_own_motion(std::size_t joints) { return place_of_own_position(joints) + 1; }
 
 }  // namespace fxdyn::diagnosis

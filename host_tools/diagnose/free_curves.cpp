@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "host_tools/diagnose/curve_sentence.hpp"
 #include "host_tools/diagnose/curve_squares.hpp"
@@ -49,11 +50,18 @@ struct Tried {
   double left = 1e300;
 };
 
+MatrixXd columns_of(const Linearised& problem, const EffectCandidate& curve) {
+  Group group;
+  group.candidate = curve;
+  return problem.make(group)[curve.joint];
+}
+
 /// Curves of one joint.
 class Trials {
  public:
-  Trials(const Linearised& problem, std::size_t joint, const std::vector<Index>& columns, double prior)
-      : problem_(problem), joint_(joint), columns_(columns), prior_(prior) {
+  Trials(const Linearised& problem, std::size_t joint, const std::vector<Index>& columns, double prior,
+         const std::vector<Fold>& folds)
+      : problem_(problem), joint_(joint), columns_(columns), prior_(prior), folds_(folds) {
     for (std::size_t j = 0; j < problem.joints(); ++j) scales_.push_back(scales_of(problem, j));
   }
 
@@ -101,11 +109,8 @@ class Trials {
   std::vector<Tried> best(const std::vector<EffectCandidate>& all) {
     std::vector<double> left(all.size());
     parallel_for(all.size(), [&](std::size_t i) {
-      Group group;
-      group.candidate = all[i];
-      const MatrixXd curve = problem_.make(group)[joint_];
-      for (const Fold& fold : problem_.blocks().folds)
-        left[i] += judged_with_curves(problem_, joint_, columns_, curve, prior_, fold);
+      const MatrixXd curve = columns_of(problem_, all[i]);
+      for (const Fold& fold : folds_) left[i] += judged_with_curves(problem_, joint_, columns_, curve, prior_, fold);
     });
     count_ += all.size();
     std::vector<Tried> out;
@@ -121,20 +126,20 @@ class Trials {
   std::size_t joint_;
   const std::vector<Index>& columns_;
   double prior_;
+  const std::vector<Fold>& folds_;
   std::vector<MotionScales> scales_;  ///< by joint
   std::size_t count_ = 0;
 };
 
 /// What functions of the other joints' velocities leave: a variable of which there is no curve.
 double left_by_velocities_of_others(const Linearised& problem, std::size_t joint, const std::vector<Index>& columns,
-                                    double prior) {
+                                    double prior, const std::vector<Fold>& folds) {
   if (problem.joints() < 2) return 1e300;
   const Family family = families(problem.joints())[problem.joints() - 1];  // after each other joint's position
   MatrixXd functions = features(problem, joint).middleCols(family.first, family.count);
   if (const Background* background = problem.background(joint)) functions = background->eliminate(functions);
   double left = 0;
-  for (const Fold& fold : problem.blocks().folds)
-    left += judged_with_curves(problem, joint, columns, functions, prior, fold);
+  for (const Fold& fold : folds) left += judged_with_curves(problem, joint, columns, functions, prior, fold);
   return left;
 }
 
@@ -145,20 +150,22 @@ std::string words_of_variable(const EffectCandidate& effect) {
 }
 
 /// The curve that explains most at a joint, where it is sure and worth its numbers.
-std::optional<FreeCurve> best_at(const Linearised& problem, std::size_t joint, double size) {
+/// @param size prior deviation of its heights
+std::optional<FreeCurve> best_by(const Linearised& problem, std::size_t joint, double size,
+                                 const std::vector<Fold>& folds) {
   const Options& options = problem.options();
   const std::vector<Index> columns = problem.columns_of(in_model(problem));
   const auto j = static_cast<Index>(joint);
   const double dilution = problem.solver().weights()[j] / diluted_weights(problem)[j];
   double before = 0, rows = 0;
-  for (const Fold& fold : problem.blocks().folds) {
+  for (const Fold& fold : folds) {
     before += judged_with_curves(problem, joint, columns, MatrixXd(problem.solver().rows(joint).x.rows(), 0), 0, fold);
     rows += problem.solver().row_count(fold.judge)[j] / dilution;
   }
   const double prior = 1 / (size * size);
-  Trials trials(problem, joint, columns, prior);
+  Trials trials(problem, joint, columns, prior, folds);
   const std::vector<Tried> tried = trials.best_of_each();
-  if (tried.empty() || left_by_velocities_of_others(problem, joint, columns, prior) < tried[0].left) return {};
+  if (tried.empty() || left_by_velocities_of_others(problem, joint, columns, prior, folds) < tried[0].left) return {};
   const auto odds = [&](double without, double with) {
     return rows * std::log(without / std::max(with, 1e-300)) / variances_per_decade;
   };
@@ -172,6 +179,38 @@ std::optional<FreeCurve> best_at(const Linearised& problem, std::size_t joint, d
   }
   if (out.odds_nothing < options.gate.established || out.closes < options.curve.least_share) return {};
   return out;
+}
+
+/// Whether one log alone has what a curve closes: all others together have less of it than is worth a curve.
+bool is_of_one_log(const Linearised& problem, const FreeCurve& curve, double size, const std::vector<Fold>& folds) {
+  const std::vector<Index> columns = problem.columns_of(in_model(problem));
+  const MatrixXd with = columns_of(problem, curve.effect), without(with.rows(), 0);
+  std::map<std::size_t, double> closed;  // by log
+  for (const Fold& fold : folds) {
+    for (const std::size_t judge : fold.judge) {
+      const Fold of{fold.fit, {judge}};
+      const auto left = [&](const MatrixXd& columns_of_curve) {
+        return judged_with_curves(problem, curve.effect.joint, columns, columns_of_curve, 1 / (size * size), of);
+      };
+      closed[problem.blocks().all[judge].log] += left(without) - left(with);
+    }
+  }
+  double sum = 0, most = 0;
+  for (const auto& [log, square] : closed) {
+    sum += std::max(square, 0.0);
+    most = std::max(most, square);
+  }
+  return sum - most < problem.options().curve.least_share * sum;
+}
+
+std::optional<FreeCurve> best_at(const Linearised& problem, std::size_t joint, double size) {
+  const Blocks& blocks = problem.blocks();
+  if (auto out = best_by(problem, joint, size, blocks.folds)) return out;
+  if (blocks.whole_logs.empty() || blocks.folds.front().judge != blocks.whole_logs.front().judge) return {};
+  // No log can be predicted by others that lack what it shows, as a stop that it alone runs into: parts of it judge.
+  const std::vector<Fold> parts = make_blocks(problem.logs()).folds;
+  auto out = best_by(problem, joint, size, parts);
+  return out && is_of_one_log(problem, *out, size, parts) ? out : std::nullopt;
 }
 
 /// Appends a curve of height 0.

@@ -16,6 +16,7 @@ struct JointState {
   bool likely = false;       ///< effects that are not sure enough for the model
   bool impacts = false;      ///< shorter than the torque's band shows
   bool wanders = false;      ///< something comes and goes with time
+  bool curved = false;       ///< a free curve of the motion closes some of it, on data that did not fit the curve
   bool bends = false;        ///< a link encoder shows a deflection without a name
 };
 Verdict verdict_of(const JointState& state);

@@ -102,6 +102,8 @@ class Projection {
   /// Coefficients of the functions, of coordinates.
   VectorXd coefficients(const VectorXd& along) const { return size_.cwiseProduct(basis_ * along); }
   double operator()(const VectorXd& products) const { return coordinates(products).squaredNorm(); }
+  /// Coefficients of the functions in each vector of an orthonormal basis.
+  MatrixXd basis() const { return size_.asDiagonal() * basis_; }
 
  private:
   VectorXd size_;
@@ -242,6 +244,24 @@ class StateTest {
     return smallest;
   }
 
+  /// Of families other than the own motion's, once its functions have taken their part of all.
+  double smallest_chance_elsewhere() {
+    std::vector<Family> all = families(problem_.joints());
+    const Family own = all[place_of_own_motion(problem_.joints())];
+    all.erase(all.begin() + static_cast<std::ptrdiff_t>(place_of_own_motion(problem_.joints())));
+    const MatrixXd basis = Projection(today_.gram, today_.size, own).basis();
+    const MatrixXd along = today_.gram.middleCols(own.first, own.count) * basis;
+    const auto rest = [&](const auto& products) {
+      return (products - along * (basis.transpose() * products.middleRows(own.first, own.count))).eval();
+    };
+    today_.residual = rest(today_.residual);
+    of_noise_ = rest(of_noise_);
+    today_.gram -= along * along.transpose();
+    double smallest = 1;
+    for (const Family& family : all) smallest = std::min(smallest, static_cast<double>(all.size()) * chance_of(family));
+    return smallest;
+  }
+
  private:
   /// What is expected of a statistic, as a share; how many free numbers one of it has, and it is known by.
   struct Expected {
@@ -333,6 +353,7 @@ LackOfFit lack_of_fit(const Linearised& problem, std::size_t joint, const Linear
   if (out.state_p < problem.options().lack_of_fit.state && test.expect_encoder_errors())
     out.state_p = test.smallest_chance();
   out.time_p = in_time(problem, joint, residual, problem.blocks().fit, residual).p;
+  if (out.state_p < problem.options().lack_of_fit.state) out.elsewhere_p = test.smallest_chance_elsewhere();
   return out;
 }
 

@@ -29,8 +29,12 @@ Curves of_motion(Models& models, const Outcome& outcome, const Gate& gate, const
                  const std::vector<SessionLog>& logs) {
   Curves out(still.size());
   std::vector<bool> without = still;
-  for (std::size_t j = 0; j < still.size(); ++j)
-    without[j] = without[j] || (!outcome.structured(j) && !gate.remains[j]);
+  for (std::size_t j = 0; j < still.size(); ++j) {
+    const bool nameless = std::none_of(outcome.found.begin(), outcome.found.end(),
+                                       [&](const Finding& f) { return !f.id.body && f.id.joint == j; });
+    const bool suspect = nameless && outcome.lack[j].state_p < models.options.lack_of_fit.suspected;
+    without[j] = without[j] || !(suspect || outcome.structured(j) || gate.remains[j]);
+  }
   for (const FreeCurve& curve : add_free_curves(models, logs, without))
     out[curve.effect.joint] = drawn(models, curve, logs);
   return out;

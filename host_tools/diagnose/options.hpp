@@ -107,6 +107,8 @@ struct SearchOptions {
   double false_alarm = 1e-3;
   /// -; coefficient of an effect that is 1 by definition (delay, saturation); hand
   double least_share = 0.4, most_share = 2;
+  /// encoder steps; over which friction with memory turns over, at least; hand: where it turns back is known to one
+  double least_path = 3;
   /// standard deviations; a coefficient further below its bound is another effect; theory: Phi(-3) = 0.13 %
   double beyond_bound = 3;
   /// share of the threshold; candidates whose first score is less are not refined; hand: refining rarely doubles it
@@ -125,6 +127,8 @@ struct SearchOptions {
 struct LackOfFitOptions {
   /// chance; noise resembles a function of the state as much; hand: F's tail is used far beyond where it is exact
   double state = 1e-8;
+  /// chance; .. so that a free curve is tried at a joint without a name, and judged on data that did not fit it; hand
+  double suspected = 1e-6;
   /// chance; noise resembles something periodic or slow in time as much; hand
   double time = 1e-6;
   /// chance; lines that noise makes as seldom count as a share of the residual; hand
@@ -170,6 +174,8 @@ struct GateOptions {
   /// share of the noise's power; structure that is more remains, however small a part of the gap it is; hand: 12 % more
   /// error than noise
   double beyond_noise = 0.25;
+  /// share of the gap; a law of friction may leave in the own motion, whose form is never exact; hand
+  double law_error = 0.02;
   /// standard deviations; coefficients of a name are off nothing by, or those of a healthy session off where they were;
   /// theory: 2 Phi(-2) = 4.6 % of noise is further off
   double sure_deviations = 2;

@@ -63,13 +63,11 @@ class Curves {
     const std::size_t position = place_of_own_position(joints_);
     if (info.needs_peers) return joints_ > 1 ? position - 1 : 0;
     if (drifts(effect.effect)) return count() - 1;
-    return turns_with_position(effect, info) ? position : position + 1;
+    return turns_with_position(effect, info) ? position : place_of_own_motion(joints_);
   }
 
  private:
   static constexpr Index fine_waves = 24;
-  /// After each other joint's position and their velocities.
-  static std::size_t place_of_own_position(std::size_t joints) { return joints > 1 ? joints : 0; }
   /// Whether its torque at rest is another in another position.
   static bool turns_with_position(const EffectCandidate& effect, const EffectInfo& info) {
     if (info.acts_on != ActsOn::torque || info.needs_structural || info.needs_total) return false;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "host_tools/diagnose/models.hpp"
 #include "host_tools/diagnose/thinning.hpp"
@@ -35,8 +36,13 @@ void smooth(SessionLog& entry, const SessionOptions& options) {
   const auto edge = whole_up(options.edge_periods / (wanted * log.step_s));
   const Index first = std::max(log.first, edge), last = std::min(log.last, log.samples() - edge);
   if (last - first < (log.last - log.first) / 2) return;
-  cutoff = wanted;
-  log.q = ZeroPhaseFilter(wanted, log.step_s).apply(log.q);
+  FilterFit lost = log.filter;  // up to the filter of before
+  lost.crossing_hz = std::min(lost.crossing_hz, cutoff);
+  lost.position_cutoff_hz = cutoff = wanted;
+  const MatrixXd before = std::exchange(log.q, ZeroPhaseFilter(wanted, log.step_s).apply(log.q));
+  for (Index j = 0; j < log.q.cols(); ++j)
+    log.lose(j, log.q.cols(),
+             lost_velocity(before.col(j), log.q.col(j), lost, static_cast<std::size_t>(j), log.step_s));
   log.first = first;
   log.last = last;
 }

@@ -27,7 +27,7 @@ ProcessedLog thinned(ProcessedLog log, Index k) {
   if (k <= 1) return log;
   const double step_s = log.step_s * static_cast<double>(k);
   if (log.tau.size() > 0) log.tau = ZeroPhaseFilter(torque_share / step_s, log.step_s).apply(log.tau);
-  for (MatrixXd* columns : {&log.q, &log.measured_dq, &log.measured_ddq, &log.qlink, &log.tau})
+  for (MatrixXd* columns : {&log.q, &log.measured_dq, &log.measured_ddq, &log.lost_velocity, &log.qlink, &log.tau})
     *columns = every(*columns, k);
   log.t = every(log.t, k);
   log.step_s = step_s;

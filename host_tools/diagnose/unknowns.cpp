@@ -88,7 +88,14 @@ class Builder {
     Unknown u;
     u.kind = Unknown::Kind::width;
     u.joint = joint;
+    u.width = joints_of(now_)[joint].sign_width;
     if (joint < models_.least_width.size()) u.lower = models_.least_width[joint];
+    // Beside a law of the nominal model most of a sign cancels. What is left of it only gets sharper: a wide one is no
+    // dry friction any more, and does the work of effects of the velocity.
+    const bool law = std::any_of(effects.begin(), effects.end(), [](const EffectFit& fit) {
+      return !fit.named && find_effect(fit.effect)->unites_others();
+    });
+    if (law) u.upper = std::max(u.lower, u.width);
     out_.all.push_back(u);
   }
 
@@ -224,8 +231,10 @@ std::pair<double, double> shape_limits(const Models& models, std::size_t joint, 
                                        const ParameterInfo& shape) {
   const FilterFit& filter = filter_of(models.current);
   if (shape.values.seen_by_encoder && joint < filter.position_noise.size()) {
-    const double step = std::max(filter.encoder_step[joint], std::sqrt(12.0) * filter.position_noise[joint]);
-    return {std::clamp(step, shape.lower, 0.1 * shape.upper), shape.upper};
+    // White noise is filtered; of a staircase nothing is, where the joint turns back.
+    const double least = std::max(models.options.search.least_path * filter.encoder_step[joint],
+                                  std::sqrt(12.0) * filter.position_noise[joint]);
+    return {std::clamp(least, shape.lower, 0.1 * shape.upper), shape.upper};
   }
   if (shape.values.least_of_sign > 0) {
     const double width = shape.values.least_of_sign * joints_of(models.current)[joint].sign_width;
@@ -259,7 +268,7 @@ void add_to(IdentifiedModel& model, const Unknown& u, double step) {
     }
     case Unknown::Kind::width: {
       double& width = joints_of(model)[u.joint].sign_width;
-      width = std::max(width * std::exp(step), u.lower);
+      width = std::clamp(width * std::exp(step), u.lower, u.upper);
       return;
     }
     case Unknown::Kind::shape: {

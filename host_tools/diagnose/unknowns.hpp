@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <cmath>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -36,13 +37,14 @@ struct Unknown {
   std::size_t healthy_effect = 0;                ///< the same in the healthy model
   bool body = false;                             ///< effect of IdentifiedModel::body
   bool change = false;                           ///< what the current session has more than the healthy one
-  double lower = 0, upper = 1e300;               ///< shape: its bounds; width: at least; rotor: at most
+  double lower = 0, upper = 1e300;               ///< shape, width: its bounds; rotor: at most
   Eigen::VectorXd in_base{};                     ///< rotor: see Rotor
   double value = 0;                              ///< in the model; 0 for logarithms, whose steps are fitted
+  double width = 0;                              ///< width: in the model
   double prior = 0, prior_std = 0;               ///< std 0: none
 
   /// What `value` can be.
-  double most() const { return kind == Kind::rotor ? upper : 1e300; }
+  double most() const { return kind == Kind::rotor ? upper : kind == Kind::width ? std::log(upper / width) : 1e300; }
   bool is_logarithm() const { return kind == Kind::shape || kind == Kind::width; }
 };
 

@@ -29,17 +29,6 @@ SignFriction sign_friction(const JointFit& fit, const EffectFit& coulomb) {
   return out;
 }
 
-/// RMS error of the velocity by how fast the joint moves.
-struct VelocityError {
-  double white = 0;  ///< whatever the velocity is
-  double slow = 0;   ///< steps come more slowly than the filter below this
-
-  double operator()(double dq) const {
-    const double stairs = slow > 0 ? slow * std::exp(-0.125 * dq * dq / (slow * slow)) : 0;
-    return std::sqrt(white * white + 2 * stairs * stairs);
-  }
-};
-
 }  // namespace
 
 VectorXd velocity_doubt(const ProcessedLog& log, std::size_t joint, const JointFit& friction,
@@ -48,8 +37,7 @@ VectorXd velocity_doubt(const ProcessedLog& log, std::size_t joint, const JointF
   const EffectFit* coulomb = dry_friction_of(friction);
   if (coulomb == nullptr || log.measured_dq.size() > 0 || !(position_noise(log.filter, joint) > 0))
     return VectorXd::Zero(log.rows());
-  const VelocityError error{velocity_noise(log.filter, joint, log.step_s / static_cast<double>(log.kept_each)),
-                            position_band(log.filter, log.step_s) * log.filter.encoder_step[joint]};
+  const VelocityError error(log.filter, joint, log.step_s / static_cast<double>(log.kept_each));
   const double width = friction.sign_width;
   const auto [amplitude, of_load] = sign_friction(friction, *coulomb);
   VectorXd uncertain(log.samples());
@@ -60,7 +48,8 @@ VectorXd velocity_doubt(const ProcessedLog& log, std::size_t joint, const JointF
     still = 0;
   };
   for (Index k = 0; k < log.samples(); ++k) {
-    const double dq = std::fabs(velocity[k]), s = error(dq);
+    const double lost = log.lost_velocity.size() > 0 ? log.lost_velocity(k, static_cast<Index>(joint)) : 0;
+    const double dq = std::fabs(velocity[k]), s = std::hypot(error(dq), lost);
     // the mean slope over what the velocity may be
     const double slope = 0.5 * (std::tanh((dq + s) / width) - std::tanh((dq - s) / width));
     const double wrong = std::min(1.0, s * s / (width * width)) * 2 * std::erfc(dq / (s * std::numbers::sqrt2));

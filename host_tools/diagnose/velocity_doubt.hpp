@@ -13,8 +13,8 @@ namespace fxdyn::diagnosis {
 ///   4 F^2 Phi(-|dq| / sigma_dq), F the friction that turns with it.
 /// A joint that stands still (|dq| < sigma_dq) bears any friction up to F, and for as long: its rows have one error
 /// between them, so that of N rows each counts like one of N times the variance.
-/// sigma_dq is what the position filter leaves of the encoder's noise, velocity_noise(). An encoder that steps more
-/// slowly than the filter is a staircase, no white noise: its velocity is wrong by sqrt(2) cutoff step.
+/// sigma_dq is what the position filter leaves of the encoder's noise, VelocityError, and the motion that it takes
+/// away, lost_velocity().
 /// @param joint its friction @param dq, load of the joint at full rate @param sigma RMS of the residual's noise
 /// @returns filtered and decimated; zeros where the velocity is measured or the joint has no friction
 Eigen::VectorXd velocity_doubt(const ProcessedLog& log, std::size_t joint, const JointFit& friction,

@@ -315,6 +315,7 @@ class ReportWriter {
     state.impacts = impacts.has_value();
     const std::optional<CurveResult>& curve = conclusion_.curves[j];
     state.wanders = curve && !curve->of_motion();
+    state.curved = curve && curve->of_motion();
     state.bends = std::find(bends.begin(), bends.end(), j) != bends.end();
     out.verdict = verdict_of(state);
 
@@ -326,9 +327,10 @@ class ReportWriter {
     if (out.carries_over == false) note_risen_error(j, of);
     const bool left = out.verdict == Verdict::unexplained || out.verdict == Verdict::partly_explained;
     // What only bends leaves no gap in the torque, and noise alone has nothing to close.
-    const bool of_torque = state.there || state.reached ||
-                           (left && (state.structured || state.remains || state.likely || state.wanders)) ||
-                           any([](const NamedEffect& e) { return e.signal.empty(); });
+    const bool of_torque =
+        state.there || state.reached ||
+        (left && (state.structured || state.remains || state.likely || state.wanders || state.curved)) ||
+        any([](const NamedEffect& e) { return e.signal.empty(); });
     const bool only_impacts = state.impacts && !changed && !state.structured && !state.wanders;
     if (only_impacts) {
       out.where = place(*impacts);

@@ -93,7 +93,7 @@ ProcessedLog part_of(const ProcessedLog& log, Index from, Index to, Index first,
   };
   ProcessedLog out;
   for (MatrixXd ProcessedLog::*columns : {&ProcessedLog::q, &ProcessedLog::measured_dq, &ProcessedLog::measured_ddq,
-                                          &ProcessedLog::qlink, &ProcessedLog::tau})
+                                          &ProcessedLog::lost_velocity, &ProcessedLog::qlink, &ProcessedLog::tau})
     out.*columns = part(log.*columns);
   out.t = log.t.segment(from, to - from);
   out.name = log.name;

@@ -43,8 +43,9 @@ struct FlexibleJoint {
   std::string note;                               ///< what a reader should know, empty if nothing
 };
 
-/// Of the joint's largest speed: no motion shows a sign's width that is less.
-inline constexpr double narrowest_sign = 1e-4;
+/// Of the joint's largest speed: no motion shows a sign's width that is less; one that is more has no dry friction in
+/// it, and is viscous friction of another form.
+inline constexpr double narrowest_sign = 1e-4, widest_sign = 0.3;
 
 struct JointFit {
   double sign_width = 0.01;   ///< s = tanh(dq / width) [rad/s | m/s]

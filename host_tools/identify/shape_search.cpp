@@ -165,7 +165,7 @@ Candidate search_shapes(const Fitter& fitter, std::size_t joint, const JointFit&
 }  // namespace
 
 Candidate search_width(const Fitter& fitter, std::size_t joint, const Scales& scales) {
-  return search(fitter, joint, fitter.design(joint), narrowest_sign * scales.velocity, 0.3 * scales.velocity,
+  return search(fitter, joint, fitter.design(joint), narrowest_sign * scales.velocity, widest_sign * scales.velocity,
                 [](JointFit& design, double value) { design.sign_width = value; });
 }
 

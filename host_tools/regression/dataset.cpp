@@ -11,6 +11,7 @@
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/evaluator.hpp"
 #include "host_tools/effects/identified_model.hpp"
+#include "host_tools/regression/encoder_noise.hpp"
 #include "host_tools/regression/noise_cutoff.hpp"
 #include "host_tools/signals/filter.hpp"
 #include "host_tools/signals/spectrum.hpp"
@@ -143,6 +144,13 @@ bool ProcessedLog::is_saturated(Index joint, Index row) const {
   const Index sample = first + row * decimation;
   return std::any_of(runs.begin(), runs.end(),
                      [&](const auto& run) { return sample >= run[0] - reach && sample < run[1] + reach; });
+}
+
+void ProcessedLog::lose(Index joint, Index joints, const VectorXd& velocity) {
+  if (velocity.size() == 0) return;
+  if (lost_velocity.size() == 0) lost_velocity.setZero(velocity.size(), joints);
+  lost_velocity.col(joint) = lost_velocity.col(joint).array().square() + velocity.array().square();
+  lost_velocity.col(joint) = lost_velocity.col(joint).cwiseSqrt();
 }
 
 MatrixXd ProcessedLog::filter_columns(const Eigen::Ref<const MatrixXd>& full_rate) const {
@@ -285,7 +293,12 @@ ProcessedLog process(Log log, const FilterFit& filter, const ProcessSettings& se
     const auto middle = log.q.col(j).segment(out.first, inside);
     out.q_range[j] = middle.maxCoeff() - middle.minCoeff();
     out.q_noise[j] = (raw.segment(out.first, inside) - middle).norm() / std::sqrt(static_cast<double>(inside));
-    if (log.dq.size() > 0) log.dq.col(j) = motion.apply(log.dq.col(j));
+    if (log.dq.size() > 0) {
+      log.dq.col(j) = motion.apply(log.dq.col(j));
+    } else {
+      const VectorXd lost = lost_velocity(raw, log.q.col(j), filter, static_cast<std::size_t>(j), log.step_s);
+      out.lose(j, n, lost);
+    }
     if (log.ddq.size() > 0) log.ddq.col(j) = motion.apply(log.ddq.col(j));
     if (log.qlink.size() > 0) {
       out.has_link[static_cast<std::size_t>(j)] = !std::isnan(log.qlink(0, j));

@@ -26,7 +26,8 @@ struct ProcessedLog {
   Eigen::VectorXd t;
   Eigen::MatrixXd q;                          ///< filtered at the position cut-off
   Eigen::MatrixXd measured_dq, measured_ddq;  ///< likewise; empty: differentiated from q
-  Eigen::MatrixXd qlink;                      ///< likewise; empty: no joint has a link encoder
+  Eigen::MatrixXd lost_velocity;              ///< of each joint, see lost_velocity(); empty: none at any joint
+  Eigen::MatrixXd qlink;                      ///< likewise filtered; empty: no joint has a link encoder
   std::vector<bool> has_link;                 ///< per joint; columns of qlink without an encoder hold q
   Eigen::MatrixXd tau;                        ///< raw; empty without torque
   std::optional<Load> load;                   ///< what the gripper carried
@@ -56,6 +57,8 @@ struct ProcessedLog {
   bool is_saturated(Eigen::Index joint, Eigen::Index row) const;
 
   Eigen::MatrixXd filter_columns(const Eigen::Ref<const Eigen::MatrixXd>& full_rate) const;
+  /// A filter takes this away of the velocity of one of so many joints, see lost_velocity(); empty: nothing.
+  void lose(Eigen::Index joint, Eigen::Index joints, const Eigen::VectorXd& velocity);
   /// The rows that fits use, of a full-rate, filtered matrix.
   Eigen::MatrixXd decimate(const Eigen::Ref<const Eigen::MatrixXd>& filtered) const;
 };

@@ -54,6 +54,14 @@ TEST_F(StructureInAResidual, AFunctionOfThePositionIsFoundAtItsJoint) {
   EXPECT_FALSE(elsewhere_.structured({}));
   EXPECT_GT(share_, 0.7);
   EXPECT_LT(share_elsewhere_, 0.3);
+  EXPECT_LT(here_.elsewhere_p, 1e-8) << "the position is another variable than the own motion";
+}
+
+TEST_F(StructureInAResidual, AFunctionOfTheOwnMotionIsNotElsewhere) {
+  const auto dq = test::small_session_log(test::fitted_puma(), Role::train, 1).log.joint_velocity(joint);
+  look([&](double, double t) { return 0.5 * std::tanh(dq[std::lround(t / test::small_log_step_s)] / 0.3); });
+  EXPECT_LT(here_.state_p, 1e-8);
+  EXPECT_GT(here_.elsewhere_p, 1e-8);
 }
 
 TEST_F(StructureInAResidual, AHumIsAMatterOfTime) {

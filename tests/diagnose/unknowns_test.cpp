@@ -90,6 +90,17 @@ TEST_F(UnknownsOfAModel, StribeckIsWiderThanTheSign) {
   EXPECT_EQ(shape_limits(models_, 1, lugre, lugre.shape[1]).first, lugre.shape[1].lower);  // its bristles turn it over
 }
 
+TEST_F(UnknownsOfAModel, APathIsNoShorterThanTheEncoderKnowsWhereAJointTurnsBack) {
+  const EffectInfo& presliding = *find_effect("presliding");
+  const auto least = [&](double step, double noise) {
+    models_.current->filter.encoder_step.assign(6, step);
+    models_.current->filter.position_noise.assign(6, noise);
+    return shape_limits(models_, 1, presliding, presliding.shape[0]).first;
+  };
+  EXPECT_DOUBLE_EQ(least(1e-4, 3e-5), 3e-4);
+  EXPECT_DOUBLE_EQ(least(0, 3e-5), std::sqrt(12.0) * 3e-5) << "white noise";
+}
+
 TEST_F(UnknownsOfAModel, ASignIsNoNarrowerThanWhatShows) {
   models_.least_width = {0.019, 0.03};
   const Unknowns unknowns = make_unknowns(models_);
@@ -102,6 +113,17 @@ TEST_F(UnknownsOfAModel, ASignIsNoNarrowerThanWhatShows) {
   EXPECT_DOUBLE_EQ(models_.current->joints[0].sign_width, 0.019);
   EXPECT_DOUBLE_EQ(models_.current->joints[1].sign_width, 0.03) << "it began below";
   EXPECT_DOUBLE_EQ(models_.current->joints[2].sign_width, 0.02 * std::exp(-0.2)) << "not known";
+}
+
+TEST_F(UnknownsOfAModel, ASignBesideALawOfTheNominalModelOnlyGetsNarrower) {
+  models_.current->joints[1].effects.push_back(test::effect("lugre", {0.005, 0.05, 0.7}, {3, 1}));
+  for (const bool named : {false, true}) {
+    models_.current->joints[1].effects.back().named = named;
+    for (const Unknown& u : make_unknowns(models_).all) {
+      if (u.kind != Kind::width) continue;
+      EXPECT_EQ(u.most() < 1e-12, u.joint == 1 && !named) << u.joint << ": " << u.most();
+    }
+  }
 }
 
 TEST_F(UnknownsOfAModel, WhatOfASignShowsFollowsFromTheNoiseAndTheSpeed) {

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "host_tools/regression/encoder_noise.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/support/random.hpp"
 #include "tests/simulate/support.hpp"
 #include "tests/support/filter.hpp"
@@ -58,6 +59,40 @@ TEST(EncoderNoise, InTheVelocityIsWhatTheFilterLeavesOfWhiteNoise) {
   EXPECT_NEAR(test::rms(dq) / velocity_noise(filter, 0, step_s), std::sqrt(3 * 0.2657), 0.03);
 }
 
+/// 20 s: a slow motion, and about its middle, where `shakes`, a fast one of 0.3 rad/s (RMS).
+VectorXd shaken(bool shakes, double noise = 0) {
+  constexpr double step_s = 0.002;
+  VectorXd q(10'000);
+  Random random(5);
+  for (Index k = 0; k < q.size(); ++k) {
+    const double t = step_s * static_cast<double>(k), near = std::exp(-std::pow((t - 10) / 0.5, 2));
+    q[k] = std::sin(0.6 * t) + noise * random.normal();
+    if (shakes) q[k] += near * 0.3 * std::sqrt(2.0) / (2 * 3.14159 * 25) * std::sin(2 * 3.14159 * 25 * t);
+  }
+  return q;
+}
+
+/// What a filter of 10 Hz takes away of it, where the motion sinks into the noise at 40 Hz.
+VectorXd lost(const VectorXd& q, double noise, double ends_hz = 40) {
+  FilterFit filter = test::filter_of(10, 10, 0.3);
+  filter.crossing_hz = ends_hz;
+  filter.position_noise = {noise};
+  filter.encoder_step = {0};
+  return lost_velocity(q, ZeroPhaseFilter(10, 0.002).apply(q).col(0), filter, 0, 0.002);
+}
+
+TEST(LostVelocity, IsThatOfTheMotionThatTheFilterTakesAway) {
+  const VectorXd of = lost(shaken(true), 1e-6);
+  ASSERT_EQ(of.size(), 10'000);
+  EXPECT_NEAR(of[5'000], 0.3, 0.03);
+  EXPECT_LT(of.segment(1'000, 2'000).maxCoeff(), 0.003);
+}
+
+TEST(LostVelocity, IsNoneInNoiseAndWhereNothingIsFaster) {
+  EXPECT_EQ(lost(shaken(false, 1e-4), 1e-4).size(), 0);
+  EXPECT_EQ(lost(shaken(true), 1e-6, 8).size(), 0) << "the filter passes all of the motion";
+}
+
 /// 10 s at 250 samples a second: at rest, then at 0.5 rad/s.
 class Doubt : public testing::Test {
  protected:
@@ -89,6 +124,15 @@ TEST_F(Doubt, IsWhereTheJointStandsStill) {
   // Whatever the sign: (4 / 2 F / sigma)^2 of a row, and all rows at rest have one error between them.
   EXPECT_GT(u.head(80).minCoeff(), 400);
   EXPECT_LT(u.tail(80).maxCoeff(), 1e-3);
+}
+
+TEST_F(Doubt, IsWhereTheFilterTookAsFastAMotionAway) {
+  const double before = doubt().tail(80).maxCoeff();
+  log_.lose(0, 1, VectorXd::Constant(samples, 0.3));
+  log_.lose(0, 1, VectorXd::Constant(samples, 0.4));  // by a second filter: 0.5 rad/s together
+  EXPECT_DOUBLE_EQ(log_.lost_velocity(0, 0), 0.5);
+  EXPECT_LT(before, 1e-3);
+  EXPECT_GT(doubt().tail(80).minCoeff(), 100);
 }
 
 TEST_F(Doubt, GrowsWithTheSquareOfFrictionOverNoise) {
