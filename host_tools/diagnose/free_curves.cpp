@@ -150,9 +150,9 @@ std::string words_of_variable(const EffectCandidate& effect) {
 }
 
 /// The curve that explains most at a joint, where it is sure and worth its numbers.
-/// @param size prior deviation of its heights
+/// @param size prior deviation of its heights @param tried_before curves, of all folds; their number grows
 std::optional<FreeCurve> best_by(const Linearised& problem, std::size_t joint, double size,
-                                 const std::vector<Fold>& folds) {
+                                 const std::vector<Fold>& folds, std::size_t& tried_before) {
   const Options& options = problem.options();
   const std::vector<Index> columns = problem.columns_of(in_model(problem));
   const auto j = static_cast<Index>(joint);
@@ -165,6 +165,7 @@ std::optional<FreeCurve> best_by(const Linearised& problem, std::size_t joint, d
   const double prior = 1 / (size * size);
   Trials trials(problem, joint, columns, prior, folds);
   const std::vector<Tried> tried = trials.best_of_each();
+  tried_before += trials.count();
   if (tried.empty() || left_by_velocities_of_others(problem, joint, columns, prior, folds) < tried[0].left) return {};
   const auto odds = [&](double without, double with) {
     return rows * std::log(without / std::max(with, 1e-300)) / variances_per_decade;
@@ -172,7 +173,7 @@ std::optional<FreeCurve> best_by(const Linearised& problem, std::size_t joint, d
   FreeCurve out;
   out.effect = tried[0].effect;
   out.closes = 1 - tried[0].left / before;
-  out.odds_nothing = odds(before, tried[0].left) - std::log10(static_cast<double>(trials.count()));
+  out.odds_nothing = odds(before, tried[0].left) - std::log10(static_cast<double>(tried_before));
   if (tried.size() > 1) {
     out.odds_rival = odds(tried[1].left, tried[0].left);
     out.rival = words_of_variable(tried[1].effect);
@@ -205,11 +206,12 @@ bool is_of_one_log(const Linearised& problem, const FreeCurve& curve, double siz
 
 std::optional<FreeCurve> best_at(const Linearised& problem, std::size_t joint, double size) {
   const Blocks& blocks = problem.blocks();
-  if (auto out = best_by(problem, joint, size, blocks.folds)) return out;
+  std::size_t tried = 0;
+  if (auto out = best_by(problem, joint, size, blocks.folds, tried)) return out;
   if (blocks.whole_logs.empty() || blocks.folds.front().judge != blocks.whole_logs.front().judge) return {};
   // No log can be predicted by others that lack what it shows, as a stop that it alone runs into: parts of it judge.
   const std::vector<Fold> parts = make_blocks(problem.logs()).folds;
-  auto out = best_by(problem, joint, size, parts);
+  auto out = best_by(problem, joint, size, parts, tried);
   return out && is_of_one_log(problem, *out, size, parts) ? out : std::nullopt;
 }
 

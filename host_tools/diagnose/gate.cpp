@@ -212,7 +212,8 @@ std::vector<bool> lacking_form(const Gate& gate, const Outcome& outcome) {
   return out;
 }
 
-/// Whether what is left at a joint is no more than the error of a law's form, in the own motion and nothing else.
+/// Whether what is left at a joint is no more than the error of a law's form: small, and in the own motion and load
+/// alone.
 bool is_error_of_law(const Outcome& outcome, const HeldOut& held, double gap, std::size_t joint) {
   const bool law = std::any_of(outcome.found.begin(), outcome.found.end(), [&](const Finding& finding) {
     return !finding.id.body && finding.id.joint == joint &&
@@ -220,7 +221,7 @@ bool is_error_of_law(const Outcome& outcome, const HeldOut& held, double gap, st
   });
   const LackOfFit& lack = outcome.lack[joint];
   const LackOfFitOptions& options = outcome.models.options.lack_of_fit;
-  return law && lack.elsewhere_p >= options.state && lack.time_p >= options.time &&
+  return law && lack.elsewhere_p >= options.suspected && lack.time_p >= options.time &&
          held.excess[static_cast<Index>(joint)] <= outcome.models.options.gate.law_error * gap;
 }
 

@@ -244,19 +244,19 @@ class StateTest {
     return smallest;
   }
 
-  /// Of families other than the own motion's, once its functions have taken their part of all.
+  /// Of families other than the own motion's, once its functions have taken their part of all. Random functions are of
+  /// no family.
   double smallest_chance_elsewhere() {
     std::vector<Family> all = families(problem_.joints());
     const Family own = all[place_of_own_motion(problem_.joints())];
     all.erase(all.begin() + static_cast<std::ptrdiff_t>(place_of_own_motion(problem_.joints())));
     const MatrixXd basis = Projection(today_.gram, today_.size, own).basis();
-    const MatrixXd along = today_.gram.middleCols(own.first, own.count) * basis;
-    const auto rest = [&](const auto& products) {
-      return (products - along * (basis.transpose() * products.middleRows(own.first, own.count))).eval();
-    };
-    today_.residual = rest(today_.residual);
-    of_noise_ = rest(of_noise_);
-    today_.gram -= along * along.transpose();
+    const MatrixXd of_own = basis.transpose() * of_noise_.middleRows(own.first, own.count);
+    of_noise_ -= today_.gram.middleCols(own.first, own.count) * basis * of_own;
+    mean_noise_ -= of_own.colwise().squaredNorm().mean();
+    for (Products* session : {&today_, &before_, &seen_}) {
+      if (session->rows > 0) take_off(own, *session);
+    }
     double smallest = 1;
     for (const Family& family : all) smallest = std::min(smallest, static_cast<double>(all.size()) * chance_of(family));
     return smallest;
@@ -268,6 +268,16 @@ class StateTest {
     double share = 0, freedom = 0, known_by = 0;
   };
 
+  /// What functions of a family explain of one session's residual and of all other functions.
+  static void take_off(const Family& family, Products& of) {
+    const MatrixXd basis = Projection(of.gram, of.size, family).basis();
+    const MatrixXd along = of.gram.middleCols(family.first, family.count) * basis;
+    const VectorXd explained = basis.transpose() * of.residual.segment(family.first, family.count);
+    of.residual -= along * explained;
+    of.gram -= along * along.transpose();
+    of.whole -= explained.squaredNorm();
+    of.rows -= static_cast<double>(basis.cols());
+  }
   template <class Do>
   void for_each_of_today(Do&& each) const {
     for (const std::size_t i : problem_.blocks().fit) {
@@ -350,10 +360,11 @@ LackOfFit lack_of_fit(const Linearised& problem, std::size_t joint, const Linear
   if (fit.square[k] * problem.solver().weights()[k] < no_variance_left * fit.rows[k]) return out;
   StateTest test(problem, joint, fit, alone, all_features, residual);
   out.state_p = test.smallest_chance();
-  if (out.state_p < problem.options().lack_of_fit.state && test.expect_encoder_errors())
+  const LackOfFitOptions& options = problem.options().lack_of_fit;
+  if (out.state_p < std::max(options.state, options.suspected) && test.expect_encoder_errors())
     out.state_p = test.smallest_chance();
   out.time_p = in_time(problem, joint, residual, problem.blocks().fit, residual).p;
-  if (out.state_p < problem.options().lack_of_fit.state) out.elsewhere_p = test.smallest_chance_elsewhere();
+  if (out.state_p < options.state) out.elsewhere_p = test.smallest_chance_elsewhere();
   return out;
 }
 

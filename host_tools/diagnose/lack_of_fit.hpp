@@ -9,7 +9,8 @@ namespace fxdyn::diagnosis {
 struct LackOfFit {
   double state_p = 1;  ///< chance that noise looks as much like a function of the state
   double time_p = 1;   ///< .. like something periodic or slow in time
-  /// .. like a function of other variables than the own motion, beside those of it; where state_p says structure
+  /// .. like a function of a variable that is neither the own motion nor the load, beside those of these; where state_p
+  /// says structure
   double elsewhere_p = 1;
   bool structured(const LackOfFitOptions& options) const { return state_p < options.state || time_p < options.time; }
 };

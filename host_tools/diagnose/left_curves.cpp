@@ -25,14 +25,15 @@ AllCurves over_time(const Models& models, const std::vector<SessionLog>& logs, c
 }
 
 /// Adds the curves of the motion to the models. @returns them
+/// @param suspects also at joints that are only suspected of structure
 Curves of_motion(Models& models, const Outcome& outcome, const Gate& gate, const std::vector<bool>& still,
-                 const std::vector<SessionLog>& logs) {
+                 const std::vector<SessionLog>& logs, bool suspects) {
   Curves out(still.size());
   std::vector<bool> without = still;
   for (std::size_t j = 0; j < still.size(); ++j) {
     const bool nameless = std::none_of(outcome.found.begin(), outcome.found.end(),
                                        [&](const Finding& f) { return !f.id.body && f.id.joint == j; });
-    const bool suspect = nameless && outcome.lack[j].state_p < models.options.lack_of_fit.suspected;
+    const bool suspect = suspects && nameless && outcome.lack[j].state_p < models.options.lack_of_fit.suspected;
     without[j] = without[j] || !(suspect || outcome.structured(j) || gate.remains[j]);
   }
   for (const FreeCurve& curve : add_free_curves(models, logs, without))
@@ -59,7 +60,7 @@ Models with_findings(const Outcome& outcome) {
 Curves curves_of_the_rest(const Outcome& outcome, const Gate& gate, const std::vector<bool>& still,
                           const Curves& wandering, const std::vector<SessionLog>& logs) {
   Models models = with_findings(outcome);
-  Curves out = of_motion(models, outcome, gate, still, logs);
+  Curves out = of_motion(models, outcome, gate, still, logs, true);
   for (std::size_t j = 0; j < still.size(); ++j) {
     if (wandering[j]) out[j] = wandering[j];
   }
@@ -72,7 +73,7 @@ Curves take_off_what_wanders(const Outcome& outcome, const Gate& gate, const std
   Models models = with_findings(outcome);
   AllCurves all = over_time(models, logs, still);
   if (std::all_of(all.begin(), all.end(), [](const auto& of_joint) { return of_joint.empty(); })) return out;
-  const Curves known = of_motion(models, outcome, gate, still, logs);
+  const Curves known = of_motion(models, outcome, gate, still, logs, false);
   for (std::size_t j = 0; j < still.size(); ++j) {
     if (known[j] || all[j].empty()) continue;
     for (const CurveResult& curve : all[j]) take_off(curve, j, joints_of(models.current)[j].sign_width, logs);

@@ -21,7 +21,7 @@ Curves take_off_what_wanders(const Outcome& outcome, const Gate& gate, const std
                              std::vector<SessionLog>& logs);
 
 /// What is left without a name gets a curve, by joint. It says which variable, and where: of time, as it was taken off,
-/// or of the motion (add_free_curves()) where structure is left.
+/// or of the motion (add_free_curves()) where structure is left, or suspected at a joint without a name.
 Curves curves_of_the_rest(const Outcome& outcome, const Gate& gate, const std::vector<bool>& still,
                           const Curves& wandering, const std::vector<SessionLog>& logs);
 

@@ -127,7 +127,8 @@ struct SearchOptions {
 struct LackOfFitOptions {
   /// chance; noise resembles a function of the state as much; hand: F's tail is used far beyond where it is exact
   double state = 1e-8;
-  /// chance; .. so that a free curve is tried at a joint without a name, and judged on data that did not fit it; hand
+  /// chance; .. so that a free curve is tried at a joint without a name, and judged on data that did not fit it, or
+  /// that an error of a law (GateOptions::law_error) is not one of the own motion alone; hand
   double suspected = 1e-6;
   /// chance; noise resembles something periodic or slow in time as much; hand
   double time = 1e-6;
@@ -174,7 +175,7 @@ struct GateOptions {
   /// share of the noise's power; structure that is more remains, however small a part of the gap it is; hand: 12 % more
   /// error than noise
   double beyond_noise = 0.25;
-  /// share of the gap; a law of friction may leave in the own motion, whose form is never exact; hand
+  /// share of the gap; a law of friction may leave in the own motion and load, as its form is never exact; hand
   double law_error = 0.02;
   /// standard deviations; coefficients of a name are off nothing by, or those of a healthy session off where they were;
   /// theory: 2 Phi(-2) = 4.6 % of noise is further off

@@ -55,7 +55,7 @@ VectorXd velocity_doubt(const ProcessedLog& log, std::size_t joint, const JointF
     const double wrong = std::min(1.0, s * s / (width * width)) * 2 * std::erfc(dq / (s * std::numbers::sqrt2));
     const double torque = (amplitude + of_load * std::fabs(load[k])) / sigma;
     uncertain[k] = torque * torque * std::max(slope * slope, wrong);
-    if (dq < s) {
+    if (dq < error(dq)) {  // what is lost moves
       ++still;
     } else {
       come_loose(k);

@@ -258,11 +258,13 @@ class ReportWriter {
     const double doubtful = problem_.noise().doubtful_share(j);
     if (doubtful <= report_.much_doubt) return;
     const double step = conclusion_.now.front().filter.encoder_step[j];
+    const bool lost = std::any_of(conclusion_.now.begin(), conclusion_.now.end(), [&](const ProcessedLog& log) {
+      return log.lost_velocity.size() > 0 && log.lost_velocity.col(static_cast<Index>(j)).maxCoeff() > 0;
+    });
     notes_.push_back(fmt::format(
-        "{}: in {:.0f} % of the rows the encoder{} does not tell which way it moves; what is unexplained may be "
-        "that: faster "
-        "motion or a finer encoder would tell",
-        joint_of(j).name, 100 * doubtful,
+        "{}: in {:.0f} % of the rows the {}encoder{} does not tell which way it moves; what is unexplained may be "
+        "that: faster motion or a finer encoder would tell",
+        joint_of(j).name, 100 * doubtful, lost ? "filtered " : "",
         step > 0 ? fmt::format(" (steps of {:.2g} {})", step, joint_of(j).position_unit()) : std::string()));
   }
 
@@ -331,7 +333,7 @@ class ReportWriter {
         state.there || state.reached ||
         (left && (state.structured || state.remains || state.likely || state.wanders || state.curved)) ||
         any([](const NamedEffect& e) { return e.signal.empty(); });
-    const bool only_impacts = state.impacts && !changed && !state.structured && !state.wanders;
+    const bool only_impacts = state.impacts && !changed && !state.structured && !state.wanders && !state.curved;
     if (only_impacts) {
       out.where = place(*impacts);
       advise(fmt::format("look at the raw torque of joint {} there; an encoder on its link would show a gap", j + 1));
@@ -361,7 +363,7 @@ class ReportWriter {
       out.closure = conclusion_.gate.closure[k];
       const Share share = diagnosis::left_of(conclusion_.gate.held, conclusion_.gate.gap[k], k);
       out.left = GapLeft{share.share, share.low, share.high};
-      if (state.wanders) out.left = more_of(*out.left, left_of(*curve, of));
+      if (state.wanders || state.curved) out.left = more_of(*out.left, left_of(*curve, of));
     }
     if (left) out.curve = curve;
     out.not_identifiable = conclusion_.outcome.not_identifiable[j];

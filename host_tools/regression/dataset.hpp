@@ -17,7 +17,7 @@ namespace fxdyn {
 
 /// A log ready for fitting and judging. Held is what can't be made again: the filtered position and the raw torque;
 /// velocity and acceleration are differentiated when they are asked for, rows of regressors made in blocks. So a log
-/// takes little more memory than its own columns.
+/// takes little more memory than its own columns, and one more for each position of which the filter takes motion away.
 struct ProcessedLog {
   std::string name;  ///< file name for messages
   Role role = Role::train;

@@ -29,6 +29,7 @@ ProcessedLog log_at_4_khz() {
   log.step_s = fast_step;
   log.t = VectorXd::LinSpaced(recorded, 0, fast_step * (recorded - 1));
   log.q = sine_of(2);
+  log.lost_velocity = sine_of(1);
   log.first = 401;
   log.last = 19601;
   log.decimation = 25;
@@ -42,6 +43,8 @@ TEST(Thinning, MotionKeepsItsTimesAndDerivatives) {
   ASSERT_EQ(out.samples(), 2501);
   EXPECT_DOUBLE_EQ(out.step_s, 2e-3);
   EXPECT_DOUBLE_EQ(out.t[100], log.t[800]);
+  ASSERT_EQ(out.lost_velocity.rows(), 2501);
+  EXPECT_DOUBLE_EQ(out.lost_velocity(100, 0), log.lost_velocity(800, 0));
   EXPECT_EQ(out.kept_each, every);
   EXPECT_GE(out.first * every, log.first);
   EXPECT_LE((out.last - 1) * every, log.last - 1);

@@ -124,6 +124,18 @@ TEST_F(UnknownsOfAModel, ASignBesideALawOfTheNominalModelOnlyGetsNarrower) {
       EXPECT_EQ(u.most() < 1e-12, u.joint == 1 && !named) << u.joint << ": " << u.most();
     }
   }
+  models_.current->joints[1].effects.back().named = false;
+  const auto after = [&](double step) {
+    Models moved = models_;
+    const Unknowns unknowns = make_unknowns(moved);
+    for (std::size_t i = 0; i < unknowns.all.size(); ++i) {
+      if (unknowns.all[i].kind == Kind::width && unknowns.all[i].joint == 1)
+        update(moved, unknowns.all, only(unknowns, i, step), 1);
+    }
+    return moved.current->joints[1].sign_width;
+  };
+  EXPECT_DOUBLE_EQ(after(0.2), 0.02);
+  EXPECT_DOUBLE_EQ(after(-0.2), 0.02 * std::exp(-0.2));
 }
 
 TEST_F(UnknownsOfAModel, WhatOfASignShowsFollowsFromTheNoiseAndTheSpeed) {

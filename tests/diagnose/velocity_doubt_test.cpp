@@ -93,6 +93,35 @@ TEST(LostVelocity, IsNoneInNoiseAndWhereNothingIsFaster) {
   EXPECT_EQ(lost(shaken(true), 1e-6, 8).size(), 0) << "the filter passes all of the motion";
 }
 
+TEST(LostVelocity, IsNoneOfTheStepsOfACoarseEncoder) {
+  FilterFit filter = test::filter_of(10, 10, 0.3);
+  filter.crossing_hz = 40;
+  filter.encoder_step = {1e-3};
+  filter.position_noise = {1e-3 / std::sqrt(12.0)};
+  // From rest to 0.3 rad/s and back: steps come more slowly than either filter passes, then faster.
+  const VectorXd t = VectorXd::LinSpaced(10'000, 0, 20);
+  const VectorXd exact = 0.5 * (0.6 * t.array()).sin();
+  const VectorXd q = (exact.array() / 1e-3).round() * 1e-3;
+  const VectorXd of = lost_velocity(q, ZeroPhaseFilter(10, 0.002).apply(q).col(0), filter, 0, 0.002);
+  // Of what may be wrong where they come slowly, 40 Hz times a step.
+  EXPECT_LT(of.size() == 0 ? 0 : of.maxCoeff(), 2 * 40 * 1e-3);
+  EXPECT_LT(of.size() == 0 ? 0 : (of.array() > 0).cast<double>().mean(), 0.05);
+}
+
+TEST(LostVelocity, IsOfLogsThatHaveNoVelocityOfTheirOwn) {
+  Log log;
+  log.step_s = 0.002;
+  log.q = shaken(true);
+  log.t = VectorXd::LinSpaced(log.q.rows(), 0, 0.002 * static_cast<double>(log.q.rows() - 1));
+  FilterFit filter = test::filter_of(10, 10, 0.3);
+  filter.crossing_hz = 40;
+  filter.position_noise = {1e-6};
+  filter.encoder_step = {0};
+  EXPECT_NEAR(process(log, filter).lost_velocity(5'000, 0), 0.3, 0.03);
+  log.dq = log.q;
+  EXPECT_EQ(process(log, filter).lost_velocity.size(), 0);
+}
+
 /// 10 s at 250 samples a second: at rest, then at 0.5 rad/s.
 class Doubt : public testing::Test {
  protected:
@@ -133,6 +162,8 @@ TEST_F(Doubt, IsWhereTheFilterTookAsFastAMotionAway) {
   EXPECT_DOUBLE_EQ(log_.lost_velocity(0, 0), 0.5);
   EXPECT_LT(before, 1e-3);
   EXPECT_GT(doubt().tail(80).minCoeff(), 100);
+  // It moves there: its rows do not share one error, as those of a joint at rest do.
+  EXPECT_LT(doubt().tail(80).maxCoeff(), 4 * 2 * 2 / (0.1 * 0.1));
 }
 
 TEST_F(Doubt, GrowsWithTheSquareOfFrictionOverNoise) {

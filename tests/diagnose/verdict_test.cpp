@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include "host_tools/diagnose/joint_state.hpp"
 #include "tests/diagnose/arm_sessions.hpp"
 #include "tests/support/sanitizers.hpp"
 
@@ -19,6 +20,12 @@ auto pump(Eigen::Index joint, double amplitude) {
 }
 
 const char* const ripple = "wavenumber = 31.0, cos = 0.3, sin = 0.2";
+
+TEST(JointVerdict, ACurveAloneIsUnexplainedAndBesideANameNothingMore) {
+  EXPECT_EQ(diagnosis::verdict_of({.curved = true}), Verdict::unexplained);
+  EXPECT_EQ(diagnosis::verdict_of({.established = true, .curved = true}), Verdict::explained);
+  EXPECT_EQ(diagnosis::verdict_of({}), Verdict::nothing_missing);
+}
 
 TEST(DiagnosisVerdict, ANameStaysWhereAnotherJointIsUnexplained) {
   const json report = diagnosed("neighbours", {.missing = effect("ripple", 2, ripple), .tamper = pump(0, 0.8)});

@@ -109,6 +109,13 @@ TEST(Windows, NoneWhereAJointMovesInNone) {
   EXPECT_EQ(in_windows({once}, room_for(2000)).size(), 1U);
 }
 
+TEST(Windows, KnowWhatTheFilterTookAway) {
+  ProcessedLog log = log_of(100).log;
+  log.lost_velocity = Eigen::MatrixXd::Zero(log.samples(), log.q.cols());
+  log.lost_velocity(3500, 0) = 0.2;
+  EXPECT_EQ(part_of(log, 3000, 6000, 100, 2900).lost_velocity(500, 0), 0.2);
+}
+
 TEST(Windows, WhatIsSaturatedMovesWithThem) {
   const ProcessedLog out = part_of(log_of(100).log, 3000, 6000, 100, 2900);
   EXPECT_EQ(out.samples(), 3000);
