@@ -31,8 +31,11 @@ assert model["tracking_motor"] < wrong["tracking_motor"] < none["tracking_motor"
 # path's fourth derivative, which jumps where a move starts: double computes a spike (roughness 0.032), fixed point stops
 # at the joint's limits (0.015) and follows better. On a path without such jumps both are the same.
 real = rows["model", "real", "none"]
-for figure in ("tracking_motor", "tracking_link", "roughness"):
+for figure in ("tracking_motor", "tracking_link"):
     assert model[figure] <= 1.01 * real[figure], (figure, model, real)
+# Where a joint comes to rest, friction decides on the last bit how it comes loose again: two models gave 0.993 and 1.019
+# of double's roughness, with paths 2.5e-6 apart. A fixed point that adds a spike would double it.
+assert model["roughness"] <= 1.05 * real["roughness"], ("roughness", model, real)
 for row, change in result["fixed_against_double"].items():
     if row.endswith("shaped"):
         assert change["error_change"] < 1e-4, (row, change)  # 1.9e-6
