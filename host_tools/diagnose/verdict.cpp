@@ -313,7 +313,6 @@ class ReportWriter {
     state.established = any([](const NamedEffect& e) { return e.established; });
     state.reached = robot_reaches(k);
     state.there = is_there(j);
-    state.likely = any([](const NamedEffect& e) { return !e.established; });
     state.impacts = impacts.has_value();
     const std::optional<CurveResult>& curve = conclusion_.curves[j];
     state.wanders = curve && !curve->of_motion();
@@ -331,8 +330,8 @@ class ReportWriter {
     // What only bends leaves no gap in the torque, and noise alone has nothing to close.
     const bool of_torque =
         state.there || state.reached ||
-        (left && (state.structured || state.remains || state.likely || state.wanders || state.curved)) ||
-        any([](const NamedEffect& e) { return e.signal.empty(); });
+        (left && (state.structured || state.remains || state.wanders || state.curved)) ||
+        any([](const NamedEffect& e) { return e.established && e.signal.empty(); });
     const bool only_impacts = state.impacts && !changed && !state.structured && !state.wanders && !state.curved;
     if (only_impacts) {
       out.where = place(*impacts);

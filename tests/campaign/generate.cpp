@@ -152,15 +152,25 @@ Eigen::MatrixXd friction_of(const Case& wanted, const Session& session, const Lo
   return out;
 }
 
+/// .. and what the simulator has no name for.
+Eigen::MatrixXd added_torque(const Case& wanted, const Session& session, const std::vector<Outside>& outside,
+                             const Log& log, const Plan& plan) {
+  const Motion motion{"", log.step_s, log.t.array() - wanted.clock_s, log.q, log.dq, log.ddq};
+  Eigen::MatrixXd added = friction_of(wanted, session, log, plan);
+  for (const Outside& effect : outside) added.col(static_cast<Index>(effect.joint)) += outside_torque(effect, motion);
+  return added;
+}
+
 /// .. to a noise-free log's truth.
-void add_to_truth(const Case& wanted, const Session& session, const fs::path& file, const Plan& plan) {
+void add_to_truth(const Case& wanted, const Session& session, const std::vector<Outside>& outside, const fs::path& file,
+                  const Plan& plan) {
   const Robot& robot = plan.healthy.robot;
   const Log log = read_exact(file, robot);
   fs::path truth_file = file;
   truth_file.replace_extension(".truth.csv");
   Log truth;
   truth.t = log.t;
-  truth.tau = read_truth(truth_file, robot.size()) + friction_of(wanted, session, log, plan);
+  truth.tau = read_truth(truth_file, robot.size()) + added_torque(wanted, session, outside, log, plan);
   write_log(truth_file, truth);
 }
 
@@ -184,12 +194,10 @@ void finish(const Case& wanted, const Session& session, const std::vector<Outsid
   Log log = read_exact(file, robot);
   fs::path truth_file = file;
   truth_file.replace_extension(".truth.csv");
-  Motion motion{"", log.step_s, log.t.array() - wanted.clock_s, log.q, log.dq, log.ddq};
   Log truth;
   truth.t = log.t;
   truth.tau = read_truth(truth_file, robot.size());
-  Eigen::MatrixXd added = friction_of(wanted, session, log, plan);
-  for (const Outside& effect : outside) added.col(static_cast<Index>(effect.joint)) += outside_torque(effect, motion);
+  const Eigen::MatrixXd added = added_torque(wanted, session, outside, log, plan);
   log.tau += added;
   truth.tau += added;
   log.dq.resize(0, 0);
@@ -324,6 +332,8 @@ json truth_json(const Case& wanted, const Ground& ground) {
     if (stands_for.empty()) {
       entry["outside"] = true;
       entry["curve"] = curve_of(outside);
+      if (const auto curve = swept(outside, 3 * role_duration_s(wanted)))
+        entry["swept"] = {{"x", curve->x}, {"y", curve->y}};
     } else {
       entry["names"] = stands_for;
     }
@@ -423,13 +433,13 @@ void generate(const Case& wanted, const fs::path& data, const fs::path& truth) {
   }
   part("measured", made, data, truth);
 
-  if (!ground.effects.empty() && ground.outside.empty()) {
+  if (!ground.effects.empty() || !ground.outside.empty()) {
     session.noise = false;
     session.exact_motion = true;
     session.link_encoders = false;
     session.logs = recording("test", motion_seed(wanted, 3), 2 * role_duration_s(wanted), wanted.recording);
     for (const fs::path& file : play(session, truth / "exact.toml", truth / "exact")) {
-      if (wanted.friction != Friction::catalogue) add_to_truth(wanted, session, file, ground.plan);
+      if (changed_after) add_to_truth(wanted, session, ground.outside, file, ground.plan);
     }
   }
   fs::copy_file(truth / "robot.urdf", data / "robot.urdf");

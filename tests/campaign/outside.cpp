@@ -174,6 +174,35 @@ VectorXd outside_torque(const Outside& o, const Motion& motion) {
   return o.amplitude * column.matrix();
 }
 
+std::optional<Swept> swept(const Outside& o, double duration_s) {
+  const std::string curve = curve_of(o);
+  if (curve.empty()) return {};
+  constexpr Index points = 400;
+  const bool of_time = curve == "time_curve", of_other = curve.starts_with("cross_position");
+  const double from = of_time    ? 0
+                      : of_other ? o.other_low
+                                 : o.low,
+               to = of_time    ? duration_s
+                    : of_other ? o.other_high
+                               : o.high;
+  const VectorXd x = VectorXd::LinSpaced(points, from, to);
+  // One motion that passes all of it in the positive direction.
+  const auto n = static_cast<Index>(std::max(o.joint, o.other) + 1);
+  Motion motion{"",
+                (to - from) / static_cast<double>(points - 1),
+                VectorXd::Zero(points),
+                Eigen::MatrixXd::Zero(points, n),
+                Eigen::MatrixXd::Zero(points, n),
+                Eigen::MatrixXd::Zero(points, n)};
+  motion.dq.col(static_cast<Index>(o.joint)).setConstant(o.velocity);
+  if (of_time)
+    motion.t = x;
+  else
+    motion.q.col(static_cast<Index>(of_other ? o.other : o.joint)) = x;
+  const VectorXd y = outside_torque(o, motion);
+  return Swept{{x.begin(), x.end()}, {y.begin(), y.end()}};
+}
+
 void scale(Outside& outside, double share, const Plan& plan) {
   outside.amplitude = 1;
   double power = 0, samples = 0;

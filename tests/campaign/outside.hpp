@@ -42,6 +42,14 @@ std::optional<Place> place_of(const Outside& outside);
 /// The free curve that has its form, "cross_position 4" where it is over the position of joint 4; "": none has.
 std::string curve_of(const Outside& outside);
 
+/// That curve: the torque, of friction in the positive direction, over the variable's range in the plan, or over time
+/// since the session's start [s].
+struct Swept {
+  std::vector<double> x, y;
+};
+/// @param duration_s of the session; @returns nothing where no curve has the form
+std::optional<Swept> swept(const Outside& outside, double duration_s);
+
 /// The amplitude that makes it the share of rated torque (RMS over the plan's motions).
 void scale(Outside& outside, double share, const Plan& plan);
 

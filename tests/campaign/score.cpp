@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 namespace fxdyn::campaign {
@@ -105,6 +106,31 @@ std::size_t count_curves(const json& diagnosis) {
   return count;
 }
 
+/// Points of a curve whose band of 95 % holds the truth's, and all of them. The mean is taken off both: what is nominal
+/// has it. Points where the truth was not swept don't count.
+void count_band(const json& curve, const json& truth, double clock_s, json& out) {
+  if (!curve.contains("x")) return;
+  const auto x = curve.at("x").get<std::vector<double>>(), y = curve.at("y").get<std::vector<double>>(),
+             std = curve.at("std").get<std::vector<double>>();
+  const auto true_x = truth.at("x").get<std::vector<double>>(), true_y = truth.at("y").get<std::vector<double>>();
+  const double start = curve.at("signal") == "t" ? clock_s : 0, step = true_x[1] - true_x[0];
+  std::vector<double> off, deviation;
+  double mean = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const double place = (x[i] - start - true_x.front()) / step;
+    const auto left = static_cast<std::size_t>(std::max(place, 0.0));
+    if (place < 0 || left + 1 >= true_x.size()) continue;
+    off.push_back(y[i] - std::lerp(true_y[left], true_y[left + 1], place - static_cast<double>(left)));
+    deviation.push_back(std[i]);
+    mean += off.back();
+  }
+  std::size_t held = 0;
+  for (std::size_t i = 0; i < off.size(); ++i)
+    held += static_cast<std::size_t>(std::fabs(off[i] - mean / static_cast<double>(off.size())) <= 1.96 * deviation[i]);
+  out["band_held"] = held;
+  out["band_points"] = off.size();
+}
+
 /// Joints, and those of them that have a sentence with a place. `found`: joints with a healthy robot's own friction
 /// under its name. The sentence is rightly about that, and they don't count.
 void count_places(const json& diagnosis, const std::set<std::size_t>& found, json& out) {
@@ -117,6 +143,34 @@ void count_places(const json& diagnosis, const std::set<std::size_t>& found, jso
   }
   out["joints"] = joints;
   out["joints_placed"] = placed;
+}
+
+/// A truth that the catalogue has no name for: noticed, placed, and given a curve.
+void score_outside(const json& truth, const json& diagnosis, const std::set<std::size_t>& unexplained,
+                   const std::vector<Named>& named, json& out) {
+  const json& first = truth.at("effects").front();
+  const std::size_t joint = true_joint(first);
+  const bool flagged = unexplained.contains(joint);
+  if (first.contains("place") && joint > 0)
+    out["placed"] = is_placed(diagnosis.at("joints").at(joint - 1), first.at("place"));
+  if (first.contains("curve") && joint > 0) {
+    // Right is the form's variable at the joint and no curve elsewhere; none where no curve has the form.
+    const std::string curve = curve_at(diagnosis.at("joints").at(joint - 1));
+    out["curve"] = curve;
+    out["curve_right"] = curve == first.at("curve").get<std::string>() && count_curves(diagnosis) <= !curve.empty();
+    const json& drawn = diagnosis.at("joints").at(joint - 1).value("curve", json());
+    out["curve_in_model"] = !curve.empty() && drawn.value("in_model", false);
+    if (out["curve_right"] && first.contains("swept") && !curve.empty())
+      count_band(drawn, first.at("swept"), truth.value("clock_s", 0.0), out);
+  }
+  const bool taken = any_of(named.begin(), named.end(), [&](const Named& one) { return one.joint == joint; });
+  out["flagged"] = flagged;
+  out["accepted"] = std::any_of(named.begin(), named.end(),
+                                [&](const Named& one) { return !flagged || !unexplained.contains(one.joint); });
+  out["named_beside"] = taken && flagged;
+  out["taken"] = taken;
+  out["right_joint"] = flagged || taken;
+  out["passed"] = flagged;
 }
 
 json score(const json& truth, const json& diagnosis, std::optional<double> closure) {
@@ -186,24 +240,7 @@ json score(const json& truth, const json& diagnosis, std::optional<double> closu
 
   const json& first = effects.front();
   if (first.value("outside", false)) {
-    const std::size_t joint = true_joint(first);
-    const bool flagged = unexplained.contains(joint);
-    if (first.contains("place") && joint > 0)
-      out["placed"] = is_placed(diagnosis.at("joints").at(joint - 1), first.at("place"));
-    if (first.contains("curve") && joint > 0) {
-      // Right is the form's variable at the joint and no curve elsewhere; none where no curve has the form.
-      const std::string curve = curve_at(diagnosis.at("joints").at(joint - 1));
-      out["curve"] = curve;
-      out["curve_right"] = curve == first.at("curve").get<std::string>() && count_curves(diagnosis) <= !curve.empty();
-    }
-    const bool taken = any_of(named.begin(), named.end(), [&](const Named& one) { return one.joint == joint; });
-    out["flagged"] = flagged;
-    out["accepted"] = std::any_of(named.begin(), named.end(),
-                                  [&](const Named& one) { return !flagged || !unexplained.contains(one.joint); });
-    out["named_beside"] = taken && flagged;
-    out["taken"] = taken;
-    out["right_joint"] = flagged || taken;
-    out["passed"] = flagged;
+    score_outside(truth, diagnosis, unexplained, named, out);
     return out;
   }
   if (effects.size() > 1) {

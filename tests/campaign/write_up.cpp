@@ -199,9 +199,22 @@ std::vector<Figure> place_figures(const std::vector<json>& results, const Filter
     quiet.of += joints;
     quiet.hit += joints - r.at("score").at("joints_placed").get<std::size_t>();
   }
+  Rate band;
+  for (const json* r : where(results, curved)) {
+    if (!done(*r) || !r->at("score").contains("band_points")) continue;
+    band.hit += r->at("score").at("band_held").get<std::size_t>();
+    band.of += r->at("score").at("band_points").get<std::size_t>();
+  }
+  const auto closures = values_of(
+      results, [=](const json& r) { return curved(r) && has(r, "curve_right") && has(r, "curve_in_model"); },
+      "closure");
+  const double closed = median(closures);
   return {at_least("outside the catalogue: where it sits, variable and interval", rate(results, known, "placed"), 0.9),
           at_least("outside the catalogue: curve of the right variable and joint; none where none has the form",
                    rate(results, curved, "curve_right"), 0.9),
+          {"outside the catalogue: closed in truth by a right curve in the model, median", ">= 0.90", closed,
+           closures.size(), closed >= 0.9},
+          at_least("outside the catalogue: points whose band of 95 % holds the truth, right curves", band, 0.9),
           at_least("clean robots: joints without a place", quiet, 0.95)};
 }
 
@@ -242,6 +255,12 @@ std::vector<Figure> drawn_figures(const std::vector<json>& results) {
     ++alarms.of;
     alarms.hit += static_cast<std::size_t>(!done(*r) || has(*r, "false_alarm"));
   }
+  Rate curve_instead;
+  for (const json* r : where(results, told)) {
+    ++curve_instead.of;
+    curve_instead.hit +=
+        static_cast<std::size_t>(done(*r) && !has(*r, "found") && r->at("score").value("curves", 0) > 0);
+  }
   std::vector<Figure> list{at_least("drawn, told apart: named right", rate(results, told, "found"), 0.95),
                            at_least("drawn, told apart: right joint", rate(results, told, "right_joint"), 0.98),
                            at_least("drawn, friction with memory and a baseline",
@@ -250,6 +269,7 @@ std::vector<Figure> drawn_figures(const std::vector<json>& results) {
                                     rate(results, of(told, of(baseline, position_or_load)), "found"), 0.9),
                            at_least("drawn, link encoders", rate(results, of(told, linked), "found"), 0.95),
                            at_most("drawn, a name too many", rate(results, told, "too_many"), 0.03),
+                           at_most("drawn, told apart: a curve in place of the name", curve_instead, 0.05),
                            at_least("drawn, outside the catalogue: flagged", rate(results, outside, "flagged"), 0.95),
                            at_least("drawn, of what is established: right", established, 0.98),
                            at_least("drawn, of what is likely: right", likely, 0.8),

@@ -86,10 +86,8 @@ TEST(VerdictOfAJoint, IsWhatIsThereAndWhatIsLeft) {
   EXPECT_EQ(verdict_of(state), Verdict::unexplained);
 }
 
-TEST(VerdictOfAJoint, ALikelyEffectAloneExplainsNothing) {
+TEST(VerdictOfAJoint, AnEffectOnTheRobotExplainsIt) {
   JointState state;
-  state.likely = true;
-  EXPECT_EQ(verdict_of(state), Verdict::unexplained);
   state.reached = true;
   EXPECT_EQ(verdict_of(state), Verdict::explained);
 }
