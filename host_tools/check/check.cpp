@@ -229,20 +229,24 @@ void append(std::vector<CheckFinding> more, std::vector<CheckFinding>& to) {
 
 /// Facts of all logs, read role by role; findings of those that the fit does not see.
 /// @param fitted train and validate logs; empty: there is none to compare with
+/// @param of_train known already
 std::vector<LogFacts> read_facts(const Project& project, const std::filesystem::path& directory,
-                                 const std::vector<ProcessedLog>& fitted, KnownRows& known, const CheckOptions& options,
-                                 std::vector<CheckFinding>& findings) {
+                                 const std::vector<ProcessedLog>& fitted, const std::vector<LogFacts>& of_train,
+                                 KnownRows& known, const CheckOptions& options, std::vector<CheckFinding>& findings) {
   std::optional<TorqueSamples> train;
   if (project.check.columns && !fitted.empty()) {
-    std::vector<ProcessedLog> logs = fitted;
-    std::erase_if(logs, [](const ProcessedLog& log) { return log.role != Role::train; });
-    train = sample_torque(logs, options.arrangement.samples, project.signals.torque_lead_s.value_or(0));
+    // Of those that train; a copy of them would hold a long log twice.
+    train = sample_torque(fitted, options.arrangement.samples, project.signals.torque_lead_s.value_or(0));
   }
   std::vector<LogFacts> out;
   for (const Role role : {Role::baseline, Role::train, Role::validate, Role::test}) {
+    if (role == Role::train) {
+      out.insert(out.end(), of_train.begin(), of_train.end());
+      continue;
+    }
     for (Log& log : read_logs(project, role, directory, &known)) {
       out.push_back(facts_of(log, options.facts));
-      if (role == Role::train || !train) continue;
+      if (!train) continue;
       append(check_one_log(project, *train, std::move(log), fitted.front().filter, options.arrangement), findings);
     }
   }
@@ -271,10 +275,18 @@ std::string inline_text(const std::string& lines) {
 
 }  // namespace
 
+std::vector<LogFacts> facts_of_train_logs(const Project& project, const std::filesystem::path& directory,
+                                          const LogFactOptions& options) {
+  std::vector<LogFacts> out;
+  for (const Log& log : read_logs(project, Role::train, directory)) out.push_back(facts_of(log, options));
+  return out;
+}
+
 std::vector<std::string> check_before_fit(const Project& project, const std::filesystem::path& directory,
-                                          GateData& data, const CheckOptions& options) {
+                                          GateData& data, const std::vector<LogFacts>& train,
+                                          const CheckOptions& options) {
   std::vector<CheckFinding> findings = compare_with_urdf(project, directory, data.logs, options.arrangement);
-  const std::vector<LogFacts> facts = read_facts(project, directory, data.logs, data.rows, options, findings);
+  const std::vector<LogFacts> facts = read_facts(project, directory, data.logs, train, data.rows, options, findings);
   append(findings_alone(project, facts, options.facts), findings);
   std::vector<std::string> notes;
   for (const CheckFinding& finding : findings) {
@@ -293,6 +305,7 @@ std::vector<std::string> check_before_fit(const Project& project, const std::fil
 CheckResult check(const Project& project, const std::filesystem::path& directory, const CheckOptions& options) {
   CheckResult result;
   std::vector<ProcessedLog> train;
+  const std::vector<LogFacts> of_train = facts_of_train_logs(project, directory, options.facts);
   KnownRows known;
   if (project.has_role(Role::train)) {
     GateData data = read_gate_data(project, directory);
@@ -307,7 +320,7 @@ CheckResult check(const Project& project, const std::filesystem::path& directory
     train = std::move(data.logs);
     known = std::move(data.rows);
   }
-  result.logs = read_facts(project, directory, train, known, options, result.findings);
+  result.logs = read_facts(project, directory, train, of_train, known, options, result.findings);
   result.joints = joints_of(result.logs, project.robot, train);
   append(saturation_of(result.joints, options.facts), result.findings);
   if (!project.has_role(Role::train)) {

@@ -98,11 +98,17 @@ std::vector<CheckFinding> check_columns(const Project& project, const std::vecto
 /// @param train samples of the train logs @param filter theirs
 std::vector<CheckFinding> check_one_log(const Project& project, const TorqueSamples& train, Log log,
                                         const FilterFit& filter, const ArrangementOptions& options = {});
+/// Facts of the train logs, which are read for them: before those that fit are held, so that a long log is not held
+/// twice.
+std::vector<LogFacts> facts_of_train_logs(const Project& project, const std::filesystem::path& directory,
+                                          const LogFactOptions& options = {});
 /// For verbs that go on to a fit: what check() would complain of, as notes. Test logs are looked at, too, but decide
 /// nothing.
+/// @param train facts of the train logs
 /// @throws DataError: the data can't be what the project says, with the line to write
 std::vector<std::string> check_before_fit(const Project& project, const std::filesystem::path& directory,
-                                          GateData& data, const CheckOptions& options = {});
+                                          GateData& data, const std::vector<LogFacts>& train,
+                                          const CheckOptions& options = {});
 /// All of it. Logs of scenarios are made below `directory`.
 CheckResult check(const Project& project, const std::filesystem::path& directory, const CheckOptions& options = {});
 

@@ -15,12 +15,17 @@ using Eigen::VectorXd;
 
 namespace {
 
-/// Speeds over a window: single steps of a coarse encoder are no motion, nor is its noise.
-Eigen::MatrixXd coarse_speed(const Log& log, double window_s, Index& window) {
-  window =
-      std::clamp<Index>(static_cast<Index>(std::ceil(window_s / log.step_s)), 1, std::max<Index>(1, log.samples() / 4));
+/// Samples of a window.
+Index window_of(const Log& log, double window_s) {
+  return std::clamp<Index>(static_cast<Index>(std::ceil(window_s / log.step_s)), 1,
+                           std::max<Index>(1, log.samples() / 4));
+}
+
+/// How fast a joint is over a window: single steps of a coarse encoder are no motion, nor is its noise.
+VectorXd coarse_speed(const Log& log, Index joint, Index window) {
   const Index rows = log.samples() - window;
-  return (log.q.bottomRows(rows) - log.q.topRows(rows)) / (static_cast<double>(window) * log.step_s);
+  const auto q = log.q.col(joint);
+  return ((q.tail(rows) - q.head(rows)) / (static_cast<double>(window) * log.step_s)).cwiseAbs();
 }
 
 /// Deviation of white noise of a position, from the median of its third differences, of which motion has next to none.
@@ -85,9 +90,9 @@ LogFacts facts_of(const Log& log, const LogFactOptions& options) {
   facts.time_note = log.time_note;
   facts.q_lower = log.q.colwise().minCoeff().transpose().array() + 0.0;  // no "-0"
   facts.q_upper = log.q.colwise().maxCoeff().transpose().array() + 0.0;
-  Index short_window = 1, window = 1;
-  facts.speed = coarse_speed(log, options.speed_window_s, short_window).cwiseAbs().colwise().maxCoeff().transpose();
-  const Eigen::MatrixXd speed = coarse_speed(log, options.rest_window_s, window).cwiseAbs();
+  const Index short_window = window_of(log, options.speed_window_s), window = window_of(log, options.rest_window_s);
+  facts.speed.resize(log.joints());
+  for (Index j = 0; j < log.joints(); ++j) facts.speed[j] = coarse_speed(log, j, short_window).maxCoeff();
   facts.largest_torque =
       log.tau.size() > 0 ? VectorXd(log.tau.cwiseAbs().colwise().maxCoeff().transpose()) : VectorXd::Zero(log.joints());
   facts.encoder_step.resize(log.joints());
@@ -97,20 +102,22 @@ LogFacts facts_of(const Log& log, const LogFactOptions& options) {
   // A joint rests where it moves by less than two steps of its encoder, or by next to nothing of its speed.
   const double window_s = static_cast<double>(window) * log.step_s;
   VectorXd rest = (options.rest_speed * facts.speed).cwiseMax(2.01 / window_s * facts.encoder_step);
-  for (Index j = 0; j < log.joints(); ++j)
+  const Index rows = log.samples() - window;
+  Eigen::Array<bool, Eigen::Dynamic, 1> resting = Eigen::Array<bool, Eigen::Dynamic, 1>::Constant(rows, true);
+  for (Index j = 0; j < log.joints(); ++j) {
     rest[j] = std::max(rest[j], options.noise_deviations * std::numbers::sqrt2 * noise_of(log.q.col(j)) / window_s);
-  const auto resting = [&](Index k) { return (speed.row(k).transpose().array() <= rest.array()).all(); };
-  Index first = 0, last = speed.rows(), count = 0;
-  for (Index k = 0; k < speed.rows(); ++k) count += resting(k);
-  while (first < speed.rows() && resting(first)) ++first;
-  while (last > first && resting(last - 1)) --last;
-  facts.rest_share = static_cast<double>(count) / static_cast<double>(std::max<Index>(1, speed.rows()));
+    resting = resting && (coarse_speed(log, j, window).array() <= rest[j]);
+  }
+  Index first = 0, last = rows;
+  while (first < rows && resting[first]) ++first;
+  while (last > first && resting[last - 1]) --last;
+  facts.rest_share = static_cast<double>(resting.count()) / static_cast<double>(std::max<Index>(1, rows));
   const bool moves = first < last;
   // Of the first window that is not at rest only its end has moved.
   const Index margin = window - short_window;
   facts.rest_until_s = moves ? log.t[first > 0 ? first + margin : 0] : log.t[0];
   facts.rest_from_s =
-      moves ? log.t[last < speed.rows() ? last - 1 + short_window : log.samples() - 1] : log.t[log.samples() - 1];
+      moves ? log.t[last < rows ? last - 1 + short_window : log.samples() - 1] : log.t[log.samples() - 1];
   facts.begin_s = log.t[0];
   facts.end_s = log.t[log.samples() - 1];
   return facts;

@@ -76,7 +76,8 @@ class Comparison {
   /// @param resumable a verb's own: the logs are checked, swarms keep their last generation in `directory`
   Comparison(const Project& project, const fs::path& directory, bool resumable)
       : project_(project), directory_(directory), data_(read_gate_data(project_, directory)), resumable_(resumable) {
-    if (resumable) check_before_fit(project_, directory_, data_);  // "named_bls" tells its notes
+    // "named_bls" tells its notes.
+    if (resumable) check_before_fit(project_, directory_, data_, facts_of_train_logs(project_, directory_));
     for (const char* name : searched) {
       if (const auto resume = resume_file(name)) resume->check_inputs();
     }

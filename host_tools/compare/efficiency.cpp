@@ -76,8 +76,10 @@ class Efficiency {
 
   /// @throws DataError: the logs can't be what the project says
   void check_logs() const {
+    const std::vector<LogFacts> of_train = facts_of_train_logs(project_, directory_);
     GateData data = read_gate_data(project_, directory_);
-    for (const std::string& note : check_before_fit(project_, directory_, data)) fmt::print(stderr, "note: {}\n", note);
+    for (const std::string& note : check_before_fit(project_, directory_, data, of_train))
+      fmt::print(stderr, "note: {}\n", note);
   }
 
   EfficiencyResult run() {

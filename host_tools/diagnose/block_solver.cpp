@@ -84,7 +84,7 @@ void BlockSolver::replace_rows(std::size_t joint, MatrixXd x, VectorXd y, Matrix
   rows.sum_up(blocks_.all, 0);
 }
 
-std::vector<Index> BlockSolver::append(std::span<const std::vector<MatrixXd>> groups) {
+std::vector<Index> BlockSolver::append(std::vector<std::vector<MatrixXd>> groups) {
   std::vector<Index> first, count;
   for (const std::vector<MatrixXd>& made : groups) {
     Index most = 0;
@@ -113,6 +113,7 @@ std::vector<Index> BlockSolver::append(std::span<const std::vector<MatrixXd>> gr
       const Index place = rows.place(first[g]);
       rows.x.middleCols(place, count[g]) = groups[g][j].topRows(rows.x.rows());
       rows.extra_x.middleCols(place, count[g]) = groups[g][j].bottomRows(rows.extra_y.size());
+      groups[g][j].resize(0, 0);
     }
     rows.sum_up(blocks_.all, from);
   });

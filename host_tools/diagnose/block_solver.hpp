@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Dense>
-#include <span>
 #include <vector>
 
 #include "host_tools/diagnose/blocks.hpp"
@@ -73,8 +72,9 @@ class BlockSolver {
   void replace_rows(std::size_t joint, Eigen::MatrixXd x, Eigen::VectorXd y, Eigen::MatrixXd extra_x = {},
                     Eigen::VectorXd extra_y = {});
   /// Appends groups of columns, by group and joint: rows of all blocks, the joint's extra ones below; 0 x 0 where
-  /// nothing is felt. @returns by group: its first column
-  std::vector<Eigen::Index> append(std::span<const std::vector<Eigen::MatrixXd>> groups);
+  /// nothing is felt. They are taken joint by joint: all of them together are as large as what they become.
+  /// @returns by group: its first column
+  std::vector<Eigen::Index> append(std::vector<std::vector<Eigen::MatrixXd>> groups);
   /// Weights and coefficients of all columns, by turns. @returns the fit with the weights that it led to
   LinearFit estimate_weights() { return estimate_weights(blocks_.fit); }
   LinearFit estimate_weights(const std::vector<std::size_t>& blocks);

@@ -17,6 +17,7 @@
 #include "host_tools/diagnose/healthy_session.hpp"
 #include "host_tools/diagnose/left_curves.hpp"
 #include "host_tools/diagnose/nominal_model.hpp"
+#include "host_tools/diagnose/parked_columns.hpp"
 #include "host_tools/diagnose/recording_faults.hpp"
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/diagnose/sessions.hpp"
@@ -63,7 +64,7 @@ class Diagnoser {
     // A change beside a baseline is something or other; without one every joint may lack all that it is asked for.
     task_.settings.most = 4 + joints() * (models_.has_baseline ? 1 : task_.settings.max_effects);
     logs_ = sessions(data_.logs, baseline_, session_, options.session);
-    note_windows(options.session);
+    add_notes(note_of_windows(logs_, options.session));
     for (std::size_t j = 0; j < joints(); ++j) {
       if (!still_[j]) continue;
       for (const std::string_view effect : joint_effect_names()) {
@@ -76,7 +77,9 @@ class Diagnoser {
     check_lengths(logs_, options().session);
     note_who_judges();
     if (models_.has_baseline) {
+      ParkedColumns parked(data_.logs);
       learn_baseline();
+      parked.take_back();
     } else {
       models_.current = nominal_model(project_, data_, false, progress_);
       mute(logs_, models_.current, still_, options().session);
@@ -113,11 +116,13 @@ class Diagnoser {
     result.nominal = before.current;
 
     Gate gate;
+    ParkedColumns parked(data_.logs);
     Outcome outcome = found_effects(start, gate);
     // What wanders may have got the name of an effect, and hides others.
     const Curves wandering = take_off_what_wanders(outcome, gate, still_, logs_);
     if (is_any(wandering)) search_without(start, outcome, gate);
     const std::vector<Likely> likely = set_aside(outcome, gate, models_.current, logs_, still_);
+    parked.take_back();
     result.nominal = finished(result.nominal);
     const IdentifiedModel judged_against = deflections_.found.empty() ? result.nominal : finished(models_.current);
     result.model = concluded(outcome, gate);
@@ -147,15 +152,6 @@ class Diagnoser {
 
  private:
   Retrial retrial() const { return {models_.current, logs_, still_, task_}; }
-  void note_windows(const SessionOptions& options) {
-    const auto is_window = [](const SessionLog& entry) { return entry.continues || entry.log.ran_s > 0; };
-    const auto windows = std::count_if(logs_.begin(), logs_.end(), is_window);
-    if (windows == 0) return;
-    notes_.push_back(
-        fmt::format("the logs are longer than the search for effects needs: it looks at {} windows of {:g} s, spread "
-                    "evenly over them; figures are of the whole logs",
-                    windows, options.window_s));
-  }
   void note_who_judges() {
     const auto judges = [](const ProcessedLog& log) { return log.role == Role::validate; };
     if (data_.logs.size() > 1 && std::none_of(data_.logs.begin(), data_.logs.end(), judges)) {
@@ -404,9 +400,7 @@ class Diagnoser {
 
   /// What the healthy session has that is not nominal is its background: learned, not reported.
   void learn_baseline() {
-    GateData healthy = data_;
-    healthy.logs = baseline_;
-    healthy.notes.clear();
+    GateData healthy = with_other_logs(data_, baseline_);
     models_.healthy = healthy_model(project_, healthy);
     mute(logs_, models_.healthy, still_, options().session);
     std::vector<SessionLog> before;

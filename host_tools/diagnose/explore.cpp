@@ -104,7 +104,10 @@ bool forget_lost_rotors(Models& models, std::vector<EffectId>& ids) {
 /// Searches around the models of an outcome, which become those of the choice. @returns whether that is another
 bool explore_once(Outcome& out, const std::vector<SessionLog>& logs, const SearchTask& task, Progress& progress) {
   Models& models = out.models;
-  Linearised problem(models, logs, out.whitening);
+  out.problem.reset();  // that of the pass before
+  out.features.clear();
+  auto with_candidates = std::make_unique<Linearised>(models, logs, out.whitening);
+  Linearised& problem = *with_candidates;
   const std::vector<std::size_t> start = in_model(problem);
   std::vector<EffectCandidate> skip = task.never;
   for (const std::size_t g : start) skip.push_back(problem.groups()[g].candidate);
@@ -121,13 +124,15 @@ bool explore_once(Outcome& out, const std::vector<SessionLog>& logs, const Searc
     return std::find(choice.groups.begin(), choice.groups.end(), g) == choice.groups.end();
   });
   const bool changed = out.dropped || ids.size() > start.size();
-  if (changed) refit(models, logs, problem.noise().whitening(), 4);
-  if (forget_lost_rotors(models, ids)) refit(models, logs, problem.noise().whitening(), 2);
+  const std::vector<VectorXd> whitening = problem.noise().whitening();
+  with_candidates.reset();  // what follows linearises again, and its columns are the most that is ever held
+  if (changed) refit(models, logs, whitening, 4);
+  if (forget_lost_rotors(models, ids)) refit(models, logs, whitening, 2);
   out.found.clear();
   for (std::size_t i = 0; i < ids.size(); ++i)
     out.found.push_back({ids[i], found[i].score, found[i].alternatives, found[i].rival});
   // Without a baseline the gap was part of what looked like noise.
-  out.whitening = changed && !models.has_baseline ? colours(models, logs) : problem.noise().whitening();
+  out.whitening = changed && !models.has_baseline ? colours(models, logs) : whitening;
   out.look_again(logs);
   return changed;
 }
@@ -153,6 +158,8 @@ bool Outcome::structured() const {
 bool Outcome::structured(std::size_t joint) const { return lack[joint].structured(models.options.lack_of_fit); }
 
 void Outcome::look_again(const std::vector<SessionLog>& logs) {
+  problem.reset();  // before the next one is made
+  features.clear();
   problem = std::make_unique<Linearised>(models, logs, whitening);
   whitening = problem->noise().whitening();
   features.resize(problem->joints());
@@ -165,6 +172,7 @@ void Outcome::look_again(const std::vector<SessionLog>& logs) {
     features[j] = diagnosis::features(*problem, j, models.has_baseline);
     lack[j] = lack_of_fit(*problem, j, fit, alone ? &*alone : nullptr, features[j]);
   });
+  problem->forget_encoders();
 }
 
 Outcome explore(const Models& models, const std::vector<SessionLog>& logs, const SearchTask& task, int passes,

@@ -38,26 +38,34 @@ GapErrors::GapErrors(const Conclusion& conclusion) : conclusion_(conclusion) {
     std::swap(shown_.logs, judges_.logs);
     figures_on_ = blocks_judge_ ? gate_of(conclusion_.now) : "validate logs, which also decided which names stay";
   }
-  predict_all(shown_);
-  predict_all(judges_);
+  sum_up(shown_);
+  sum_up(judges_);
+  first_after_ = predict(conclusion_.model, first_shown());
 }
 
-void GapErrors::predict_all(Set& set) const {
+void GapErrors::sum_up(Set& set) const {
   set.before.resize(set.logs.size());
   set.after.resize(set.logs.size());
   parallel_for(set.logs.size(), [&](std::size_t l) {
-    set.before[l] = predict(conclusion_.nominal, *set.logs[l]);
-    set.after[l] = predict(conclusion_.model, *set.logs[l]);
+    const ProcessedLog& log = *set.logs[l];
+    const auto squares = [&](const IdentifiedModel& model) {
+      const MatrixXd torque = predict(model, log);
+      VectorXd out(torque.cols());
+      for (Index j = 0; j < out.size(); ++j)
+        out[j] =
+            error_of(log, torque, static_cast<std::size_t>(j)).segment(log.first, log.last - log.first).squaredNorm();
+      return out;
+    };
+    set.before[l] = squares(conclusion_.nominal);
+    set.after[l] = squares(conclusion_.model);
   });
 }
 
-double GapErrors::error(const Set& set, const std::vector<MatrixXd>& torque, std::size_t joint) const {
+double GapErrors::error(const Set& set, const std::vector<VectorXd>& squares, std::size_t joint) const {
   double square = 0, count = 0;
   for (std::size_t l = 0; l < set.logs.size(); ++l) {
-    const ProcessedLog& log = *set.logs[l];
-    const Index samples = log.last - log.first;
-    square += error_of(log, torque[l], joint).segment(log.first, samples).squaredNorm();
-    count += static_cast<double>(samples);
+    square += squares[l][static_cast<Index>(joint)];
+    count += static_cast<double>(set.logs[l]->last - set.logs[l]->first);
   }
   return std::sqrt(square / std::max(count, 1.0));
 }

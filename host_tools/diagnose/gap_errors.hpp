@@ -28,16 +28,16 @@ class GapErrors {
   const std::string& figures_on() const { return figures_on_; }
   const ProcessedLog& first_shown() const { return *shown_.logs.front(); }
   /// Torque of the model with what was found.
-  const Eigen::MatrixXd& first_after() const { return shown_.after.front(); }
+  const Eigen::MatrixXd& first_after() const { return first_after_; }
 
  private:
   struct Set {
     std::vector<const ProcessedLog*> logs;
-    std::vector<Eigen::MatrixXd> before, after;  ///< the models' torque
+    std::vector<Eigen::VectorXd> before, after;  ///< by log: squares of both models' errors, by joint
   };
-  /// Predicts both models' torque.
-  void predict_all(Set& set) const;
-  double error(const Set& set, const std::vector<Eigen::MatrixXd>& torque, std::size_t joint) const;
+  /// Both models' errors, as sums: torques of all logs are as large as the logs.
+  void sum_up(Set& set) const;
+  double error(const Set& set, const std::vector<Eigen::VectorXd>& squares, std::size_t joint) const;
   /// Errors of what was fitted come out too small by the square root of this.
   double judged_over_fitted(const Eigen::VectorXd& judged, const Eigen::VectorXd& fitted, std::size_t joint) const;
 
@@ -45,6 +45,7 @@ class GapErrors {
   std::string figures_on_;
   bool blocks_judge_ = false;  ///< train logs judged one another
   Set shown_, judges_;         ///< no judges: they are those that are shown
+  Eigen::MatrixXd first_after_;
 };
 
 }  // namespace fxdyn::diagnosis

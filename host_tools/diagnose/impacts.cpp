@@ -79,7 +79,8 @@ std::vector<std::optional<Impacts>> find_impacts(const IdentifiedModel& model, c
   std::vector<Count> train(n), judges(n), old(n);
   const auto count = [n, &options](const IdentifiedModel& of, const std::vector<ProcessedLog>& logs, auto&& list_of) {
     for (const ProcessedLog& log : logs) {
-      const MatrixXd error = log.tau - predict(of, log);
+      MatrixXd error = predict(of, log);  // in place: a long log's columns are held once
+      error = log.tau - error;
       std::vector<Count>& list = list_of(log);
       parallel_for(n, [&](std::size_t j) { add(list[j], log, j, error.col(static_cast<Index>(j)), options); });
     }

@@ -207,11 +207,11 @@ const std::vector<MatrixXd>& Linearised::load_columns() const {
 }
 
 const Linearised* Linearised::through_encoders() const {
-  std::call_once(seen_made_, [&] {
-    seen_logs_ = logs();
+  std::call_once(seen_->made, [&] {
+    seen_->logs = logs();
     bool any = false;
-    for (std::size_t l = 0; l < seen_logs_.size(); ++l) {
-      SessionLog& entry = seen_logs_[l];
+    for (std::size_t l = 0; l < seen_->logs.size(); ++l) {
+      SessionLog& entry = seen_->logs[l];
       if (entry.healthy) continue;
       const std::optional<MotionRows> moved = see_again(entry.log);
       if (!moved) continue;
@@ -220,9 +220,9 @@ const Linearised* Linearised::through_encoders() const {
       const MatrixXd error = entry.log.tau - log_columns_.torque_of(l, log_columns_.model(l));
       entry.log.tau = log_columns_.torque_along(l, *moved) + as_much_noise(entry.log, error, l + 1);
     }
-    if (any) seen_ = std::make_unique<Linearised>(models(), seen_logs_, noise_.whitening());
+    if (any) seen_->problem = std::make_unique<Linearised>(models(), seen_->logs, noise_.whitening());
   });
-  return seen_.get();
+  return seen_->problem.get();
 }
 
 namespace {
@@ -236,7 +236,7 @@ Index most_columns(const std::vector<MatrixXd>& of_joints) {
 }  // namespace
 
 std::size_t Linearised::add(Group group, const std::vector<MatrixXd>& columns) {
-  group.first = solver_->append({&columns, 1}).front();
+  group.first = solver_->append({columns}).front();
   group.count = most_columns(columns);
   groups_.push_back(std::move(group));
   return groups_.size() - 1;
@@ -246,11 +246,9 @@ void Linearised::add_all(std::vector<Group> groups) {
   if (groups.empty()) return;
   std::vector<std::vector<MatrixXd>> made(groups.size());
   parallel_for(groups.size(), [&](std::size_t g) { made[g] = make(groups[g]); });
-  const std::vector<Index> first = solver_->append(made);
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    groups[g].first = first[g];
-    groups[g].count = most_columns(made[g]);
-  }
+  for (std::size_t g = 0; g < groups.size(); ++g) groups[g].count = most_columns(made[g]);
+  const std::vector<Index> first = solver_->append(std::move(made));
+  for (std::size_t g = 0; g < groups.size(); ++g) groups[g].first = first[g];
   groups_.insert(groups_.end(), groups.begin(), groups.end());
 }
 

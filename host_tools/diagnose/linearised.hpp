@@ -64,6 +64,8 @@ class Linearised {
   /// The same of a robot that is this model and nothing else, seen through the same encoders (seen_again()); null where
   /// they make no error. Made once. Safe from several threads.
   const Linearised* through_encoders() const;
+  /// Its columns are as many as this one's: it is made again where it is asked for again.
+  void forget_encoders() { seen_ = std::make_unique<Seen>(); }
   /// Appends them as a group; returns its index.
   std::size_t add(Group group, const std::vector<Eigen::MatrixXd>& columns);
   void add_all(std::vector<Group> groups);
@@ -87,9 +89,12 @@ class Linearised {
   std::vector<std::unique_ptr<Background>> background_;  ///< per joint
   mutable std::once_flag load_made_;
   mutable std::vector<Eigen::MatrixXd> load_;
-  mutable std::once_flag seen_made_;
-  mutable std::vector<SessionLog> seen_logs_;
-  mutable std::unique_ptr<Linearised> seen_;
+  struct Seen {
+    std::once_flag made;
+    std::vector<SessionLog> logs;
+    std::unique_ptr<Linearised> problem;
+  };
+  std::unique_ptr<Seen> seen_ = std::make_unique<Seen>();
 };
 
 /// Covariance of the base parameters, whatever else is fitted.

@@ -51,11 +51,16 @@ LogColumns::LogColumns(const Models& models, const std::vector<SessionLog>& logs
       robot_(logs.size()) {
   parallel_for(logs.size(), [&](std::size_t l) {
     const ProcessedLog& log = logs[l].log;
-    MotionRows m = log.motion();
-    motions_[l] = std::make_unique<Motion>(
-        Motion{log.name, log.step_s, log.t, std::move(m.q), std::move(m.dq), std::move(m.ddq)});
-    if (const double cutoff = logs[l].bending_hz; cutoff > 0)
-      slow_[l] = std::make_unique<Motion>(slow_part(*motions_[l], cutoff));
+    RowCache& cache = *logs[l].cache;
+    std::call_once(cache.moved, [&] {
+      MotionRows m = log.motion();
+      cache.motion =
+          std::make_unique<Motion>(log.name, log.step_s, log.t, std::move(m.q), std::move(m.dq), std::move(m.ddq));
+      if (const double cutoff = logs[l].bending_hz; cutoff > 0)
+        cache.slow = std::make_unique<Motion>(slow_part(*cache.motion, cutoff));
+    });
+    motions_[l] = cache.motion.get();
+    slow_[l] = cache.slow.get();
     robot_[l] = std::make_shared<RobotColumns>(with_load_of(log, model(l)), *motions_[l]);
   });
 }
@@ -191,7 +196,7 @@ std::shared_ptr<const RobotColumns> LogColumns::robot_with(std::size_t log, cons
 }
 
 MatrixXd LogColumns::torque_of(std::size_t log, ModelValue model) const {
-  return torque_of_both(with_load_of((*logs_)[log].log, std::move(model)), *motions_[log], slow_[log].get());
+  return torque_of_both(with_load_of((*logs_)[log].log, std::move(model)), *motions_[log], slow_[log]);
 }
 
 MatrixXd LogColumns::torque_along(std::size_t log, const MotionRows& motion) const {

@@ -71,8 +71,8 @@ class LogColumns {
   const std::vector<SessionLog>* logs_;
   DhChain chain_;
   BaseSet base_;
-  std::vector<std::unique_ptr<Motion>> motions_;
-  std::vector<std::unique_ptr<Motion>> slow_;  ///< by log: its motion below bending_hz; null: the same
+  std::vector<const Motion*> motions_;  ///< of the logs' caches
+  std::vector<const Motion*> slow_;     ///< by log: its motion below bending_hz; null: the same
   std::vector<std::shared_ptr<const RobotColumns>> robot_;
   /// By log, joint, the rotor's inertia, and whether the effect bends.
   mutable std::map<std::tuple<std::size_t, std::size_t, double, bool>, std::shared_ptr<const RobotColumns>> for_group_;

@@ -8,13 +8,29 @@ namespace {
 
 /// Friction with memory that a model lacks looks like a torque that is not aligned: by how much it is beside the
 /// effects that `identify` adds by itself [s].
-double lead_beside_effects(Project project, const GateData& data, Progress& progress) {
-  GateData copy = data;
+double lead_beside_effects(Project project, GateData& data, Progress& progress) {
+  std::vector<std::string> notes = data.notes;  // what is found on the way is no finding
   project.identify.effects.reset();
-  return identify(project, copy, progress)->torque_lead_s();
+  const double lead = identify(project, data, progress)->torque_lead_s();
+  data.notes = std::move(notes);
+  return lead;
 }
 
 }  // namespace
+
+GateData with_other_logs(const GateData& data, const std::vector<ProcessedLog>& logs) {
+  GateData out;
+  out.filter = data.filter;
+  out.logs = logs;
+  out.references = data.references;
+  out.largest_torque = data.largest_torque;
+  out.q_lower = data.q_lower;
+  out.q_upper = data.q_upper;
+  out.dq = data.dq;
+  out.ddq = data.ddq;
+  out.threads = data.threads;
+  return out;
+}
 
 IdentifiedModel nominal_model(Project project, GateData& data, bool healthy, Progress& progress) {
   if (!project.identify.effects) project.identify.effects = nominal_effects();

@@ -11,4 +11,7 @@ namespace fxdyn::diagnosis {
 /// name @throws DataError as identify() does
 IdentifiedModel nominal_model(Project project, GateData& data, bool healthy, Progress& progress);
 
+/// What is known of the train logs, with other logs in their place: those may fill the memory.
+GateData with_other_logs(const GateData& data, const std::vector<ProcessedLog>& logs);
+
 }  // namespace fxdyn::diagnosis

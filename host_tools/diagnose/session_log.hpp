@@ -6,11 +6,12 @@
 #include <vector>
 
 #include "host_tools/regression/dataset.hpp"
+#include "host_tools/signals/motion.hpp"
 
 namespace fxdyn::diagnosis {
 
-/// Rows that follow from a log's motion alone, kept from one linearisation to the next: filtered and decimated, as they
-/// are before whitening.
+/// What follows from a log's motion alone, kept for all linearisations: the motion at the log's rate, and rows,
+/// filtered and decimated, as they are before whitening.
 struct RowCache {
   struct Features {
     Eigen::VectorXd scales;
@@ -19,6 +20,9 @@ struct RowCache {
   struct AllFeatures {
     Features of_motion, of_model;
   };
+  std::once_flag moved;
+  std::unique_ptr<const Motion> motion;
+  std::unique_ptr<const Motion> slow;  ///< below SessionLog::bending_hz; null: the same
   std::once_flag made;
   std::vector<Eigen::MatrixXd> base;  ///< per joint: its base columns, nothing following in the torque's path
   std::vector<AllFeatures> features;  ///< per joint, see features()

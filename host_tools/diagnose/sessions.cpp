@@ -4,7 +4,9 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "host_tools/diagnose/models.hpp"
@@ -25,26 +27,35 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+/// Another cut-off for the positions of a log.
+struct Smoothing {
+  double cutoff_hz = 0;
+  FilterFit lost;  ///< with the cut-offs between which it takes motion away
+};
+
 /// Positions without what is faster than the motion by far: noise in regressors is taken for structure, and what a
 /// coarse encoder makes of the acceleration may be more than the torque's own noise.
-void smooth(SessionLog& entry, const SessionOptions& options) {
+std::optional<Smoothing> plan_smoothing(SessionLog& entry, bool measured_velocity, const SessionOptions& options) {
   ProcessedLog& log = entry.log;
   entry.bending_hz = bending_hz(log);
   double& cutoff = log.filter.position_cutoff_hz;
   const double wanted = std::max(options.position_band * log.filter.excited_hz, options.lowest_position_hz);
-  if (log.measured_dq.size() > 0 || wanted >= std::min(cutoff, 0.4 / log.step_s)) return;
+  if (measured_velocity || wanted >= std::min(cutoff, 0.4 / log.step_s)) return {};
   const auto edge = whole_up(options.edge_periods / (wanted * log.step_s));
   const Index first = std::max(log.first, edge), last = std::min(log.last, log.samples() - edge);
-  if (last - first < (log.last - log.first) / 2) return;
-  FilterFit lost = log.filter;  // up to the filter of before
-  lost.crossing_hz = std::min(lost.crossing_hz, cutoff);
-  lost.position_cutoff_hz = cutoff = wanted;
-  const MatrixXd before = std::exchange(log.q, ZeroPhaseFilter(wanted, log.step_s).apply(log.q));
-  for (Index j = 0; j < log.q.cols(); ++j)
-    log.lose(j, log.q.cols(),
-             lost_velocity(before.col(j), log.q.col(j), lost, static_cast<std::size_t>(j), log.step_s));
+  if (last - first < (log.last - log.first) / 2) return {};
+  Smoothing out{wanted, log.filter};  // up to the filter of before
+  out.lost.crossing_hz = std::min(out.lost.crossing_hz, cutoff);
+  out.lost.position_cutoff_hz = cutoff = wanted;
   log.first = first;
   log.last = last;
+  return out;
+}
+
+/// @param log of that joint alone
+void smooth(ProcessedLog& log, Index joint, const Smoothing& by) {
+  const MatrixXd before = std::exchange(log.q, ZeroPhaseFilter(by.cutoff_hz, log.step_s).apply(log.q));
+  log.lose(0, 1, lost_velocity(before.col(0), log.q.col(0), by.lost, static_cast<std::size_t>(joint), log.step_s));
 }
 
 /// How many of its samples go into one.
@@ -70,6 +81,83 @@ void keep_alike_rows(std::vector<SessionLog>& logs, const SessionOptions& option
   for (SessionLog& entry : logs) entry.log.decimation = std::max<Index>(1, std::lround(interval_s / entry.log.step_s));
 }
 
+constexpr std::array columns_of_log{&ProcessedLog::q,   &ProcessedLog::measured_dq,   &ProcessedLog::measured_ddq,
+                                    &ProcessedLog::tau, &ProcessedLog::lost_velocity, &ProcessedLog::qlink};
+
+/// All that is no column, but the time; as many samples.
+ProcessedLog without_columns(const ProcessedLog& log) {
+  ProcessedLog out = part_of(log, 0, 1, log.first, log.last);
+  for (const auto columns : columns_of_log) (out.*columns).resize(0, 0);
+  out.q.resize(log.samples(), 0);
+  out.t = log.t;
+  out.from_s = log.from_s;
+  out.to_s = log.to_s;
+  out.saturated = log.saturated;
+  return out;
+}
+
+/// A log on its way into a session. Long ones fill the memory: what becomes of one is settled before its columns are
+/// touched, and those are taken joint by joint.
+class Recording {
+ public:
+  Recording(const ProcessedLog& log, bool healthy, double start, const SessionOptions& options)
+      : frame{without_columns(log), healthy, healthy || log.role == Role::train, std::max(0.0, log.t[0] - start)},
+        recorded_(log) {
+    double& cutoff = frame.log.filter.torque_cutoff_hz;
+    cutoff = std::min({cutoff, options.highest_cutoff_hz, frame.log.filter.position_cutoff_hz});
+    smoothing_ = plan_smoothing(frame, log.measured_dq.size() > 0, options);
+    every_ = thinning(frame.log, options);
+    frame.log = thinned(std::move(frame.log), every_);
+  }
+
+  /// The columns of one joint, smooth and thinned.
+  ProcessedLog of_joint(Index joint) const {
+    ProcessedLog out;
+    out.step_s = recorded_.step_s;
+    for (const auto columns : columns_of_log) {
+      if ((recorded_.*columns).size() > 0) out.*columns = (recorded_.*columns).col(joint);
+    }
+    if (smoothing_) smooth(out, joint, *smoothing_);
+    return thinned(std::move(out), every_);
+  }
+
+  SessionLog frame;  ///< without columns
+
+ private:
+  const ProcessedLog& recorded_;
+  std::optional<Smoothing> smoothing_;
+  Index every_ = 1;
+};
+
+/// The windows of all recordings with their columns; how far these move, and the recordings.
+struct Filled {
+  std::vector<SessionLog> logs;
+  Ranges of_windows, of_whole;
+};
+
+Filled fill(const std::vector<Recording>& recordings, const std::vector<std::vector<Window>>& windows, Index joints) {
+  Filled out{{}, Ranges(joints), Ranges(joints)};
+  for (std::size_t r = 0; r < recordings.size(); ++r) {
+    std::vector<SessionLog> parts = in_windows(recordings[r].frame, windows[r]);
+    for (Index j = 0; j < joints; ++j) {
+      const ProcessedLog joint = recordings[r].of_joint(j);
+      out.of_whole.add(recordings[r].frame, j, joint.q.col(0));
+      for (std::size_t w = 0; w < parts.size(); ++w) {
+        const auto [from, to, first, last] = windows[r][w];
+        for (const auto columns : columns_of_log) {
+          if ((joint.*columns).size() == 0) continue;
+          MatrixXd& of_part = parts[w].log.*columns;
+          if (of_part.size() == 0) of_part.setZero(to - from, joints);
+          of_part.col(j) = (joint.*columns).col(0).segment(from, to - from);
+        }
+        out.of_windows.add(parts[w], j, parts[w].log.q.col(j));
+      }
+    }
+    std::move(parts.begin(), parts.end(), std::back_inserter(out.logs));
+  }
+  return out;
+}
+
 bool any(const std::vector<bool>& joints) { return std::find(joints.begin(), joints.end(), true) != joints.end(); }
 
 }  // namespace
@@ -86,20 +174,27 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
     one &= pause > -1e-9 && pause < options.longest_pause_s;
   }
   if (one) session = {windows.front()[0], windows.back()[1]};
-  std::vector<SessionLog> out;
-  const auto add = [&](const ProcessedLog& log, bool healthy, double start) {
-    SessionLog entry{log, healthy, healthy || log.role == Role::train, std::max(0.0, log.t[0] - start)};
-    double& cutoff = entry.log.filter.torque_cutoff_hz;
-    cutoff = std::min({cutoff, options.highest_cutoff_hz, entry.log.filter.position_cutoff_hz});
-    smooth(entry, options);
-    const Index k = thinning(entry.log, options);
-    entry.log = thinned(std::move(entry.log), k);
-    out.push_back(std::move(entry));
-  };
-  for (const ProcessedLog& log : now) add(log, false, one ? windows.front()[0] : log.t[0]);
-  for (const ProcessedLog& log : before) add(log, true, log.t[0]);
-  keep_alike_rows(out, options);
-  return in_windows(std::move(out), options);
+  std::vector<Recording> recordings;
+  for (const ProcessedLog& log : now) recordings.emplace_back(log, false, one ? windows.front()[0] : log.t[0], options);
+  for (const ProcessedLog& log : before) recordings.emplace_back(log, true, log.t[0], options);
+  std::vector<SessionLog> frames;
+  for (const Recording& recording : recordings) frames.push_back(recording.frame);
+  keep_alike_rows(frames, options);
+  for (std::size_t r = 0; r < frames.size(); ++r) recordings[r].frame.log.decimation = frames[r].log.decimation;
+  const Index joints = now.front().q.cols();
+  Filled out = fill(recordings, plan_windows(frames, joints, options), joints);
+  if (!out.of_windows.reach(options.least_in_windows, out.of_whole)) out = fill(recordings, whole_logs(frames), joints);
+  return std::move(out.logs);
+}
+
+std::vector<std::string> note_of_windows(const std::vector<SessionLog>& logs, const SessionOptions& options) {
+  const auto is_window = [](const SessionLog& entry) { return entry.continues || entry.log.ran_s > 0; };
+  const auto windows = std::count_if(logs.begin(), logs.end(), is_window);
+  if (windows == 0) return {};
+  return {
+      fmt::format("the logs are longer than the search for effects needs: it looks at {} windows of {:g} s, spread "
+                  "evenly over them; figures are of the whole logs",
+                  windows, options.window_s)};
 }
 
 void check_lengths(const std::vector<SessionLog>& logs, const SessionOptions& options) {

@@ -19,6 +19,9 @@ namespace fxdyn::diagnosis {
 std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before,
                                  std::optional<Session>& session, const SessionOptions& options);
 
+/// For people: that windows of the logs are searched; none: they are whole.
+std::vector<std::string> note_of_windows(const std::vector<SessionLog>& logs, const SessionOptions& options);
+
 /// @throws DataError: train logs or the baseline are too short to fit anything; without a log that judges and with one
 /// trajectory only, its blocks have to, and are too short for that
 void check_lengths(const std::vector<SessionLog>& logs, const SessionOptions& options);

@@ -17,7 +17,7 @@ constexpr double torque_share = 0.4;
 Index kept(Index samples, Index k) { return (samples + k - 1) / k; }
 
 MatrixXd every(const MatrixXd& columns, Index k) {
-  if (columns.size() == 0) return columns;
+  if (columns.rows() == 0) return columns;
   return columns(Eigen::seqN(0, kept(columns.rows(), k), k), Eigen::all);
 }
 

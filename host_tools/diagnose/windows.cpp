@@ -10,6 +10,7 @@ namespace {
 using Eigen::ArrayXd;
 using Eigen::Index;
 using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
 /// Of many logs each may keep little: no window is shorter.
 constexpr double shortest_window_s = 4;
@@ -28,55 +29,41 @@ double most_rows_each(const std::vector<SessionLog>& logs, double room) {
   return rows.empty() ? 0 : rows.back();
 }
 
+Window whole_of(const ProcessedLog& log) { return {0, log.samples(), log.first, log.last}; }
+
 /// The windows of one recording, of `most` rows together; the recording itself where it has no more.
-void cut(const SessionLog& entry, double most, const SessionOptions& options, std::vector<SessionLog>& out) {
-  const ProcessedLog& log = entry.log;
+std::vector<Window> cut(const ProcessedLog& log, double most, const SessionOptions& options) {
   const auto samples_of = [&](double seconds) { return static_cast<Index>(std::lround(seconds / log.step_s)); };
   const Index whole = log.last - log.first;
   const auto kept = static_cast<Index>(std::lround(most * static_cast<double>(log.decimation)));
   const Index length = std::max(samples_of(shortest_window_s), std::min(samples_of(options.window_s), kept));
   const Index count = std::max<Index>(1, kept / length);
-  if (whole <= kept || count * length >= whole) {
-    out.push_back(entry);
-    return;
-  }
+  if (whole <= kept || count * length >= whole) return {whole_of(log)};
+  std::vector<Window> out;
   const Index margin = std::max(log.first, samples_of(options.run_in_s));
   for (Index w = 0; w < count; ++w) {
     // In the middle of its part of the log.
     const Index begin = log.first + (2 * w + 1) * whole / (2 * count) - length / 2, end = begin + length;
     const Index from = std::max<Index>(0, begin - margin), to = std::min(log.samples(), end + margin);
-    SessionLog window;
-    window.log = part_of(log, from, to, begin - from, end - from);
-    window.healthy = entry.healthy;
-    window.fits = entry.fits;
-    window.continues = w > 0;
-    window.age_s = entry.age_s + window.log.ran_s - log.ran_s;
-    window.bending_hz = entry.bending_hz;
-    out.push_back(std::move(window));
+    out.push_back({from, to, begin - from, end - from});
   }
-}
-
-/// How far each joint moves in the logs of a session that fit [rad | m].
-ArrayXd ranges(const std::vector<SessionLog>& logs, bool healthy) {
-  ArrayXd low, high;
-  for (const SessionLog& entry : logs) {
-    if (entry.healthy != healthy || !entry.fits) continue;
-    const auto q = entry.log.q.middleRows(entry.log.first, entry.log.last - entry.log.first).array();
-    const ArrayXd least = q.colwise().minCoeff().transpose(), most = q.colwise().maxCoeff().transpose();
-    low = low.size() == 0 ? least : ArrayXd(low.min(least));
-    high = high.size() == 0 ? most : ArrayXd(high.max(most));
-  }
-  return high - low;
-}
-
-bool all_move(const std::vector<SessionLog>& windows, const std::vector<SessionLog>& logs, double least) {
-  for (const bool healthy : {false, true}) {
-    if (!(ranges(windows, healthy) >= least * ranges(logs, healthy)).all()) return false;
-  }
-  return true;
+  return out;
 }
 
 }  // namespace
+
+void Ranges::add(const SessionLog& entry, Index joint, const Eigen::Ref<const VectorXd>& q) {
+  if (!entry.fits) return;
+  const auto inside = q.segment(entry.log.first, entry.log.last - entry.log.first);
+  auto& [low, high] = of_[entry.healthy];
+  low[joint] = std::min(low[joint], inside.minCoeff());
+  high[joint] = std::max(high[joint], inside.maxCoeff());
+}
+
+bool Ranges::reach(double share, const Ranges& others) const {
+  const auto range = [](const auto& of) -> ArrayXd { return (of[1] - of[0]).max(0); };
+  return (range(of_[0]) >= share * range(others.of_[0])).all() && (range(of_[1]) >= share * range(others.of_[1])).all();
+}
 
 std::vector<std::vector<std::size_t>> by_recording(const std::vector<SessionLog>& logs) {
   std::vector<std::vector<std::size_t>> out;
@@ -89,7 +76,7 @@ std::vector<std::vector<std::size_t>> by_recording(const std::vector<SessionLog>
 
 ProcessedLog part_of(const ProcessedLog& log, Index from, Index to, Index first, Index last) {
   const auto part = [&](const MatrixXd& columns) {
-    return columns.size() == 0 ? columns : MatrixXd(columns.middleRows(from, to - from));
+    return columns.rows() == 0 ? columns : MatrixXd(columns.middleRows(from, to - from));
   };
   ProcessedLog out;
   for (MatrixXd ProcessedLog::*columns : {&ProcessedLog::q, &ProcessedLog::measured_dq, &ProcessedLog::measured_ddq,
@@ -124,18 +111,41 @@ ProcessedLog part_of(const ProcessedLog& log, Index from, Index to, Index first,
   return out;
 }
 
-std::vector<SessionLog> in_windows(std::vector<SessionLog> logs, const SessionOptions& options) {
+std::vector<std::vector<Window>> plan_windows(const std::vector<SessionLog>& logs, Index joints,
+                                              const SessionOptions& options) {
   double joint_rows = 0;
-  for (const SessionLog& entry : logs) joint_rows += static_cast<double>(entry.log.rows() * entry.log.q.cols());
-  if (joint_rows <= options.most_rows) return logs;
-  const ProcessedLog& any = logs.front().log;
-  const double rows_a_second = 1 / (any.step_s * static_cast<double>(any.decimation));  // alike in all of them
-  const double room =
-      std::max(options.most_rows / static_cast<double>(any.q.cols()), options.least_kept_s * rows_a_second);
-  const double most = most_rows_each(logs, room);
+  for (const SessionLog& entry : logs) joint_rows += static_cast<double>(entry.log.rows() * joints);
+  double most = joint_rows;
+  if (joint_rows > options.most_rows) {
+    const ProcessedLog& any = logs.front().log;
+    const double rows_a_second = 1 / (any.step_s * static_cast<double>(any.decimation));  // alike in all of them
+    most = most_rows_each(
+        logs, std::max(options.most_rows / static_cast<double>(joints), options.least_kept_s * rows_a_second));
+  }
+  std::vector<std::vector<Window>> out;
+  for (const SessionLog& entry : logs) out.push_back(cut(entry.log, most, options));
+  return out;
+}
+
+std::vector<std::vector<Window>> whole_logs(const std::vector<SessionLog>& logs) {
+  std::vector<std::vector<Window>> out;
+  for (const SessionLog& entry : logs) out.push_back({whole_of(entry.log)});
+  return out;
+}
+
+std::vector<SessionLog> in_windows(const SessionLog& entry, const std::vector<Window>& windows) {
+  if (windows.size() == 1 && windows.front().from == 0 && windows.front().to == entry.log.samples()) return {entry};
   std::vector<SessionLog> out;
-  for (const SessionLog& entry : logs) cut(entry, most, options, out);
-  return all_move(out, logs, options.least_in_windows) ? out : logs;
+  for (const Window& w : windows) {
+    SessionLog& window = out.emplace_back();
+    window.log = part_of(entry.log, w.from, w.to, w.first, w.last);
+    window.healthy = entry.healthy;
+    window.fits = entry.fits;
+    window.continues = out.size() > 1;
+    window.age_s = entry.age_s + window.log.ran_s - entry.log.ran_s;
+    window.bending_hz = entry.bending_hz;
+  }
+  return out;
 }
 
 }  // namespace fxdyn::diagnosis

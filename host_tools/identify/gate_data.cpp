@@ -65,6 +65,10 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
   for (const Role role : {Role::train, Role::validate}) {
     for (Log& log : read_logs(project, role, directory, &data.rows)) logs.push_back(std::move(log));
   }
+  Eigen::Index samples = 0;
+  for (const Log& log : logs) samples += log.samples();
+  if (static_cast<double>(samples) > options.long_logs) data.threads = 1;
+  const ThreadLimit limit(data.threads);
   data.filter = choose_filter(logs, project.signals);
   const auto n = static_cast<Eigen::Index>(project.robot.size());
   data.largest_torque = data.dq = data.ddq = Eigen::VectorXd::Zero(n);
@@ -78,9 +82,6 @@ GateData read_gate_data(const Project& project, const std::filesystem::path& dir
   double seconds = 0;
   for (const Log& log : logs) seconds += log.step_s * static_cast<double>(log.samples());
   settings.shortest_interval_s = seconds / options.most_rows;
-  Eigen::Index samples = 0;
-  for (const Log& log : logs) samples += log.samples();
-  if (static_cast<double>(samples) > options.long_logs) data.threads = 1;
   for (Log& log : logs) {
     if (!log.time_note.empty()) data.notes.push_back(log.time_note);
     if (log.resampled) {

@@ -49,11 +49,13 @@ Pipeline::~Pipeline() = default;
 GateData& Pipeline::data() {
   if (!data_) {
     progress_.stage("reading and filtering the logs", 1);
+    const std::vector<LogFacts> of_train = facts_of_train_logs(project_, directory_);
     data_ = std::make_unique<GateData>(read_gate_data(project_, directory_));
     data_notes_ = data_->notes;
     progress_.step();
     progress_.stage("checking the logs", 1);
-    for (std::string& note : check_before_fit(project_, directory_, *data_)) data_notes_.push_back(std::move(note));
+    for (std::string& note : check_before_fit(project_, directory_, *data_, of_train))
+      data_notes_.push_back(std::move(note));
     progress_.step();
     progress_.done();
   }

@@ -121,18 +121,23 @@ std::vector<MatrixXd> KeptEffects::torque(const IdentifiedModel& model, const st
   std::vector<MatrixXd> out(logs.size());
   parallel_for(logs.size(), [&](std::size_t l) {
     const ProcessedLog& log = logs[l];
-    MatrixXd tau = log.tau;
+    MatrixXd& torque = out[l];  // first of what is kept, then of the rest: a long log's columns are held once
     if (any) {
-      for (Index j = 0; j < tau.cols(); ++j)
-        tau.col(j) = before_total_effects(diagnosed_.joints[static_cast<std::size_t>(j)], tau.col(j), log.step_s);
       // Where there is a link encoder the Fitter's rigid body moves as the link does, bent gear included.
       IdentifiedModel seen = with;
       for (std::size_t j = 0; j < seen.joints.size(); ++j) {
         if (log.has_link[j]) std::erase_if(seen.joints[j].effects, acts_on_position);
       }
-      tau -= predict(seen, log) - predict(without, log);
+      torque = predict(seen, log);
+      torque -= predict(without, log);
+    } else {
+      torque.setZero(log.tau.rows(), log.tau.cols());
     }
-    out[l] = log.filter_columns(tau);
+    for (Index j = 0; j < torque.cols(); ++j) {
+      MatrixXd tau = log.tau.col(j);
+      if (any) tau = before_total_effects(diagnosed_.joints[static_cast<std::size_t>(j)], tau.col(0), log.step_s);
+      torque.col(j) = log.filter_columns(tau - torque.col(j));
+    }
   });
   return out;
 }

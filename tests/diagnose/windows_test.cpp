@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
+
+#include "host_tools/diagnose/sessions.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
@@ -38,15 +41,24 @@ SessionOptions room_for(double rows) {
   return out;
 }
 
+std::vector<SessionLog> cut_up(const std::vector<SessionLog>& logs, const SessionOptions& options) {
+  const auto windows = plan_windows(logs, 2, options);
+  std::vector<SessionLog> out;
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    for (SessionLog& window : in_windows(logs[l], windows[l])) out.push_back(std::move(window));
+  }
+  return out;
+}
+
 TEST(Windows, LogsThatFitStayWhole) {
-  const auto out = in_windows({log_of(100), log_of(50)}, room_for(10'000));
+  const auto out = cut_up({log_of(100), log_of(50)}, room_for(10'000));
   ASSERT_EQ(out.size(), 2U);
   EXPECT_EQ(out[0].log.samples(), 10'001);
 }
 
 // 1000 s and 400 s at 10 rows a second of two joints are 28 000 rows, of which there is room for a quarter.
 TEST(Windows, LongLogsKeepEquallyManySpreadEvenly) {
-  const auto out = in_windows({log_of(1000), log_of(400, 1000)}, room_for(7200));
+  const auto out = cut_up({log_of(1000), log_of(400, 1000)}, room_for(7200));
   ASSERT_EQ(out.size(), 9U + 9U);
   Index rows = 0;
   for (const SessionLog& entry : out) {
@@ -69,7 +81,7 @@ TEST(Windows, LongLogsKeepEquallyManySpreadEvenly) {
 }
 
 TEST(Windows, BelongToTheirRecording) {
-  const auto out = in_windows({log_of(1000), log_of(400), log_of(30)}, room_for(5000));
+  const auto out = cut_up({log_of(1000), log_of(400), log_of(30)}, room_for(5000));
   const auto recordings = by_recording(out);
   ASSERT_EQ(recordings.size(), 3U);
   EXPECT_EQ(recordings[0].size(), recordings[1].size());
@@ -77,7 +89,7 @@ TEST(Windows, BelongToTheirRecording) {
 }
 
 TEST(Windows, ShortLogsStayWhole) {
-  const auto out = in_windows({log_of(1000), log_of(30)}, room_for(4000));
+  const auto out = cut_up({log_of(1000), log_of(30)}, room_for(4000));
   EXPECT_EQ(out.back().log.samples(), 3001);
   EXPECT_FALSE(out.back().continues);
   Index rows = 0;
@@ -88,7 +100,7 @@ TEST(Windows, ShortLogsStayWhole) {
 
 TEST(Windows, ManyLogsKeepLittleEach) {
   std::vector<SessionLog> logs(60, log_of(60));
-  const auto out = in_windows(logs, room_for(60 * 2 * 80));  // 8 s each
+  const auto out = cut_up(logs, room_for(60 * 2 * 80));  // 8 s each
   EXPECT_EQ(out.size(), 60U);
   for (const SessionLog& entry : out) EXPECT_EQ(entry.log.rows(), 80);
 }
@@ -97,16 +109,60 @@ TEST(Windows, SomeSecondsStayHoweverManyRowsTheyHave) {
   SessionOptions options = room_for(2000);
   options.least_kept_s = 300;
   Index rows = 0;
-  for (const SessionLog& entry : in_windows({log_of(1000)}, options)) rows += entry.log.rows();
+  for (const SessionLog& entry : cut_up({log_of(1000)}, options)) rows += entry.log.rows();
   EXPECT_EQ(rows, 3000);
 }
 
 // What moves for a short while only would not be seen.
-TEST(Windows, NoneWhereAJointMovesInNone) {
+TEST(Windows, RangesTellWhereAJointHardlyMoves) {
   SessionLog once = log_of(1000);
   once.log.q.col(1).setZero();
   once.log.q.col(1).segment(60'000, 100).setLinSpaced(0, 1);
-  EXPECT_EQ(in_windows({once}, room_for(2000)).size(), 1U);
+  Ranges of_whole(2), of_windows(2);
+  for (Index j = 0; j < 2; ++j) of_whole.add(once, j, once.log.q.col(j));
+  for (const SessionLog& window : cut_up({once}, room_for(2000))) {
+    for (Index j = 0; j < 2; ++j) of_windows.add(window, j, window.log.q.col(j));
+  }
+  EXPECT_TRUE(of_whole.reach(1, of_whole));
+  EXPECT_FALSE(of_windows.reach(0.1, of_whole));
+}
+
+/// 1000 s as sessions() takes them: neither smoothed nor thinned.
+ProcessedLog long_recording() {
+  ProcessedLog log = log_of(1000).log;
+  log.filter.torque_cutoff_hz = 5;
+  log.filter.position_cutoff_hz = 50;
+  log.filter.excited_hz = 10;
+  return log;
+}
+
+// Their columns are taken joint by joint.
+TEST(Windows, SessionsOfLongLogsHaveTheirColumns) {
+  ProcessedLog log = long_recording();
+  log.lost_velocity = Eigen::MatrixXd::Zero(log.samples(), 2);
+  log.lost_velocity.col(1) = log.t;
+  std::optional<Session> session;
+  const auto out = sessions({log}, {}, session, room_for(7200));
+  ASSERT_EQ(out.size(), 18U);
+  for (const SessionLog& entry : out) {
+    const auto from = static_cast<Index>(std::lround(entry.log.t[0] / log.step_s));
+    const Index count = entry.log.samples();
+    EXPECT_EQ(entry.log.q, log.q.middleRows(from, count));
+    EXPECT_EQ(entry.log.tau, log.tau.middleRows(from, count));
+    EXPECT_EQ(entry.log.lost_velocity, log.lost_velocity.middleRows(from, count));
+    EXPECT_EQ(entry.log.measured_dq.size(), 0);
+  }
+}
+
+TEST(Windows, SessionsStayWholeWhereAJointMovesInNone) {
+  ProcessedLog log = long_recording();
+  log.q.col(1).setZero();
+  log.q.col(1).segment(60'000, 100).setLinSpaced(0, 1);
+  std::optional<Session> session;
+  const auto out = sessions({log}, {}, session, room_for(2000));
+  ASSERT_EQ(out.size(), 1U);
+  EXPECT_EQ(out.front().log.q, log.q);
+  EXPECT_EQ(out.front().log.t, log.t);
 }
 
 TEST(Windows, KnowWhatTheFilterTookAway) {

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdio>
+#include <memory>
+#include <vector>
+
+#include "host_tools/identify/options.hpp"
+#include "host_tools/regression/dataset.hpp"
+
+namespace fxdyn::diagnosis {
+
+/// Columns of logs that nothing looks at for a while: in a file without a name, not in memory. A search sees windows of
+/// a long log, and takes as much memory as the log itself. Logs that fill little stay where they are; so do those that
+/// the disk has no room for, and those with encoders of links, which a search looks at.
+class ParkedColumns {
+ public:
+  /// @param samples of all logs together, from which on they are parked
+  explicit ParkedColumns(std::vector<ProcessedLog>& logs, double samples = fxdyn::GateOptions().long_logs);
+  /// What was not taken back is lost with its logs.
+  ~ParkedColumns() = default;
+  ParkedColumns(const ParkedColumns&) = delete;
+  ParkedColumns& operator=(const ParkedColumns&) = delete;
+
+  /// @throws DataError: they can't be read again
+  void take_back();
+
+ private:
+  struct Parked {
+    Eigen::MatrixXd* columns;
+    Eigen::Index joints;
+  };
+  struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+  std::unique_ptr<std::FILE, Close> file_;
+  std::vector<Parked> parked_;
+};
+
+}  // namespace fxdyn::diagnosis
