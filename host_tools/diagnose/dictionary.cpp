@@ -117,4 +117,19 @@ std::vector<Group> dictionary(const Linearised& problem, const std::vector<Effec
   return out;
 }
 
+std::vector<EffectCandidate> curves_over_parts(const EffectInfo& info, std::size_t joint, std::size_t of,
+                                               const MotionScales& scales, int parts) {
+  std::vector<EffectCandidate> out;
+  std::vector<double> first;
+  if (info.needs_peers) first.push_back(static_cast<double>(of + 1));
+  const std::size_t i = first.size();
+  const double from = info.shape[i].values.tried(scales)[0], span = info.shape[i + 1].values.tried(scales)[0];
+  const double length = span / parts;
+  for (int half = 0; length >= info.shape[i + 1].lower && half <= 2 * (parts - 1); ++half) {
+    out.push_back({std::string(info.name), joint, first});
+    out.back().shape.insert(out.back().shape.end(), {from + half * length / 2, length});
+  }
+  return out;
+}
+
 }  // namespace fxdyn::diagnosis

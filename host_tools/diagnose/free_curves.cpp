@@ -27,8 +27,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Parts of the motion over which the knots may be: the whole and halves for every variable, down to eighths.
-constexpr int coarsest_parts = 2, finest_parts = 8;
+/// Parts of the motion over which the knots may be for every variable: the whole and halves.
+constexpr int coarsest_parts = 2;
 /// Where a curve is drawn: four points a piece.
 constexpr Index drawn_points = 4 * static_cast<Index>(curve_pieces) + 1;
 
@@ -95,16 +95,8 @@ class Trials {
   static bool less(const Tried& a, const Tried& b) { return a.left < b.left; }
   /// Knots over each of so many parts of the motion, and over those between. @param of the variable's joint
   void add(const EffectInfo& info, std::size_t of, int parts, std::vector<EffectCandidate>& to) const {
-    std::vector<double> first;
-    if (info.needs_peers) first.push_back(static_cast<double>(of + 1));
-    const std::size_t i = first.size();
-    const double from = info.shape[i].values.tried(scales_[of])[0],
-                 span = info.shape[i + 1].values.tried(scales_[of])[0];
-    const double length = span / parts;
-    for (int half = 0; length >= info.shape[i + 1].lower && half <= 2 * (parts - 1); ++half) {
-      to.push_back({std::string(info.name), joint_, first});
-      to.back().shape.insert(to.back().shape.end(), {from + half * length / 2, length});
-    }
+    for (EffectCandidate& curve : curves_over_parts(info, joint_, of, scales_[of], parts))
+      to.push_back(std::move(curve));
   }
   std::vector<Tried> best(const std::vector<EffectCandidate>& all) {
     std::vector<double> left(all.size());

@@ -193,6 +193,8 @@ void choose_time_constants(Outcome& outcome, const std::vector<SessionLog>& logs
 /// Whether a name's form holds against a free curve of its variable.
 bool form_holds(const OwnEvidence& own, const GateOptions& options) {
   const bool several = own.alike > 1;
+  // Names one after the other close ever more of something else.
+  if (own.spline_gain >= options.established * variances_per_decade) return false;
   if (own.of_position && own.curve_gain >= options.established * variances_per_decade)
     return own.form >= (several ? options.several_closure : options.sure_closure);
   return own.form >= (several ? options.sure_closure : options.least_closure);
@@ -206,8 +208,8 @@ std::vector<bool> lacking_form(const Gate& gate, const Outcome& outcome) {
     const Group& group = outcome.problem->groups()[gate.groups[i]];
     const OwnEvidence& own = gate.own[i];
     if (group.on_body || !own.of_position || form_holds(own, options)) continue;
-    out[group.candidate.joint] =
-        out[group.candidate.joint] || own.curve_gain >= options.established * variances_per_decade;
+    out[group.candidate.joint] = out[group.candidate.joint] || std::max(own.curve_gain, own.spline_gain) >=
+                                                                   options.established * variances_per_decade;
   }
   return out;
 }

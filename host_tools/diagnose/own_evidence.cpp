@@ -7,6 +7,7 @@
 #include <mutex>
 
 #include "host_tools/diagnose/curve_squares.hpp"
+#include "host_tools/diagnose/dictionary.hpp"
 #include "host_tools/diagnose/features.hpp"
 #include "host_tools/diagnose/without.hpp"
 #include "host_tools/effects/effects.hpp"
@@ -37,9 +38,7 @@ class Curves {
     for (const Block& block : problem.blocks().all) {
       if (block.healthy) all_.middleRows(block.first, block.count).setZero();
     }
-    // Of size one each, as their prior is.
-    const VectorXd size = (all_.colwise().norm() / std::sqrt(static_cast<double>(all_.rows()))).transpose();
-    all_ = all_ * size.unaryExpr([](double s) { return s > 1e-9 ? 1 / s : 0.0; }).asDiagonal();
+    all_ = of_size_one(all_);
     if (const Background* background = problem.background(joint)) all_ = background->eliminate(all_);
   }
 
@@ -56,6 +55,11 @@ class Curves {
       cols += families_[f].count;
     }
     return out;
+  }
+  /// Of size one each, as their prior is.
+  static MatrixXd of_size_one(const MatrixXd& columns) {
+    const VectorXd size = (columns.colwise().norm() / std::sqrt(static_cast<double>(columns.rows()))).transpose();
+    return columns * size.unaryExpr([](double s) { return s > 1e-9 ? 1 / s : 0.0; }).asDiagonal();
   }
   /// The family of an effect's own variable.
   std::size_t of_variable(const EffectCandidate& effect) const {
@@ -125,12 +129,16 @@ class AtJoint {
     around = diagnosis::without(problem_, gone);
     return around.get();
   }
-  Deviance judged(const std::vector<std::size_t>& groups) const { return judged(groups, {}, {}); }
+  Deviance judged(const std::vector<std::size_t>& groups) const {
+    return judged(groups, std::vector<std::size_t>{}, {});
+  }
   /// The deviance of all folds, with curves of the size that suits them best.
   /// @param nothing the deviance without them: they are at most as large as what is there
   Deviance judged(const std::vector<std::size_t>& groups, const std::vector<std::size_t>& families,
                   const Deviance& nothing) const {
-    const MatrixXd curves = curves_.of(families);
+    return judged(groups, curves_.of(families), nothing);
+  }
+  Deviance judged(const std::vector<std::size_t>& groups, const MatrixXd& curves, const Deviance& nothing) const {
     std::vector<PredictiveDeviance> folds;
     const Linearised* around = relinearised(without(groups));
     const Linearised& problem = around != nullptr ? *around : problem_;
@@ -139,7 +147,7 @@ class AtJoint {
     for (const Fold& fold : problem_.blocks().folds) folds.emplace_back(problem, joint_, columns, curves, fold);
     double precision = weight_ / std::max(1.0, nothing.square / rows_);
     Deviance best;
-    for (int i = 0; i < (families.empty() ? 1 : sizes); ++i, precision *= finer) {
+    for (int i = 0; i < (curves.cols() == 0 ? 1 : sizes); ++i, precision *= finer) {
       Deviance sum;
       for (const PredictiveDeviance& fold : folds) {
         const Deviance of = fold(precision);
@@ -175,7 +183,26 @@ class AtJoint {
     const double by_names = nothing.sum() - named.sum(), by_curve = nothing.sum() - curve.sum();
     out.form = by_curve > 0 ? std::max(0.0, by_names) / by_curve : 1.0;
     out.curve_gain = gain(named, curve) - 2 * std::log(2 * sizes);
+    if (out.of_position && out.alike > 1) out.spline_gain = spline_gain(rest, nothing, named);
     return out;
+  }
+  /// Of the best free curve of the position in the place of names, with knots over the whole range or parts of it.
+  /// @param rest groups without the names @param nothing, named deviances without and with them
+  double spline_gain(const std::vector<std::size_t>& rest, const Deviance& nothing, const Deviance& named) const {
+    const EffectInfo& info = *find_effect("position_curve");
+    const MotionScales scales = scales_of(problem_, joint_);
+    Deviance best = nothing;
+    std::size_t tried = 0;
+    for (int parts = 1; parts <= finest_parts; parts *= 2) {
+      for (const EffectCandidate& curve : curves_over_parts(info, joint_, joint_, scales, parts)) {
+        Group group;
+        group.candidate = curve;
+        const Deviance of = judged(rest, Curves::of_size_one(problem_.make(group)[joint_]), nothing);
+        if (less(of, best)) best = of;
+        ++tried;
+      }
+    }
+    return gain(named, best) - 2 * std::log(static_cast<double>(sizes * tried));
   }
 
   const Linearised& problem_;

@@ -18,6 +18,8 @@ struct OwnEvidence {
   /// What that curve is more likely by than those names, as a difference of -2 ln p less the price of the curves tried:
   /// less than 0 where they suffice.
   double curve_gain = 0;
+  /// Several of the own position: the same of a free curve of the position (B-spline) in the place of all of them.
+  double spline_gain = 0;
   bool of_position = false;  ///< its variable is the own position
   std::size_t alike = 1;     ///< effects of that variable at the joint
   bool of_time = false;      ///< its variable is time, whose curve says nothing of other times

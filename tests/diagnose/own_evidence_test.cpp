@@ -118,6 +118,19 @@ TEST(EvidenceOfItsOwn, TwoNamesForAStopLoseAgainstACurve) {
   }
 }
 
+// The more names, the more they close. A free curve in their place is likelier all the same.
+TEST(EvidenceOfItsOwn, ThreeNamesForAStopLoseAgainstOneCurve) {
+  const auto stop = [](const ArrayXd& q, const ArrayXd&) -> ArrayXd { return -6 * (q - 0.3).max(0.0); };
+  const auto own =
+      evidence(stop, {test::named_effect("gravity_compensator", {}, {0.5, 0.5}),
+                      test::named_effect("spring", {}, {-1, 0}), test::named_effect("ripple", {5}, {0.3, 0.1})});
+  ASSERT_EQ(own.size(), 3U);
+  for (const OwnEvidence& one : own) {
+    EXPECT_GT(one.form, GateOptions{}.several_closure);
+    EXPECT_GT(one.spline_gain, 14);
+  }
+}
+
 TEST(EvidenceOfItsOwn, TwoNamesForWhatTheyAreDoNot) {
   const auto both = [](const ArrayXd& q, const ArrayXd&) -> ArrayXd { return 3 * q + 5 * (14 * q).cos(); };
   for (const Role second : {Role::validate, Role::train}) {
@@ -126,6 +139,7 @@ TEST(EvidenceOfItsOwn, TwoNamesForWhatTheyAreDoNot) {
     ASSERT_EQ(own.size(), 2U);
     for (const OwnEvidence& one : own) {
       EXPECT_LT(one.curve_gain, 0);
+      EXPECT_LT(one.spline_gain, 0);
       EXPECT_GT(one.form, 0.95);
     }
   }
@@ -142,6 +156,7 @@ TEST(EvidenceOfItsOwn, TwoNamesForWhatTheyAreHoldBesideASmallBump) {
   for (const OwnEvidence& one : own) {
     EXPECT_GT(one.curve_gain, 14);
     EXPECT_GT(one.form, GateOptions{}.several_closure);
+    EXPECT_LT(one.spline_gain, 0);
   }
 }
 
