@@ -203,6 +203,7 @@ class Diagnoser {
   /// Again, on logs that have lost what wanders. Names of before stay only where the data that judge miss them.
   void search_without(const Models& start, Outcome& outcome, Gate& gate) {
     Outcome first = std::move(outcome);
+    first.put_down();
     Deflections bent = deflections_;
     outcome = found_effects(start, gate);
     refit(first.models, logs_, first.whitening, 8);
