@@ -29,6 +29,7 @@
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/error.hpp"
+#include "host_tools/support/heap.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {
@@ -82,6 +83,7 @@ class Diagnoser {
       parked.take_back();
     } else {
       models_.current = nominal_model(project_, data_, false, progress_);
+      give_back_memory();
       mute(logs_, models_.current, still_, options().session);
       look_at_links(models_.current, logs_);
     }

@@ -1,6 +1,7 @@
 #include "host_tools/diagnose/parked_columns.hpp"
 
 #include "host_tools/support/error.hpp"
+#include "host_tools/support/heap.hpp"
 
 namespace fxdyn::diagnosis {
 
@@ -22,6 +23,7 @@ ParkedColumns::ParkedColumns(std::vector<ProcessedLog>& logs, double samples) {
       if (!park(*columns)) return;  // the rest stays
     }
   }
+  give_back_memory();
 }
 
 ParkedColumns::ParkedColumns(std::vector<MatrixXd>& matrices, double bytes) {
@@ -34,6 +36,7 @@ ParkedColumns::ParkedColumns(std::vector<MatrixXd>& matrices, double bytes) {
   for (MatrixXd& columns : matrices) {
     if (!park(columns)) return;
   }
+  give_back_memory();
 }
 
 bool ParkedColumns::park(MatrixXd& columns) {

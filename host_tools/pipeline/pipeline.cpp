@@ -25,6 +25,7 @@
 #include "host_tools/simulate/recordings.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
+#include "host_tools/support/heap.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {
@@ -57,6 +58,7 @@ GateData& Pipeline::data() {
     for (std::string& note : check_before_fit(project_, directory_, *data_, of_train))
       data_notes_.push_back(std::move(note));
     data_->rows = {};  // every log has been compared with the others
+    give_back_memory();
     progress_.step();
     progress_.done();
   }
