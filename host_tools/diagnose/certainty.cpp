@@ -5,6 +5,7 @@
 
 #include "host_tools/diagnose/deviations.hpp"
 #include "host_tools/diagnose/harmless.hpp"
+#include "host_tools/diagnose/parked_columns.hpp"
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/effects/model_parts.hpp"
 
@@ -186,10 +187,14 @@ void search_again(const std::vector<EffectCandidate>& before, Outcome& outcome, 
     if (!stays && find_effect(one.effect)->unites_others()) task.never.push_back(one);
   }
   if (passed.size() == before.size() && !outcome.dropped) return;
+  ParkedColumns parked(outcome.features);
   Outcome other = explore_again(outcome, retrial.logs, task, progress);
   Gate of_other = pass(other, retrial.nominal, retrial.logs, retrial.still);
   // The gate sees to it that no joint errs more than in the nominal model.
-  if (!errs_less_in_all(judged_error(outcome.models, retrial.logs), judged_error(other.models, retrial.logs))) return;
+  if (!errs_less_in_all(judged_error(outcome.models, retrial.logs), judged_error(other.models, retrial.logs))) {
+    parked.take_back();
+    return;
+  }
   outcome = std::move(other);
   gate = std::move(of_other);
 }
@@ -202,11 +207,15 @@ bool settle_rivals(Outcome& outcome, Gate& gate, const Retrial& retrial, Progres
     const Finding* finding = without_a_sure_name(outcome, tried);
     if (finding == nullptr) break;
     tried.push_back(candidate_of(outcome, *finding));
+    ParkedColumns parked(outcome.features);
     Outcome other = explore_rival(outcome, *finding, retrial.logs, retrial.task, progress);
     Gate of_other = pass(other, retrial.nominal, retrial.logs, retrial.still);
     const VectorXd before = judged_error(outcome.models, retrial.logs);
     const VectorXd after = judged_error(other.models, retrial.logs);
-    if (!errs_less(before, after, outcome.models.options.gate)) continue;
+    if (!errs_less(before, after, outcome.models.options.gate)) {
+      parked.take_back();
+      continue;
+    }
     weigh_evidence(other, of_other);
     outcome = std::move(other);
     gate = std::move(of_other);

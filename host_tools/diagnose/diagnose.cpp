@@ -29,6 +29,7 @@
 #include "host_tools/regression/regressor.hpp"
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/error.hpp"
+#include "host_tools/support/heap.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {
@@ -82,6 +83,7 @@ class Diagnoser {
       parked.take_back();
     } else {
       models_.current = nominal_model(project_, data_, false, progress_);
+      give_back_memory();
       mute(logs_, models_.current, still_, options().session);
       look_at_links(models_.current, logs_);
     }
@@ -203,6 +205,7 @@ class Diagnoser {
   /// Again, on logs that have lost what wanders. Names of before stay only where the data that judge miss them.
   void search_without(const Models& start, Outcome& outcome, Gate& gate) {
     Outcome first = std::move(outcome);
+    first.put_down();
     Deflections bent = deflections_;
     outcome = found_effects(start, gate);
     refit(first.models, logs_, first.whitening, 8);

@@ -104,8 +104,7 @@ bool forget_lost_rotors(Models& models, std::vector<EffectId>& ids) {
 /// Searches around the models of an outcome, which become those of the choice. @returns whether that is another
 bool explore_once(Outcome& out, const std::vector<SessionLog>& logs, const SearchTask& task, Progress& progress) {
   Models& models = out.models;
-  out.problem.reset();  // that of the pass before
-  out.features.clear();
+  out.put_down();
   auto with_candidates = std::make_unique<Linearised>(models, logs, out.whitening);
   Linearised& problem = *with_candidates;
   const std::vector<std::size_t> start = in_model(problem);
@@ -157,9 +156,13 @@ bool Outcome::structured() const {
 
 bool Outcome::structured(std::size_t joint) const { return lack[joint].structured(models.options.lack_of_fit); }
 
-void Outcome::look_again(const std::vector<SessionLog>& logs) {
-  problem.reset();  // before the next one is made
+void Outcome::put_down() {
+  problem.reset();
   features.clear();
+}
+
+void Outcome::look_again(const std::vector<SessionLog>& logs) {
+  put_down();  // before the next ones are made
   problem = std::make_unique<Linearised>(models, logs, whitening);
   whitening = problem->noise().whitening();
   features.resize(problem->joints());

@@ -26,6 +26,8 @@ struct Outcome {
   bool structured(std::size_t joint) const;
   /// Linearises around the models again and looks for lack of fit.
   void look_again(const std::vector<SessionLog>& logs);
+  /// Until look_again(): problem and features are by far the largest part.
+  void put_down();
 };
 
 /// Search, name, fit again around what was named; again where that left structure or found several effects.

@@ -33,6 +33,7 @@ HealthySession learn_healthy(Models nominal, const std::vector<SessionLog>& logs
   modest.settings.most = std::max<std::size_t>(2, joints * task.settings.max_effects);
   if (outcome.structured() || has_ripples(out.models, logs, modest.settings, progress)) {
     // All that has a form: what stays is taken out of today's logs without one.
+    outcome.put_down();
     outcome = explore(out.models, logs, modest, 2, progress);
     out.models = outcome.models;
     for (std::size_t j = 0; j < joints; ++j) {

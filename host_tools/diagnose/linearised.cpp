@@ -1,8 +1,11 @@
 #include "host_tools/diagnose/linearised.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <map>
 #include <numeric>
+#include <utility>
 
 #include "host_tools/diagnose/base_parameters.hpp"
 #include "host_tools/diagnose/design_matrix.hpp"
@@ -245,7 +248,21 @@ std::size_t Linearised::add(Group group, const std::vector<MatrixXd>& columns) {
 void Linearised::add_all(std::vector<Group> groups) {
   if (groups.empty()) return;
   std::vector<std::vector<MatrixXd>> made(groups.size());
-  parallel_for(groups.size(), [&](std::size_t g) { made[g] = make(groups[g]); });
+  // Those that share something follow each other, so that it is needed once and for a while.
+  const auto place = [&](std::size_t g) {
+    const Group& group = groups[g];
+    return group.on_body ? std::pair(joints(), 0.0) : std::pair(group.candidate.joint, group.rotor_inertia);
+  };
+  std::vector<std::size_t> order(groups.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return place(a) < place(b); });
+  std::map<std::pair<std::size_t, double>, std::atomic<std::size_t>> left;
+  for (const std::size_t g : order) ++left[place(g)];
+  parallel_for(groups.size(), [&](std::size_t i) {
+    const std::size_t g = order[i];
+    made[g] = make(groups[g]);
+    if (--left.at(place(g)) == 0 && !groups[g].on_body) log_columns_.forget_shared(groups[g].candidate.joint);
+  });
   for (std::size_t g = 0; g < groups.size(); ++g) groups[g].count = most_columns(made[g]);
   const std::vector<Index> first = solver_->append(std::move(made));
   for (std::size_t g = 0; g < groups.size(); ++g) groups[g].first = first[g];

@@ -19,7 +19,9 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// All that robot_with() keeps [bytes]: enough for every rotor of a session of usual length.
-constexpr double most_kept = 64e6;
+constexpr double most_kept = 96e6;
+/// Slopes by the states of all joints [bytes] that are kept between candidates of different joints.
+constexpr double most_slopes = 64e6;
 
 namespace {
 
@@ -190,9 +192,20 @@ std::shared_ptr<const RobotColumns> LogColumns::robot_with(std::size_t log, cons
                                                    slow ? *slow_[log] : *motions_[log]);
   const std::lock_guard lock(for_group_mutex_);
   // Those of a long log are made again rather than kept for every rotor; whoever uses one holds it.
-  const auto bytes = static_cast<double>(3 * sizeof(double) * made->torque().size());
+  // Two torques, and slopes by three states.
+  const auto bytes = static_cast<double>(5 * sizeof(double) * made->torque().size());
   if (bytes * static_cast<double>(for_group_.size() + 1) > most_kept) for_group_.clear();
   return for_group_.emplace(key, std::move(made)).first->second;
+}
+
+void LogColumns::forget_shared(std::size_t joint) const {
+  double slopes = 0;
+  for (const Motion* motion : motions_)
+    slopes += static_cast<double>(3 * sizeof(double) * joints()) * static_cast<double>(motion->q.size());
+  if (slopes <= most_slopes) return;
+  for (const auto& robot : robot_) robot->forget_slopes(joint);
+  const std::lock_guard lock(for_group_mutex_);
+  for_group_.clear();
 }
 
 MatrixXd LogColumns::torque_of(std::size_t log, ModelValue model) const {

@@ -51,6 +51,9 @@ class LogColumns {
   EffectColumns of(std::size_t log, const EffectCandidate& candidate) const { return of(log, candidate, *robot_[log]); }
   /// .. of a group, around the model with the rotor that comes with it.
   EffectColumns of(std::size_t log, const Group& group) const;
+  /// What columns of a joint's effects share is kept for the next of them. Of many or long logs that is too much for
+  /// all joints at once: call this after a joint's last one. Safe from several threads.
+  void forget_shared(std::size_t joint) const;
 
   /// Columns as the torque shows them: through what follows them in the torque's path.
   Eigen::MatrixXd follow(std::size_t log, std::size_t joint, Eigen::MatrixXd columns) const;

@@ -1,6 +1,7 @@
 #include "host_tools/diagnose/parked_columns.hpp"
 
 #include "host_tools/support/error.hpp"
+#include "host_tools/support/heap.hpp"
 
 namespace fxdyn::diagnosis {
 
@@ -19,24 +20,42 @@ ParkedColumns::ParkedColumns(std::vector<ProcessedLog>& logs, double samples) {
   if (!file_) return;
   for (ProcessedLog& log : logs) {
     for (MatrixXd* columns : {&log.q, &log.tau, &log.lost_velocity}) {
-      const auto count = static_cast<std::size_t>(columns->size());
-      if (count == 0) continue;
-      const bool written =
-          std::fwrite(columns->data(), sizeof(double), count, file_.get()) == count && std::fflush(file_.get()) == 0;
-      if (!written) return;  // the rest stays
-      parked_.push_back({columns, columns->cols()});
-      columns->resize(columns->rows(), 0);
+      if (!park(*columns)) return;  // the rest stays
     }
   }
+  give_back_memory();
+}
+
+ParkedColumns::ParkedColumns(std::vector<MatrixXd>& matrices, double bytes) {
+  double all = 0;
+  for (const MatrixXd& columns : matrices)
+    all += static_cast<double>(sizeof(double)) * static_cast<double>(columns.size());
+  if (all < bytes) return;
+  file_.reset(std::tmpfile());
+  if (!file_) return;
+  for (MatrixXd& columns : matrices) {
+    if (!park(columns)) return;
+  }
+  give_back_memory();
+}
+
+bool ParkedColumns::park(MatrixXd& columns) {
+  const auto size = static_cast<std::size_t>(columns.size());
+  if (size == 0) return true;
+  if (std::fwrite(columns.data(), sizeof(double), size, file_.get()) != size || std::fflush(file_.get()) != 0)
+    return false;
+  parked_.push_back({&columns, columns.cols()});
+  columns.resize(columns.rows(), 0);
+  return true;
 }
 
 void ParkedColumns::take_back() {
   if (file_) std::rewind(file_.get());
-  for (const auto& [columns, joints] : parked_) {
-    columns->resize(columns->rows(), joints);
-    const auto count = static_cast<std::size_t>(columns->size());
-    if (std::fread(columns->data(), sizeof(double), count, file_.get()) != count)
-      throw DataError("the logs, which a temporary file held meanwhile, can't be read again");
+  for (const auto& [columns, count] : parked_) {
+    columns->resize(columns->rows(), count);
+    const auto size = static_cast<std::size_t>(columns->size());
+    if (std::fread(columns->data(), sizeof(double), size, file_.get()) != size)
+      throw DataError("what a temporary file held meanwhile can't be read again");
   }
   parked_.clear();
 }

@@ -16,6 +16,9 @@ class ParkedColumns {
  public:
   /// @param samples of all logs together, from which on they are parked
   explicit ParkedColumns(std::vector<ProcessedLog>& logs, double samples = fxdyn::GateOptions().long_logs);
+  /// What an outcome keeps while another one is searched, likewise.
+  /// @param bytes of all matrices together, from which on they are parked
+  explicit ParkedColumns(std::vector<Eigen::MatrixXd>& matrices, double bytes = 32e6);
   /// What was not taken back is lost with its logs.
   ~ParkedColumns() = default;
   ParkedColumns(const ParkedColumns&) = delete;
@@ -25,9 +28,12 @@ class ParkedColumns {
   void take_back();
 
  private:
+  /// @returns whether there was room
+  bool park(Eigen::MatrixXd& columns);
+
   struct Parked {
     Eigen::MatrixXd* columns;
-    Eigen::Index joints;
+    Eigen::Index count;
   };
   struct Close {
     void operator()(std::FILE* file) const { std::fclose(file); }

@@ -286,7 +286,9 @@ VectorXd Search::scores_of_noise(std::size_t joint, const Choice& state, const C
 }
 
 std::size_t Search::refine(const Choice& state, std::size_t g) {
-  const std::optional<Refined> better = refined(problem_, state.fit, problem_.groups()[g]);
+  const Group& start = problem_.groups()[g];
+  const std::optional<Refined> better = refined(problem_, state.fit, start);
+  if (!start.on_body) problem_.log_columns().forget_shared(start.candidate.joint);
   return better ? problem_.add(better->group, better->columns) : g;
 }
 

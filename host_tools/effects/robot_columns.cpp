@@ -64,7 +64,7 @@ RobotColumns::RobotColumns(const IdentifiedModel& model, const Motion& motion)
   for (std::size_t j = 0; j < joints_of(model).size(); ++j) sign_.push_back(std::make_unique<Sign>());
   const auto joints = static_cast<double>(joints_of(model).size());
   if (!plain || 3 * sizeof(double) * joints * joints * static_cast<double>(motion.q.rows()) > most_kept) return;
-  for (std::size_t j = 0; j < joints_of(model).size(); ++j) by_state_.push_back(std::make_unique<ByState>());
+  for (std::size_t j = 0; j < joints_of(model).size(); ++j) by_state_.push_back(std::make_unique<KeptByState>());
 }
 
 const Eigen::VectorXd& RobotColumns::sign(std::size_t joint) const {
@@ -77,28 +77,37 @@ const Eigen::VectorXd& RobotColumns::sign(std::size_t joint) const {
   return out.values;
 }
 
-const RobotColumns::ByState& RobotColumns::by_state(std::size_t joint) const {
-  ByState& out = *by_state_[joint];
-  std::call_once(out.made, [&] {
-    const Motion& m = *motion_;
-    const RigidBody body = rigid_body_of(model_);
-    MatrixXd moved;
-    const auto slope = [&](MatrixXd& to, const MatrixXd& of, double step) {
-      moved = of;
-      moved.col(static_cast<Index>(joint)).array() += step;
-      to.resize(of.rows(), of.cols());
-      rigid_torques(body, &of == &m.q ? moved : m.q, &of == &m.dq ? moved : m.dq, &of == &m.ddq ? moved : m.ddq, to);
-      to = (to - structural_) / step;
-    };
-    slope(out.q, m.q, small_angle);
-    slope(out.dq, m.dq, small_velocity);
-    slope(out.ddq, m.ddq, unit_acceleration);
-  });
-  return out;
+std::shared_ptr<const RobotColumns::ByState> RobotColumns::by_state(std::size_t joint) const {
+  KeptByState& kept = *by_state_[joint];
+  const std::lock_guard lock(kept.mutex);
+  if (kept.slopes) return kept.slopes;
+  auto out = std::make_shared<ByState>();
+  const Motion& m = *motion_;
+  const RigidBody body = rigid_body_of(model_);
+  MatrixXd moved;
+  const auto slope = [&](MatrixXd& to, const MatrixXd& of, double step) {
+    moved = of;
+    moved.col(static_cast<Index>(joint)).array() += step;
+    to.resize(of.rows(), of.cols());
+    rigid_torques(body, &of == &m.q ? moved : m.q, &of == &m.dq ? moved : m.dq, &of == &m.ddq ? moved : m.ddq, to);
+    to = (to - structural_) / step;
+  };
+  slope(out->q, m.q, small_angle);
+  slope(out->dq, m.dq, small_velocity);
+  slope(out->ddq, m.ddq, unit_acceleration);
+  kept.slopes = std::move(out);
+  return kept.slopes;
+}
+
+void RobotColumns::forget_slopes(std::size_t joint) const {
+  if (by_state_.empty()) return;
+  const std::lock_guard lock(by_state_[joint]->mutex);
+  by_state_[joint]->slopes.reset();  // whoever uses them holds them
 }
 
 MatrixXd RobotColumns::of_deflection(std::size_t joint, const Eigen::VectorXd& delta) const {
-  const ByState& slope = by_state(joint);
+  const std::shared_ptr<const ByState> held = by_state(joint);
+  const ByState& slope = *held;
   JointLimits<Real> limits;
   limits.q_upper = limits.dq_upper = limits.ddq_upper = unbounded;
   limits.q_lower = limits.dq_lower = limits.ddq_lower = -unbounded;

@@ -58,6 +58,9 @@ class RobotColumns {
   /// [torque of `changed` - torque of the model] / theta at one joint, where nothing else differs than that joint's
   /// torque effects.
   Eigen::VectorXd own_slope(const IdentifiedModel& changed, std::size_t joint, double theta) const;
+  /// What a joint's deflections share is kept, and made again where it is asked for after this. For those who hold many
+  /// motions. Safe from several threads.
+  void forget_slopes(std::size_t joint) const;
 
  private:
   /// [torque of `changed` - torque of the model] / theta
@@ -71,10 +74,13 @@ class RobotColumns {
   };
   /// Change of the rigid body's torques with one joint's state, samples x joints each.
   struct ByState {
-    std::once_flag made;
     Eigen::MatrixXd q, dq, ddq;
   };
-  const ByState& by_state(std::size_t joint) const;
+  struct KeptByState {
+    std::mutex mutex;
+    std::shared_ptr<const ByState> slopes;
+  };
+  std::shared_ptr<const ByState> by_state(std::size_t joint) const;
   /// Torques for a deflection [rad | m per unit] of a joint, by its state's slopes.
   Eigen::MatrixXd of_deflection(std::size_t joint, const Eigen::VectorXd& delta) const;
 
@@ -83,7 +89,7 @@ class RobotColumns {
   Eigen::MatrixXd torque_, structural_;
   mutable std::vector<std::unique_ptr<Sign>> sign_;  ///< by joint
   /// Empty where something else than the rigid body feels a deflection, or the motion is too long to keep them.
-  mutable std::vector<std::unique_ptr<ByState>> by_state_;
+  mutable std::vector<std::unique_ptr<KeptByState>> by_state_;
 };
 
 }  // namespace fxdyn

@@ -25,6 +25,7 @@
 #include "host_tools/simulate/recordings.hpp"
 #include "host_tools/support/error.hpp"
 #include "host_tools/support/files.hpp"
+#include "host_tools/support/heap.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn {
@@ -56,6 +57,8 @@ GateData& Pipeline::data() {
     progress_.stage("checking the logs", 1);
     for (std::string& note : check_before_fit(project_, directory_, *data_, of_train))
       data_notes_.push_back(std::move(note));
+    data_->rows = {};  // every log has been compared with the others
+    give_back_memory();
     progress_.step();
     progress_.done();
   }
@@ -116,7 +119,7 @@ void Pipeline::check_excited() const {
 
 std::vector<ProcessedLog> Pipeline::logs(Role role) {
   std::vector<ProcessedLog> out;
-  for (Log& log : read_logs(project_, role, directory_, &data().rows)) {
+  for (Log& log : read_logs(project_, role, directory_)) {
     check_torque(log, project_.robot);
     out.push_back(process(std::move(log), data().filter));
   }
@@ -168,7 +171,7 @@ void Pipeline::diagnose() {
   const ThreadLimit limit(data().threads);
   data().notes = data_notes_;
   std::vector<ProcessedLog> baseline;
-  for (Log& log : read_logs(project_, Role::baseline, directory_, &data().rows)) {
+  for (Log& log : read_logs(project_, Role::baseline, directory_)) {
     log.role = Role::train;  // what the healthy session is fitted on
     check_torque(log, project_.robot);
     baseline.push_back(process(std::move(log), data().filter));

@@ -15,4 +15,8 @@ inline void keep_freed_memory() {
   mallopt(M_TRIM_THRESHOLD, trim_bytes);
 }
 
+/// What keep_freed_memory() kept goes back to the system: between stages, where the next one needs other matrices than
+/// the last. Otherwise holes that no longer fit add up with long logs.
+inline void give_back_memory() { malloc_trim(0); }
+
 }  // namespace fxdyn

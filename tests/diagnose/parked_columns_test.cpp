@@ -48,5 +48,18 @@ TEST(ParkedColumns, LogsWithEncodersOfLinksStay) {
   EXPECT_EQ(logs[0].tau.cols(), 3);
 }
 
+TEST(ParkedColumns, OfAnOutcomeComeBackWhereTheyFillMuch) {
+  std::vector<MatrixXd> features{MatrixXd::Random(100, 7), {}, MatrixXd::Random(50, 2)};
+  const std::vector<MatrixXd> before = features;
+  ParkedColumns small(features, 6401);
+  EXPECT_EQ(features[0].size(), 700);
+  ParkedColumns parked(features, 6400);
+  EXPECT_EQ(features[0].size() + features[2].size(), 0);
+  parked.take_back();
+  EXPECT_EQ(features[0], before[0]);
+  EXPECT_EQ(features[1].size(), 0);
+  EXPECT_EQ(features[2], before[2]);
+}
+
 }  // namespace
 }  // namespace fxdyn::diagnosis

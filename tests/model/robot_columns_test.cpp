@@ -172,6 +172,16 @@ TEST(RobotColumns, PayloadIsLinearInMassAndFirstMoment) {
   EXPECT_EQ(names[3].name + " " + names[3].unit, "mass com_z kg*m");
 }
 
+TEST(RobotColumns, AreTheSameOnceWhatTheyShareIsForgotten) {
+  const Motion motion = swing();
+  const RobotColumns columns(puma(), motion);
+  const EffectCandidate bend{"elasticity", 1, shape_of("elasticity", 1)};
+  const EffectColumns before = columns(bend);
+  columns.forget_slopes(1);
+  const EffectColumns after = columns(bend);
+  for (std::size_t j = 0; j < before.joints.size(); ++j) EXPECT_EQ(before.joints[j], after.joints[j]);
+}
+
 TEST(RobotColumns, RefuseWhatIsNotThere) {
   const IdentifiedModel model = puma();
   const Motion motion = swing();
