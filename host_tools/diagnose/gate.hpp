@@ -62,7 +62,8 @@ Gate judge_again(const Outcome& outcome, const std::vector<SessionLog>& logs, co
 Eigen::VectorXd judged_error(const Models& models, const std::vector<SessionLog>& logs);
 
 /// Judges each fold by a fit of the others; time constants of drift are chosen by that, and names that do not hold are
-/// taken out of the outcome one by one: those that may be why a joint's plain error on the validate logs is larger than
+/// taken out of the outcome one by one: first several of a joint's position that one free curve in their place is
+/// likelier than; then those that may be why a joint's plain error on the validate logs is larger than
 /// that of `nominal` (rows near standstill, of which the search believes little, count there too), or, where there are
 /// no such logs, that on train logs that judge one another larger than without what was found; of several the one
 /// without which least is harmed. Then those that bring nothing; those that spoil a joint at which nothing was found;
