@@ -82,7 +82,9 @@ void weigh_evidence(Outcome& outcome, const Gate& gate) {
     const auto j = static_cast<Index>(group.candidate.joint);
     const double share = gate.gap[j] > 0 ? gate.held.alone[i][j] / gate.gap[j] : 0;
     evidence.closure = group.on_body ? gate.robot_closure[i] : share;
-    const double form = group.on_body ? std::max(gate.robot_closure[i], gate.robot_form[i]) : gate.own[i].form;
+    const double form = group.on_body                   ? std::max(gate.robot_closure[i], gate.robot_form[i])
+                        : gate.own[i].is_stack(options) ? 0.0  // something else is there
+                                                        : gate.own[i].form;
     judge(evidence, gate.believed[i], form, options);
   }
 }

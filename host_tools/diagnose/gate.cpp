@@ -190,14 +190,10 @@ void choose_time_constants(Outcome& outcome, const std::vector<SessionLog>& logs
   outcome.look_again(logs);
 }
 
-/// Whether one free curve in the place of several names is likelier than they are, by 1000 to 1.
-bool is_stack(const OwnEvidence& own, const GateOptions& options) {
-  return own.spline_gain >= options.established * variances_per_decade;
-}
-
 /// Whether a name's form holds against a free curve of its variable.
 bool form_holds(const OwnEvidence& own, const GateOptions& options) {
   const bool several = own.alike > 1;
+  if (own.is_stack(options)) return false;
   if (own.of_position && own.curve_gain >= options.established * variances_per_decade)
     return own.form >= (several ? options.several_closure : options.sure_closure);
   return own.form >= (several ? options.sure_closure : options.least_closure);
@@ -211,8 +207,8 @@ std::vector<bool> lacking_form(const Gate& gate, const Outcome& outcome) {
     const Group& group = outcome.problem->groups()[gate.groups[i]];
     const OwnEvidence& own = gate.own[i];
     if (group.on_body || !own.of_position || form_holds(own, options)) continue;
-    out[group.candidate.joint] =
-        out[group.candidate.joint] || own.curve_gain >= options.established * variances_per_decade;
+    out[group.candidate.joint] = out[group.candidate.joint] || own.is_stack(options) ||
+                                 own.curve_gain >= options.established * variances_per_decade;
   }
   return out;
 }
@@ -299,7 +295,7 @@ bool take_out_stack(Outcome& outcome, const Gate& gate, const std::vector<Sessio
   std::vector<EffectId> stack;
   for (std::size_t i = 0; i < gate.groups.size(); ++i) {
     const Group& group = outcome.problem->groups()[gate.groups[i]];
-    if (group.on_body || !is_stack(gate.own[i], outcome.models.options.gate)) continue;
+    if (group.on_body || !gate.own[i].is_stack(outcome.models.options.gate)) continue;
     if (stack.empty() || stack.front().joint == group.id.joint) stack.push_back(group.id);
   }
   // From the last on, so that the others' places stay.
@@ -426,7 +422,8 @@ Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<Se
   Gate gate;
   for (;;) {
     gate = judge_again(outcome, logs, still);
-    if (take_out_stack(outcome, gate, logs)) continue;
+    // The curve can have their place in the model only where validate logs confirm it; else their torque stays.
+    if (validated.size() > 0 && take_out_stack(outcome, gate, logs)) continue;
     PlainErrors errors{validated, validated};
     if (!gate.groups.empty()) {
       if (fit_without_harm(outcome, nominal, logs)) gate = judge_again(outcome, logs, still);

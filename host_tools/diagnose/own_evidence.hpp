@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <vector>
 
+#include "host_tools/diagnose/finding.hpp"
 #include "host_tools/diagnose/linearised.hpp"
 
 namespace fxdyn::diagnosis {
@@ -23,6 +24,9 @@ struct OwnEvidence {
   bool of_position = false;  ///< its variable is the own position
   std::size_t alike = 1;     ///< effects of that variable at the joint
   bool of_time = false;      ///< its variable is time, whose curve says nothing of other times
+
+  /// Whether one free curve in the place of several names is likelier than they are, by 1000 to 1.
+  bool is_stack(const GateOptions& options) const { return spline_gain >= options.established * variances_per_decade; }
 };
 
 /// An effect's own variable is another joint's velocity, time, the own position, or else the own motion and load; its

@@ -328,10 +328,9 @@ class ReportWriter {
     if (out.carries_over == false) note_risen_error(j, of);
     const bool left = out.verdict == Verdict::unexplained || out.verdict == Verdict::partly_explained;
     // What only bends leaves no gap in the torque, and noise alone has nothing to close.
-    const bool of_torque =
-        state.there || state.reached ||
-        (left && (state.structured || state.remains || state.wanders || state.curved)) ||
-        any([](const NamedEffect& e) { return e.established && e.signal.empty(); });
+    const bool of_torque = state.there || state.reached ||
+                           (left && (state.structured || state.remains || state.wanders || state.curved)) ||
+                           any([](const NamedEffect& e) { return e.established && e.signal.empty(); });
     const bool only_impacts = state.impacts && !changed && !state.structured && !state.wanders && !state.curved;
     if (only_impacts) {
       out.where = place(*impacts);
