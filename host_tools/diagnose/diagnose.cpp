@@ -214,32 +214,36 @@ class Diagnoser {
     deflections_ = std::move(bent);
     weigh_evidence(outcome, gate);
   }
-  /// The model has the curves that are told of, where validate logs confirm each: beyond the motion that fitted it, a
-  /// curve is a guess.
+  /// The model has the curves that are told of, where validate logs confirm them: beyond its motion one is a guess.
   void take_curves(const Outcome& outcome, Diagnosis& result) const {
     if (task_.settings.max_effects == 0) return;  // the BLS is to learn what is left
     std::vector<JointDiagnosis>& told = result.report.joints;
     std::vector<bool> without = still_;
     for (std::size_t j = 0; j < joints(); ++j) without[j] = without[j] || !told[j].curve || !told[j].curve->of_motion();
-    const VectorXd before = plain_error(result.model, logs_);
-    if (before.sum() == 0) return;
-    Models models = with_findings(outcome);
-    const std::vector<FreeCurve> curves = add_free_curves(models, logs_, without);
-    if (curves.empty()) return;
-    Linearised problem(models, logs_, plain());
-    problem.solver().set_weights(diluted_weights(problem));
-    add_deviations(models, problem);
-    mark_named(models.current, outcome);
-    for (const FreeCurve& curve : curves) effect_of(models.current, curve.id).named = false;
-    IdentifiedModel with = finished(models.current);
-    const VectorXd after = plain_error(with, logs_);
-    const auto falls = [&](const FreeCurve& curve) {
-      const auto j = static_cast<Index>(curve.effect.joint);
-      return after[j] < before[j];
-    };
-    if (is_worse_anywhere(result.model, with) || !std::all_of(curves.begin(), curves.end(), falls)) return;
-    result.model = std::move(with);
-    for (const FreeCurve& curve : curves) told[curve.effect.joint].curve->in_model = true;
+    for (const VectorXd before = plain_error(result.model, logs_); before.sum() > 0;) {
+      Models models = with_findings(outcome);
+      const std::vector<FreeCurve> curves = add_free_curves(models, logs_, without);
+      if (curves.empty()) return;
+      Linearised problem(models, logs_, plain());
+      problem.solver().set_weights(diluted_weights(problem));
+      add_deviations(models, problem);
+      mark_named(models.current, outcome);
+      for (const FreeCurve& curve : curves) effect_of(models.current, curve.id).named = false;
+      IdentifiedModel with = finished(models.current);
+      const VectorXd after = plain_error(with, logs_);
+      // One that does not bring its joint's error down keeps no other out.
+      bool all_fall = true;
+      for (const FreeCurve& curve : curves) {
+        const auto j = static_cast<Index>(curve.effect.joint);
+        without[curve.effect.joint] = !(after[j] < before[j]);
+        all_fall = all_fall && !without[curve.effect.joint];
+      }
+      if (!all_fall) continue;
+      if (is_worse_anywhere(result.model, with)) return;
+      result.model = std::move(with);
+      for (const FreeCurve& curve : curves) told[curve.effect.joint].curve->in_model = true;
+      return;
+    }
   }
   static EffectFit& effect_of(IdentifiedModel& model, const EffectId& id) {
     return id.body ? model.body[id.effect] : model.joints[id.joint].effects[id.effect];

@@ -298,10 +298,19 @@ bool take_out_stack(Outcome& outcome, const Gate& gate, const std::vector<Sessio
     if (group.on_body || !gate.own[i].is_stack(outcome.models.options.gate)) continue;
     if (stack.empty() || stack.front().joint == group.id.joint) stack.push_back(group.id);
   }
-  // From the last on, so that the others' places stay.
-  std::sort(stack.begin(), stack.end(), [](const EffectId& a, const EffectId& b) { return a.effect > b.effect; });
-  for (const EffectId& id : stack) take_out(outcome, id, logs);
-  return !stack.empty();
+  if (stack.empty()) return false;
+  for (const EffectId& id : stack) std::erase_if(outcome.found, [&](const Finding& f) { return f.id == id; });
+  std::vector<EffectId> ids = stack;
+  for (const Finding& f : outcome.found) ids.push_back(f.id);
+  for (std::size_t left = stack.size(); left > 0; --left) {
+    const EffectId gone = ids.front();
+    ids.erase(ids.begin());
+    take_back(outcome.models, ids, gone);
+  }
+  for (std::size_t i = 0; i < outcome.found.size(); ++i) outcome.found[i].id = ids[i];
+  refit(outcome.models, logs, outcome.whitening, 3);
+  outcome.look_again(logs);
+  return true;
 }
 
 /// The named effect that goes first, as a place in the gate's groups; their number: all hold.
@@ -426,7 +435,10 @@ Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<Se
     if (validated.size() > 0 && take_out_stack(outcome, gate, logs)) continue;
     PlainErrors errors{validated, validated};
     if (!gate.groups.empty()) {
-      if (fit_without_harm(outcome, nominal, logs)) gate = judge_again(outcome, logs, still);
+      if (fit_without_harm(outcome, nominal, logs)) {
+        gate = judge_again(outcome, logs, still);
+        if (validated.size() > 0 && take_out_stack(outcome, gate, logs)) continue;
+      }
       if (validated.size() > 0) {
         errors.after = plain_error(outcome.models.current, logs);
       } else {

@@ -202,6 +202,7 @@ class AtJoint {
         ++tried;
       }
     }
+    if (tried == 0) return 0;  // hardly any motion has room for knots
     return gain(named, best) - 2 * std::log(static_cast<double>(sizes * tried));
   }
 

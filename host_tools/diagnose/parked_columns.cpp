@@ -16,7 +16,7 @@ ParkedColumns::ParkedColumns(std::vector<ProcessedLog>& logs, double samples) {
     linked |= log.qlink.size() > 0;
   }
   if (linked || all < samples) return;
-  file_.reset(std::tmpfile());
+  open();
   if (!file_) return;
   for (ProcessedLog& log : logs) {
     for (MatrixXd* columns : {&log.q, &log.tau, &log.lost_velocity}) {
@@ -31,12 +31,18 @@ ParkedColumns::ParkedColumns(std::vector<MatrixXd>& matrices, double bytes) {
   for (const MatrixXd& columns : matrices)
     all += static_cast<double>(sizeof(double)) * static_cast<double>(columns.size());
   if (all < bytes) return;
-  file_.reset(std::tmpfile());
+  open();
   if (!file_) return;
   for (MatrixXd& columns : matrices) {
     if (!park(columns)) return;
   }
   give_back_memory();
+}
+
+void ParkedColumns::open() {
+  file_.reset(std::tmpfile());
+  // Written at once: what a full disk had no room for must not be tried again where the rest is read.
+  if (file_) std::setvbuf(file_.get(), nullptr, _IONBF, 0);
 }
 
 bool ParkedColumns::park(MatrixXd& columns) {
@@ -50,7 +56,8 @@ bool ParkedColumns::park(MatrixXd& columns) {
 }
 
 void ParkedColumns::take_back() {
-  if (file_) std::rewind(file_.get());
+  if (file_ && std::fseek(file_.get(), 0, SEEK_SET) != 0)
+    throw DataError("what a temporary file held meanwhile can't be read again");
   for (const auto& [columns, count] : parked_) {
     columns->resize(columns->rows(), count);
     const auto size = static_cast<std::size_t>(columns->size());

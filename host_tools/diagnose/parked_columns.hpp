@@ -28,6 +28,7 @@ class ParkedColumns {
   void take_back();
 
  private:
+  void open();
   /// @returns whether there was room
   bool park(Eigen::MatrixXd& columns);
 

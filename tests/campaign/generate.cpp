@@ -333,7 +333,7 @@ json truth_json(const Case& wanted, const Ground& ground) {
       entry["outside"] = true;
       entry["curve"] = curve_of(outside);
       if (const auto curve = swept(outside, 3 * role_duration_s(wanted)))
-        entry["swept"] = {{"x", curve->x}, {"y", curve->y}};
+        entry["swept"] = {{"x", curve->x}, {"y", curve->y}, {"friction", curve->friction}};
     } else {
       entry["names"] = stands_for;
     }

@@ -200,7 +200,8 @@ std::optional<Swept> swept(const Outside& o, double duration_s) {
   else
     motion.q.col(static_cast<Index>(of_other ? o.other : o.joint)) = x;
   const VectorXd y = outside_torque(o, motion);
-  return Swept{{x.begin(), x.end()}, {y.begin(), y.end()}};
+  const bool friction = o.effect == "tight_spot" || o.effect == "wandering_friction";
+  return Swept{{x.begin(), x.end()}, {y.begin(), y.end()}, friction};
 }
 
 void scale(Outside& outside, double share, const Plan& plan) {

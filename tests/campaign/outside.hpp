@@ -46,6 +46,7 @@ std::string curve_of(const Outside& outside);
 /// since the session's start [s].
 struct Swept {
   std::vector<double> x, y;
+  bool friction = false;  ///< its sign is that of the motion
 };
 /// @param duration_s of the session; @returns nothing where no curve has the form
 std::optional<Swept> swept(const Outside& outside, double duration_s);

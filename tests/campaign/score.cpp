@@ -107,9 +107,9 @@ std::size_t count_curves(const json& diagnosis) {
 }
 
 /// Points of a curve whose band of 95 % holds the truth's, and all of them. The mean is taken off both: what is nominal
-/// has it. Points where the truth was not swept don't count.
+/// has it. Points where the truth was not swept don't count, nor does a friction beside a torque.
 void count_band(const json& curve, const json& truth, double clock_s, json& out) {
-  if (!curve.contains("x")) return;
+  if (!curve.contains("x") || curve.at("friction") != truth.at("friction")) return;
   const auto x = curve.at("x").get<std::vector<double>>(), y = curve.at("y").get<std::vector<double>>(),
              std = curve.at("std").get<std::vector<double>>();
   const auto true_x = truth.at("x").get<std::vector<double>>(), true_y = truth.at("y").get<std::vector<double>>();

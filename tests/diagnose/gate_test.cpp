@@ -98,6 +98,61 @@ TEST_F(NamesAtTheGate, OnlyWhatBringsSomethingStays) {
   EXPECT_EQ(report.at("joints").at(2).at("verdict"), "nothing_missing");
 }
 
+/// A PUMA 560 whose second joint runs into a stop, which has three names, beside a ripple of the third.
+/// @param second role of the log that judges; train: both do
+Outcome with_a_stack(Role second, std::vector<SessionLog>& logs) {
+  const IdentifiedModel nominal = test::fitted_puma();
+  IdentifiedModel robot = nominal;
+  robot.joints[2].effects.push_back(test::effect("ripple", {14}, {0.5, 0.2}));
+  for (const auto& [role, seed] : {std::pair{Role::train, 1}, std::pair{second, 2}}) {
+    logs.push_back(test::small_session_log(robot, role, static_cast<std::uint64_t>(seed)));
+    ProcessedLog& log = logs.back().log;
+    log.tau.col(1).array() -= 6 * (log.q.col(1).array() - 0.3).max(0.0);
+  }
+  Outcome out;
+  out.models = test::around(nominal);
+  auto& joints = out.models.current->joints;
+  for (const EffectFit& fit :
+       {test::named_effect("gravity_compensator", {}, {0.5, 0.5}), test::named_effect("spring", {}, {-1, 0}),
+        test::named_effect("ripple", {5}, {0.3, 0.1})}) {
+    joints[1].effects.push_back(fit);
+    out.found.push_back({{false, 1, joints[1].effects.size() - 1}, 100, {}});
+  }
+  joints[2].effects.push_back(test::named_effect("ripple", {14}, {0.5, 0.2}));
+  out.found.push_back({{false, 2, joints[2].effects.size() - 1}, 100, {}});
+  out.whitening = test::no_whitening();
+  out.not_identifiable.resize(7);
+  refit(out.models, logs, out.whitening, 4);
+  out.look_again(logs);
+  return out;
+}
+
+TEST(AStackAtTheGate, IsTakenOutWhereALogCanConfirmTheCurveInItsPlace) {
+  std::vector<SessionLog> logs;
+  Outcome outcome = with_a_stack(Role::validate, logs);
+  const Gate gate = pass(outcome, test::fitted_puma(), logs, std::vector<bool>(6, false));
+  ASSERT_EQ(outcome.found.size(), 1U);
+  const EffectId& id = outcome.found[0].id;
+  EXPECT_EQ(id.joint, 2U);
+  EXPECT_EQ(outcome.models.current->joints[2].effects.at(id.effect).effect, "ripple");
+  for (const char* gone : {"gravity_compensator", "spring", "ripple"})
+    EXPECT_EQ(outcome.models.current->joints[1].find(gone), nullptr) << gone;
+}
+
+TEST(AStackAtTheGate, HasNoNamesWhateverItCloses) {
+  std::vector<SessionLog> logs;
+  Outcome outcome = with_a_stack(Role::train, logs);
+  const Gate gate = judge_again(outcome, logs, std::vector<bool>(6, false));
+  weigh_evidence(outcome, gate);
+  ASSERT_EQ(outcome.found.size(), 4U);
+  for (const Finding& finding : outcome.found) {
+    if (finding.id.joint != 1) continue;
+    EXPECT_FALSE(gate.believed[gate.place(*outcome.problem, finding.id)]);
+    EXPECT_EQ(finding.evidence.certainty, Certainty::unlisted);
+  }
+  EXPECT_TRUE(gate.remains[1]);
+}
+
 TEST_F(NamesAtTheGate, NothingStaysBelowItsThresholds) {
   outcome_.models.options.gate.least_gain = 1e6;
   EXPECT_TRUE(pass(outcome_, nominal_, logs_, still_).groups.empty());
