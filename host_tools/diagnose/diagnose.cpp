@@ -22,7 +22,6 @@
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/diagnose/sessions.hpp"
 #include "host_tools/diagnose/verdict.hpp"
-#include "host_tools/effects/braking.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/identify/estimate.hpp"
@@ -214,23 +213,31 @@ class Diagnoser {
     deflections_ = std::move(bent);
     weigh_evidence(outcome, gate);
   }
-  /// The model has the curves that are told of, where validate logs confirm them: beyond its motion one is a guess.
+  /// Squares of the error on what judges: validate logs by the model that is written, else logs by a fit of the others.
+  VectorXd error_of(const Models& models, const IdentifiedModel& written) const {
+    VectorXd out = plain_error(written, logs_);
+    return out.size() > 0 ? out : judged_error(models, logs_);
+  }
+  /// The model has the curves that are told of, where the data that judge confirm them.
   void take_curves(const Outcome& outcome, Diagnosis& result) const {
     if (task_.settings.max_effects == 0) return;  // the BLS is to learn what is left
     std::vector<JointDiagnosis>& told = result.report.joints;
     std::vector<bool> without = still_;
-    for (std::size_t j = 0; j < joints(); ++j) without[j] = without[j] || !told[j].curve || !told[j].curve->of_motion();
-    for (const VectorXd before = plain_error(result.model, logs_); before.sum() > 0;) {
+    for (std::size_t j = 0; j < joints(); ++j)
+      without[j] = without[j] || !told[j].curve || !may_enter(*told[j].curve, logs_, options().gate);
+    if (std::find(without.begin(), without.end(), false) == without.end()) return;
+    for (const VectorXd before = error_of(with_findings(outcome), result.model);;) {
       Models models = with_findings(outcome);
       const std::vector<FreeCurve> curves = add_free_curves(models, logs_, without);
       if (curves.empty()) return;
       Linearised problem(models, logs_, plain());
       problem.solver().set_weights(diluted_weights(problem));
       add_deviations(models, problem);
-      mark_named(models.current, outcome);
-      for (const FreeCurve& curve : curves) effect_of(models.current, curve.id).named = false;
-      IdentifiedModel with = finished(models.current);
-      const VectorXd after = plain_error(with, logs_);
+      IdentifiedModel with = models.current;
+      mark_named(with, outcome);
+      for (const FreeCurve& curve : curves) effect_of(with, curve.id).named = false;
+      with = finished(with);
+      const VectorXd after = error_of(models, with);
       // One that does not bring its joint's error down keeps no other out.
       bool all_fall = true;
       for (const FreeCurve& curve : curves) {
@@ -244,9 +251,6 @@ class Diagnoser {
       for (const FreeCurve& curve : curves) told[curve.effect.joint].curve->in_model = true;
       return;
     }
-  }
-  static EffectFit& effect_of(IdentifiedModel& model, const EffectId& id) {
-    return id.body ? model.body[id.effect] : model.joints[id.joint].effects[id.effect];
   }
   /// A fault of the recording would get the name of an effect.
   void refuse_faulty_recordings(const Models& nominal, const Outcome& outcome) const {
@@ -439,15 +443,6 @@ class Diagnoser {
     models_.rotors = learned.models.rotors;
     add_notes(check_same_robot(models_, logs_, still_));
     data_.notes.insert(data_.notes.end(), healthy.notes.begin(), healthy.notes.end());
-  }
-
-  /// What is there for sure stays as a column without a name where its name is not: its torque is measured all the
-  /// same.
-  static void mark_named(IdentifiedModel& model, const Outcome& outcome) {
-    for (const Finding& finding : outcome.found) {
-      effect_of(model, finding.id).named = finding.evidence.certainty == Certainty::established;
-    }
-    for (JointFit& joint : model.joints) let_it_brake(joint);  // around less than it was fitted beside
   }
 
   const Project& project_;

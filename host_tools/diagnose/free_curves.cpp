@@ -50,10 +50,22 @@ struct Tried {
   double left = 1e300;
 };
 
-MatrixXd columns_of(const Linearised& problem, const EffectCandidate& curve) {
+/// By log and row: 1 where the joint moves, else 0. At rest stiction holds any torque: what is there is no curve's.
+std::vector<VectorXd> moves(const Linearised& problem, std::size_t joint) {
+  const double width = joints_of(problem.models().current)[joint].sign_width;
+  std::vector<VectorXd> out;
+  for (std::size_t l = 0; l < problem.logs().size(); ++l) {
+    const auto speed = problem.motion(l).dq.col(static_cast<Index>(joint)).array().abs();
+    out.emplace_back((speed > width).cast<double>());
+  }
+  return out;
+}
+
+/// Where the joint moves.
+MatrixXd columns_of(const Linearised& problem, const EffectCandidate& curve, const std::vector<VectorXd>& moving) {
   Group group;
   group.candidate = curve;
-  return problem.make(group)[curve.joint];
+  return problem.make(group, false, moving)[curve.joint];
 }
 
 /// Curves of one joint.
@@ -61,7 +73,12 @@ class Trials {
  public:
   Trials(const Linearised& problem, std::size_t joint, const std::vector<Index>& columns, double prior,
          const std::vector<Fold>& folds)
-      : problem_(problem), joint_(joint), columns_(columns), prior_(prior), folds_(folds) {
+      : problem_(problem),
+        joint_(joint),
+        columns_(columns),
+        prior_(prior),
+        folds_(folds),
+        moving_(moves(problem, joint)) {
     for (std::size_t j = 0; j < problem.joints(); ++j) scales_.push_back(scales_of(problem, j));
   }
 
@@ -101,7 +118,7 @@ class Trials {
   std::vector<Tried> best(const std::vector<EffectCandidate>& all) {
     std::vector<double> left(all.size());
     parallel_for(all.size(), [&](std::size_t i) {
-      const MatrixXd curve = columns_of(problem_, all[i]);
+      const MatrixXd curve = columns_of(problem_, all[i], moving_);
       for (const Fold& fold : folds_) left[i] += judged_with_curves(problem_, joint_, columns_, curve, prior_, fold);
     });
     count_ += all.size();
@@ -119,6 +136,7 @@ class Trials {
   const std::vector<Index>& columns_;
   double prior_;
   const std::vector<Fold>& folds_;
+  std::vector<VectorXd> moving_;
   std::vector<MotionScales> scales_;  ///< by joint
   std::size_t count_ = 0;
 };
@@ -177,7 +195,7 @@ std::optional<FreeCurve> best_by(const Linearised& problem, std::size_t joint, d
 /// Whether one log alone has what a curve closes: all others together have less of it than is worth a curve.
 bool is_of_one_log(const Linearised& problem, const FreeCurve& curve, double size, const std::vector<Fold>& folds) {
   const std::vector<Index> columns = problem.columns_of(in_model(problem));
-  const MatrixXd with = columns_of(problem, curve.effect), without(with.rows(), 0);
+  const MatrixXd with = columns_of(problem, curve.effect, moves(problem, curve.effect.joint)), without(with.rows(), 0);
   std::map<std::size_t, double> closed;  // by log
   for (const Fold& fold : folds) {
     for (const std::size_t judge : fold.judge) {
@@ -322,6 +340,17 @@ double misfit(const Linearised& problem, const FreeCurve& curve, const CurveResu
   return std::max(0.0, (of_means - static_cast<double>(bins) * noise) / rows);
 }
 
+/// Whether a curve of the load takes or gives more than all of the load: a drive loses no more than goes through it.
+bool exceeds_load(const Models& models, const FreeCurve& curve) {
+  if (variable_of(*find_effect(curve.effect.effect)) != "load") return false;
+  const Knots knots(curve.effect);
+  const VectorXd at = VectorXd::LinSpaced(drawn_points, knots.from, knots.from + knots.span);
+  const std::vector<double>& linear = joints_of(models.current)[curve.id.joint].effects[curve.id.effect].linear;
+  const VectorXd y = bumps(knots, at) * Eigen::Map<const VectorXd>(linear.data(), static_cast<Index>(curve_heights));
+  const Index steps = drawn_points - 1;
+  return ((y.tail(steps) - y.head(steps)).array().abs() > (at.tail(steps) - at.head(steps)).array()).any();
+}
+
 bool is_any(const std::vector<bool>& of) { return std::find(of.begin(), of.end(), true) != of.end(); }
 
 std::vector<bool> harmed_by(const Models& now, const Models& before, const std::vector<SessionLog>& logs) {
@@ -359,17 +388,19 @@ std::vector<FreeCurve> add_free_curves(Models& models, const std::vector<Session
     refit(models, logs, white(n), 4, only);
   };
   // A fit that took no step leaves heights of 0: then there is nothing to draw.
-  const auto drop_flat = [&] {
-    return std::erase_if(found, [&](const FreeCurve& curve) { return is_flat(models, curve); }) > 0;
+  const auto drop_impossible = [&] {
+    return std::erase_if(found, [&](const FreeCurve& curve) {
+             return is_flat(models, curve) || exceeds_load(models, curve);
+           }) > 0;
   };
   while (!found.empty()) {
     fit({});
-    if (drop_flat()) continue;
+    if (drop_impossible()) continue;
     std::vector<bool> harmed = harmed_by(models, before, logs);
     if (is_any(harmed)) {
       // What a curve does not explain goes to the base parameters, which its joint has in common with others.
       fit(joints_with(found, n));
-      if (drop_flat()) continue;
+      if (drop_impossible()) continue;
       harmed = harmed_by(models, before, logs);
     }
     if (!is_any(harmed)) return found;

@@ -5,6 +5,8 @@
 
 #include "host_tools/diagnose/free_curves.hpp"
 #include "host_tools/diagnose/time_curve.hpp"
+#include "host_tools/effects/braking.hpp"
+#include "host_tools/effects/joint_fit.hpp"
 #include "host_tools/effects/model_parts.hpp"
 #include "host_tools/support/parallel.hpp"
 
@@ -47,12 +49,20 @@ bool is_any(const Curves& curves) {
   return std::any_of(curves.begin(), curves.end(), [](const auto& curve) { return curve.has_value(); });
 }
 
+EffectFit& effect_of(IdentifiedModel& model, const EffectId& id) {
+  return id.body ? body_of(model)[id.effect] : joints_of(model)[id.joint].effects[id.effect];
+}
+
+void mark_named(IdentifiedModel& model, const Outcome& outcome) {
+  for (const Finding& finding : outcome.found)
+    effect_of(model, finding.id).named = finding.evidence.certainty == Certainty::established;
+  for (JointFit& joint : joints_of(model)) let_it_brake(joint);  // around less than it was fitted beside
+}
+
 Models with_findings(const Outcome& outcome) {
   Models models = outcome.models;
   for (const Finding& finding : outcome.found) {
-    const EffectId& id = finding.id;
-    (id.body ? body_of(models.current)[id.effect] : joints_of(models.current)[id.joint].effects[id.effect]).named =
-        true;
+    effect_of(models.current, finding.id).named = true;
   }
   return models;
 }
@@ -80,6 +90,12 @@ Curves take_off_what_wanders(const Outcome& outcome, const Gate& gate, const std
     out[j] = std::move(all[j].front());
   }
   return out;
+}
+
+bool may_enter(const CurveResult& curve, const std::vector<SessionLog>& logs, const GateOptions& options) {
+  const bool sure = !curve.odds_rival || *curve.odds_rival >= options.established;
+  const bool validated = std::any_of(logs.begin(), logs.end(), [](const SessionLog& log) { return !log.fits; });
+  return curve.of_motion() && (sure || validated);
 }
 
 }  // namespace fxdyn::diagnosis

@@ -157,13 +157,14 @@ std::vector<Index> Linearised::columns_of(const std::vector<std::size_t>& groups
   return out;
 }
 
-std::vector<MatrixXd> Linearised::make(const Group& group, bool in_both) const {
+std::vector<MatrixXd> Linearised::make(const Group& group, bool in_both, const std::vector<VectorXd>& counts) const {
   std::vector<std::vector<MatrixXd>> of_log(logs().size(), std::vector<MatrixXd>(joints()));
   parallel_for(logs().size(), [&](std::size_t l) {
     if (logs()[l].healthy && !in_both) return;
     const ProcessedLog& log = logs()[l].log;
-    const EffectColumns full = log_columns_.of(l, group);
+    EffectColumns full = log_columns_.of(l, group);
     for (std::size_t j = 0; j < joints(); ++j) {
+      if (full.joints[j].size() > 0 && !counts.empty()) full.joints[j].array().colwise() *= counts[l].array();
       if (full.joints[j].size() > 0)
         of_log[l][j] = noise_.apply(l, j, log.decimate(log.filter_columns(full.joints[j])));
     }

@@ -57,7 +57,9 @@ class Linearised {
   /// Columns of candidates (current session; `in_both`: of the healthy one as well), whitened: per joint rows x
   /// columns, below them those that the joint's background adds; 0 x 0 where nothing is felt. Safe from several
   /// threads.
-  std::vector<Eigen::MatrixXd> make(const Group& group, bool in_both = false) const;
+  /// @param counts by log the factor of each row at full rate, before the filter; empty: 1
+  std::vector<Eigen::MatrixXd> make(const Group& group, bool in_both = false,
+                                    const std::vector<Eigen::VectorXd>& counts = {}) const;
   /// Columns of a load that is any body: d torque / d (mass, first moment, second moment: xx, yy, zz, and twice xy, xz,
   /// yz), as make() has them; made once. Safe from several threads.
   const std::vector<Eigen::MatrixXd>& load_columns() const;

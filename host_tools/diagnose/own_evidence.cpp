@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 
 #include "host_tools/diagnose/curve_squares.hpp"
 #include "host_tools/diagnose/dictionary.hpp"
@@ -183,7 +184,10 @@ class AtJoint {
     const double by_names = nothing.sum() - named.sum(), by_curve = nothing.sum() - curve.sum();
     out.form = by_curve > 0 ? std::max(0.0, by_names) / by_curve : 1.0;
     out.curve_gain = gain(named, curve) - 2 * std::log(2 * sizes);
-    if (out.of_position && out.alike > 1) out.spline_gain = spline_gain(rest, nothing, named);
+    if (out.of_position && out.alike > 1) {
+      if (!spline_gain_) spline_gain_ = spline_gain(rest, nothing, named);
+      out.spline_gain = *spline_gain_;
+    }
     return out;
   }
   /// Of the best free curve of the position in the place of names, with knots over the whole range or parts of it.
@@ -214,6 +218,7 @@ class AtJoint {
   double rows_ = 0;
   std::vector<std::size_t> variable_;  ///< by own group: a family
   std::vector<OwnEvidence> evidence_;
+  mutable std::optional<double> spline_gain_;  ///< the same of all names of the position
   mutable std::map<std::vector<std::size_t>, std::unique_ptr<Linearised>> around_;  ///< by what is left out
 };
 

@@ -229,14 +229,14 @@ TEST(Diagnosis, WithoutABaselineToo) {
   expect_curve_of_hose("hose_alone", false, 0.9);
 }
 
-TEST(Diagnosis, WithoutSuchLogsACurveIsAnAnswerOnly) {
+TEST(Diagnosis, WithoutSuchLogsTrainLogsConfirmItForOneAnother) {
   if (test::sanitized) GTEST_SKIP() << "other cases run the same code";
   const std::filesystem::path out =
       test::diagnose_sessions("spot_alone", {.baseline = false, .validate = false, .tamper = tight_spot});
   const json joint = json::parse(read_file(out / "diagnosis.json")).at("joints").at(1);
   ASSERT_TRUE(joint.at("curve").is_object()) << joint.dump(1);
-  EXPECT_FALSE(joint.at("curve").at("in_model"));
-  EXPECT_EQ(read_model(out / "model.json").joints[1].find("friction_over_position"), nullptr);
+  EXPECT_TRUE(joint.at("curve").at("in_model"));
+  EXPECT_NE(read_model(out / "model.json").joints[1].find("friction_over_position"), nullptr);
 }
 
 TEST(Diagnosis, WhereNothingIsToBeNamedACurveIsAnAnswerOnly) {

@@ -7,6 +7,7 @@
 #include <functional>
 
 #include "host_tools/diagnose/gate.hpp"
+#include "host_tools/diagnose/left_curves.hpp"
 #include "host_tools/diagnose/refit.hpp"
 #include "tests/diagnose/small_problem.hpp"
 
@@ -31,16 +32,14 @@ struct Answer {
   }
 };
 
+/// @param nominal the robot without the torque; @param extra of the second joint, by log
 /// @param inertia of joint 3, in the train log alone, after the first fit [kg*m^2]
-Answer answer(const Torque& torque, double inertia = 0) {
-  const IdentifiedModel nominal = test::fitted_puma();
+Answer answer_on(const IdentifiedModel& nominal, const std::function<ArrayXd(const SessionLog&)>& extra,
+                 double inertia = 0) {
   Answer out;
   for (const auto& [role, seed] : {std::pair{Role::train, 1}, std::pair{Role::validate, 2}}) {
     out.logs.push_back(test::small_session_log(nominal, role, static_cast<std::uint64_t>(seed)));
-    ProcessedLog& log = out.logs.back().log;
-    const MotionRows motion = log.motion(0, log.samples());
-    log.tau.col(1).array() +=
-        torque(motion.q.col(1).array(), motion.dq.col(1).array(), motion.q.col(3).array(), motion.dq.col(3).array());
+    out.logs.back().log.tau.col(1).array() += extra(out.logs.back());
   }
   Outcome outcome;
   outcome.models = test::around(nominal);
@@ -55,6 +54,26 @@ Answer answer(const Torque& torque, double inertia = 0) {
   out.curves = add_free_curves(out.after, out.logs, without);
   if (!out.curves.empty()) out.drawn = drawn(out.after, out.curves.front(), out.logs);
   return out;
+}
+
+Answer answer(const Torque& torque, double inertia = 0, const IdentifiedModel& nominal = test::fitted_puma()) {
+  const auto extra = [&](const SessionLog& entry) {
+    const MotionRows motion = entry.log.motion(0, entry.log.samples());
+    return torque(motion.q.col(1).array(), motion.dq.col(1).array(), motion.q.col(3).array(), motion.dq.col(3).array());
+  };
+  return answer_on(nominal, extra, inertia);
+}
+
+/// A torque of the second joint's own load.
+Answer answer_of_load(const std::function<ArrayXd(const ArrayXd& load)>& torque) {
+  const IdentifiedModel nominal = test::fitted_puma();
+  return answer_on(nominal, [&](const SessionLog& entry) {
+    std::vector<SessionLog> logs{entry};
+    logs[0].fits = true;
+    const Models models = test::around(nominal);
+    const Linearised problem(models, logs, test::no_whitening());
+    return torque(problem.robot_columns(0).structural().col(1).array());
+  });
 }
 
 ArrayXd bump(const ArrayXd& x, double at, double width) { return (-((x - at) / width).square()).exp(); }
@@ -143,12 +162,55 @@ TEST(FreeCurves, ACurveStaysWhereAFitOfEverythingWouldHarmAnotherJoint) {
   EXPECT_NEAR(a.left(2), 1, 1e-9);
 }
 
+// Stiction holds any torque: a place that the joint rests in is no place of a torque.
+TEST(FreeCurves, WhatIsThereAtRestAloneIsNone) {
+  IdentifiedModel nominal = test::fitted_puma();
+  nominal.joints[1].sign_width = 0.6;
+  const auto held = [](double most) {
+    return [most](const ArrayXd&, const ArrayXd& dq, const ArrayXd& other, const ArrayXd&) -> ArrayXd {
+      return 4 * (6 * other).sin() * (dq.abs() < most).cast<double>();
+    };
+  };
+  const Answer resting = answer(held(0.55), 0, nominal);
+  EXPECT_TRUE(resting.curves.empty()) << resting.curves[0].effect.effect;
+  const Answer moving = answer(held(100), 0, nominal);
+  ASSERT_EQ(moving.curves.size(), 1U);
+  EXPECT_EQ(moving.curves[0].effect.effect, "cross_position");
+}
+
+TEST(FreeCurves, ALoadLosesNoMoreThanAllOfIt) {
+  const auto loss = [](double height) {
+    return [height](const ArrayXd& load) -> ArrayXd { return height * bump(load, 15, 5); };
+  };
+  const Answer a = answer_of_load(loss(3));
+  ASSERT_EQ(a.curves.size(), 1U);
+  EXPECT_EQ(a.curves[0].effect.effect, "load_curve");
+  for (const FreeCurve& curve : answer_of_load(loss(12)).curves) EXPECT_NE(curve.effect.effect, "load_curve");
+}
+
 TEST(FreeCurves, NoiseGetsNone) {
   const Answer a = answer([](const ArrayXd& q, const ArrayXd&, const ArrayXd&, const ArrayXd&) -> ArrayXd {
     return ArrayXd::Zero(q.size());
   });
   EXPECT_TRUE(a.curves.empty());
   EXPECT_EQ(a.after.current->joints[1].effects.size(), a.before.current->joints[1].effects.size());
+}
+
+TEST(FreeCurves, WithoutValidateLogsTheModelHasThoseOfASureVariable) {
+  std::vector<SessionLog> logs(1);
+  CurveResult curve;
+  curve.effect = "velocity_curve";
+  curve.signal = "dq";
+  EXPECT_TRUE(may_enter(curve, logs, GateOptions{}));
+  curve.odds_rival = 2.9;
+  EXPECT_FALSE(may_enter(curve, logs, GateOptions{}));
+  curve.odds_rival = 3.1;
+  EXPECT_TRUE(may_enter(curve, logs, GateOptions{}));
+  curve.odds_rival = 0.1;
+  logs.emplace_back().fits = false;
+  EXPECT_TRUE(may_enter(curve, logs, GateOptions{}));
+  curve.signal = "t";
+  EXPECT_FALSE(may_enter(curve, logs, GateOptions{}));
 }
 
 }  // namespace
