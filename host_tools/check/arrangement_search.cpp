@@ -299,6 +299,13 @@ std::vector<Scored> best_of_each(const ArrangementEvidence& evidence, const Arra
     refine(evidence, now, best[i]);
     // What no joint feels of a direction would be noise; and units are powers of ten.
     if (is_simple(simple.move) && simple.score.nats < best[i].score.nats + options.as_good) best[i] = simple;
+    if (best[i].move.mistake != Mistake::gravity) return;
+    // Nor turns gravity over where parallel axes feel no more of it than a tilt.
+    Scored tilted = simple;
+    tilted.move.direction = tilted.move.result.gravity = now.gravity;
+    tilted.score.nats = nats;
+    refine(evidence, now, tilted);
+    if (tilted.score.nats < best[i].score.nats + options.as_good) best[i] = std::move(tilted);
   });
   std::sort(best.begin(), best.end(), [](const Scored& a, const Scored& b) { return a.score.nats < b.score.nats; });
   return best;

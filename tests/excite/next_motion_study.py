@@ -24,7 +24,7 @@ ROBOTS = {  # URDF: rated torque, acceleration
 }
 STEPS_S = [3, 4, 5, 6, 8, 10, 12, 14, 16, 18, 20, 25, 30, 40, 50, 60]
 MOST_PLANS = 3  # one after the other
-SIZE = (0.05, 0.6)  # times the torque noise: RMS of the effect in the first of the slow logs
+SIZE = (0.15, 1.5)  # times the torque noise: RMS of the effect in the first of the slow logs
 LARGEST = 0.03  # of rated torque: at most, RMS at full speed
 SIMPLE = ("viscous", "coulomb")
 
@@ -198,9 +198,9 @@ class Case:
             self.project(name, before, f"[excite]\nseed = {i + 1}\n")
             plan = self.run("excite", name + ".toml", "--out", name)
             if plan.returncode != 0:
-                sys.exit(f"{self.folder}: {plan.stderr}")
+                return None, 0, plan.stderr.strip()
             motion = self.record(name, motion)
-        return self.seconds_until("standard", before, motion), sum(d for _, d in motion)
+        return self.seconds_until("standard", before, motion), sum(d for _, d in motion), ""
 
     def judge(self):
         out = {"seed": self.seed, "robot": self.urdf, "effect": self.effect, "joint": self.joint + 1,
@@ -211,7 +211,9 @@ class Case:
         planned, planned_s, why = self.planned(before)
         if planned_s == 0:
             return {**out, "status": "no plan", "why": why}
-        standard, standard_s = self.standard(before)
+        standard, standard_s, why = self.standard(before)
+        if standard_s == 0:
+            return {**out, "status": "no standard motion", "why": why}
         return {**out, "status": "open", "planned": planned, "planned_s": planned_s, "standard": standard,
                 "standard_s": standard_s}
 
@@ -229,7 +231,7 @@ def judged(arguments):
 
 def table(results):
     opened = [r for r in results if r["status"] == "open"]
-    count = {s: sum(r["status"] == s for r in results) for s in ("named at once", "no plan", "open")}
+    count = {s: sum(r["status"] == s for r in results) for s in ("named at once", "no plan", "no standard motion", "open")}
     print(", ".join(f"{n} {s}" for s, n in count.items()))
     print("| seed | robot | joint | effect | planned, s | standard, s |\n|---|---|---|---|---|---|")
     for r in opened:
