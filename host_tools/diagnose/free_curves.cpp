@@ -50,13 +50,15 @@ struct Tried {
   double left = 1e300;
 };
 
-/// By log and row: 1 where the joint moves, else 0. At rest stiction holds any torque: what is there is no curve's.
+/// By log and row: 1 where the joint moves by more than the velocity's noise (Models::least_width), else 0. At rest
+/// stiction holds any torque: what is there is no curve's.
 std::vector<VectorXd> moves(const Linearised& problem, std::size_t joint) {
-  const double width = joints_of(problem.models().current)[joint].sign_width;
+  const std::vector<double>& widths = problem.models().least_width;
+  const double least = widths.empty() ? 0 : widths[joint];
   std::vector<VectorXd> out;
   for (std::size_t l = 0; l < problem.logs().size(); ++l) {
     const auto speed = problem.motion(l).dq.col(static_cast<Index>(joint)).array().abs();
-    out.emplace_back((speed > width).cast<double>());
+    out.emplace_back((speed > least).cast<double>());
   }
   return out;
 }

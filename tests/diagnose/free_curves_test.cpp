@@ -34,8 +34,9 @@ struct Answer {
 
 /// @param nominal the robot without the torque; @param extra of the second joint, by log
 /// @param inertia of joint 3, in the train log alone, after the first fit [kg*m^2]
+/// @param least_width of all joints [rad/s]: slower is at rest
 Answer answer_on(const IdentifiedModel& nominal, const std::function<ArrayXd(const SessionLog&)>& extra,
-                 double inertia = 0) {
+                 double inertia = 0, double least_width = 0) {
   Answer out;
   for (const auto& [role, seed] : {std::pair{Role::train, 1}, std::pair{Role::validate, 2}}) {
     out.logs.push_back(test::small_session_log(nominal, role, static_cast<std::uint64_t>(seed)));
@@ -43,6 +44,7 @@ Answer answer_on(const IdentifiedModel& nominal, const std::function<ArrayXd(con
   }
   Outcome outcome;
   outcome.models = test::around(nominal);
+  outcome.models.least_width.assign(6, least_width);
   outcome.whitening = test::no_whitening();
   refit(outcome.models, out.logs, outcome.whitening, 4);
   outcome.look_again(out.logs);
@@ -56,12 +58,13 @@ Answer answer_on(const IdentifiedModel& nominal, const std::function<ArrayXd(con
   return out;
 }
 
-Answer answer(const Torque& torque, double inertia = 0, const IdentifiedModel& nominal = test::fitted_puma()) {
+Answer answer(const Torque& torque, double inertia = 0, const IdentifiedModel& nominal = test::fitted_puma(),
+              double least_width = 0) {
   const auto extra = [&](const SessionLog& entry) {
     const MotionRows motion = entry.log.motion(0, entry.log.samples());
     return torque(motion.q.col(1).array(), motion.dq.col(1).array(), motion.q.col(3).array(), motion.dq.col(3).array());
   };
-  return answer_on(nominal, extra, inertia);
+  return answer_on(nominal, extra, inertia, least_width);
 }
 
 /// A torque of the second joint's own load.
@@ -171,9 +174,10 @@ TEST(FreeCurves, WhatIsThereAtRestAloneIsNone) {
       return 4 * (6 * other).sin() * (dq.abs() < most).cast<double>();
     };
   };
-  const Answer resting = answer(held(0.55), 0, nominal);
+  const Answer resting = answer(held(0.55), 0, nominal, 0.6);
   EXPECT_TRUE(resting.curves.empty()) << resting.curves[0].effect.effect;
-  const Answer moving = answer(held(100), 0, nominal);
+  EXPECT_FALSE(answer(held(0.55), 0, nominal).curves.empty());
+  const Answer moving = answer(held(100), 0, nominal, 0.6);
   ASSERT_EQ(moving.curves.size(), 1U);
   EXPECT_EQ(moving.curves[0].effect.effect, "cross_position");
 }
