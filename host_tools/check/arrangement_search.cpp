@@ -299,11 +299,11 @@ std::vector<Scored> best_of_each(const ArrangementEvidence& evidence, const Arra
     refine(evidence, now, best[i]);
     // What no joint feels of a direction would be noise; and units are powers of ten.
     if (is_simple(simple.move) && simple.score.nats < best[i].score.nats + options.as_good) best[i] = simple;
-    if (best[i].move.mistake != Mistake::gravity) return;
     // Nor turns gravity over where parallel axes feel no more of it than a tilt.
+    if (best[i].move.mistake != Mistake::gravity || best[i].move.direction.dot(now.gravity) >= 0) return;
     Scored tilted = simple;
     tilted.move.direction = tilted.move.result.gravity = now.gravity;
-    tilted.score.nats = nats;
+    tilted.score = evidence(now);
     refine(evidence, now, tilted);
     if (tilted.score.nats < best[i].score.nats + options.as_good) best[i] = std::move(tilted);
   });

@@ -226,7 +226,9 @@ class Diagnoser {
     for (std::size_t j = 0; j < joints(); ++j)
       without[j] = without[j] || !told[j].curve || !may_enter(*told[j].curve, logs_, options().gate);
     if (std::find(without.begin(), without.end(), false) == without.end()) return;
-    for (const VectorXd before = error_of(with_findings(outcome), result.model);;) {
+    Models bare = with_findings(outcome);
+    refit(bare, logs_, plain(), 4);  // as those with curves are: the curves alone are to differ
+    for (const VectorXd before = error_of(bare, result.model);;) {
       Models models = with_findings(outcome);
       const std::vector<FreeCurve> curves = add_free_curves(models, logs_, without);
       if (curves.empty()) return;

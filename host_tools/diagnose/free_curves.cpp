@@ -51,7 +51,7 @@ struct Tried {
 };
 
 /// By log and row: 1 where the joint moves by more than the velocity's noise (Models::least_width), else 0. At rest
-/// stiction holds any torque: what is there is no curve's.
+/// stiction holds any torque: what is there chooses no curve.
 std::vector<VectorXd> moves(const Linearised& problem, std::size_t joint) {
   const std::vector<double>& widths = problem.models().least_width;
   const double least = widths.empty() ? 0 : widths[joint];
