@@ -1,5 +1,6 @@
 """CAN buses of images in QEMU, for tests: frames are (identifier, bytes)."""
 import os
+import re
 import select
 import socket
 import subprocess
@@ -44,16 +45,17 @@ class SlcanBus:
         self.unsent += f't{identifier:03X}{len(data)}{data.hex().upper()}\r'.encode()
 
     def receive_line(self, timeout=10):
+        """The next line without its end: CR, or BEL, which refuses a line and has no CR after it."""
         self.line.sendall(self.unsent)
         self.unsent = b''
         deadline = time.monotonic() + timeout
-        while b'\r' not in self.text:
+        while not (end := re.search(rb'[\r\a]', self.text)):
             ready, _, _ = select.select([self.line], [], [], max(0, deadline - time.monotonic()))
             more = self.line.recv(4096) if ready else b''
             if not more:
                 raise Silent(f'no line within {timeout} s')
             self.text += more
-        line, _, self.text = self.text.partition(b'\r')
+        line, self.text = self.text[:end.start()], self.text[end.end():]
         return line.decode()
 
     def receive(self, timeout=10):
