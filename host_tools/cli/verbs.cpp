@@ -58,7 +58,7 @@ std::span<const Verb> verbs() {
            "fleet.toml --out out/fleet --chunk 0 --of 8", add_fleet_worker},
       Verb{"history", "What drifts from session to session of one robot: history.html, history.json.",
            "out/2026-05-01 out/2026-06-01 --out out/history", add_history},
-      Verb{"effects", "List the effects that the model knows.", "--json", add_effects},
+      Verb{"effects", "List the effects that the model knows.", "stribeck presliding", add_effects},
       Verb{"doctor", "What this machine lacks for which verb, and the command that installs it.", "", add_doctor},
       Verb{"completion", "What bash or zsh needs to complete verbs, options and file names, to standard output.",
            "bash > ~/.local/share/bash-completion/completions/fxdyn", add_completion},

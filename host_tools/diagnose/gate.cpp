@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "host_tools/diagnose/deviations.hpp"
+#include "host_tools/diagnose/error_of_law.hpp"
 #include "host_tools/diagnose/explore.hpp"
 #include "host_tools/diagnose/harmless.hpp"
 #include "host_tools/diagnose/refit.hpp"
@@ -213,19 +214,6 @@ std::vector<bool> lacking_form(const Gate& gate, const Outcome& outcome) {
   return out;
 }
 
-/// Whether what is left at a joint is no more than the error of a law's form: small, and in the own motion and load
-/// alone.
-bool is_error_of_law(const Outcome& outcome, const HeldOut& held, double gap, std::size_t joint) {
-  const bool law = std::any_of(outcome.found.begin(), outcome.found.end(), [&](const Finding& finding) {
-    return !finding.id.body && finding.id.joint == joint &&
-           find_effect(joints_of(outcome.models.current)[joint].effects[finding.id.effect].effect)->unites_others();
-  });
-  const LackOfFit& lack = outcome.lack[joint];
-  const LackOfFitOptions& options = outcome.models.options.lack_of_fit;
-  return law && lack.elsewhere_p >= options.suspected && lack.time_p >= options.time &&
-         held.excess[static_cast<Index>(joint)] <= outcome.models.options.gate.law_error * gap;
-}
-
 /// Which names are believed at each joint.
 void conclude(Gate& gate, const Outcome& outcome, const std::vector<bool>& still) {
   const std::vector<bool> misnamed = lacking_form(gate, outcome);
@@ -235,6 +223,7 @@ void conclude(Gate& gate, const Outcome& outcome, const std::vector<bool>& still
   gate.gap = gap_of(held);
   gate.closure.setZero(n);
   gate.remains.clear();
+  gate.of_law.clear();
   gate.accepted.clear();
   for (Index j = 0; j < n; ++j) {
     const auto k = static_cast<std::size_t>(j);
@@ -244,7 +233,8 @@ void conclude(Gate& gate, const Outcome& outcome, const std::vector<bool>& still
     const double noise = std::max(held.after[j] - held.leftover[j], 0.0);
     const double counts = std::min((1 - options.sure_closure) * gate.gap[j], options.beyond_noise * noise);
     const bool left = outcome.structured(k) && held.excess[j] > counts;
-    gate.remains.push_back(!still[k] && (misnamed[k] || (left && !is_error_of_law(outcome, held, gate.gap[j], k))));
+    gate.of_law.push_back(outcome.structured(k) && is_error_of_law(outcome, held, gate.gap[j], k));
+    gate.remains.push_back(!still[k] && (misnamed[k] || (left && !gate.of_law[k])));
     gate.accepted.push_back(gate.closure[j] >= (gate.remains.back() ? options.sure_closure : options.least_closure));
   }
 }

@@ -41,6 +41,7 @@ struct Gate {
   std::vector<double> robot_closure;  ///< by group; effects on the body only
   std::vector<double> robot_form;     ///< likewise, form_on_robot()
   std::vector<bool> remains;          ///< structure that counts is left
+  std::vector<bool> of_law;           ///< what is left is no more than the error of a law of friction
   std::vector<bool> accepted;         ///< the joint's gap is closed by its names
   std::vector<OwnEvidence> own;       ///< by group; effects at a joint only
   std::vector<bool> believed;         ///< by group

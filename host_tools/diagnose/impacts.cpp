@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host_tools/diagnose/velocity_doubt.hpp"
+#include "host_tools/effects/identified_model.hpp"
 #include "host_tools/support/parallel.hpp"
 
 namespace fxdyn::diagnosis {
@@ -40,23 +42,32 @@ void bridge_reversals(VectorXd& error, const VectorXd& dq) {
   }
 }
 
-/// @param error measured less predicted torque of the joint, all samples
-void add(Count& to, const ProcessedLog& log, std::size_t joint, VectorXd error, const ImpactOptions& options) {
-  const Index count = log.last - log.first;
-  bridge_reversals(error, log.joint_velocity(static_cast<Index>(joint)));
-  const VectorXd above = (error - log.filter_columns(error)).segment(log.first, count);
-  std::vector<double> sizes(above.begin(), above.end());
+double median_size(const Eigen::Ref<const VectorXd>& of) {
+  std::vector<double> sizes(of.begin(), of.end());
   for (double& size : sizes) size = std::fabs(size);
-  const auto middle = sizes.begin() + count / 2;
+  const auto middle = sizes.begin() + of.size() / 2;
   std::nth_element(sizes.begin(), middle, sizes.end());
-  const double sigma = *middle / median_of_sigma;
+  return *middle;
+}
+
+/// @param error measured less predicted torque of the joint, all samples @param friction the model's, of the joint
+void add(Count& to, const ProcessedLog& log, std::size_t joint, VectorXd error, const JointFit& friction,
+         const ImpactOptions& options) {
+  const Index count = log.last - log.first;
+  VectorXd swing = log.joint_velocity(static_cast<Index>(joint));  // a long log's columns: as few as will do
+  bridge_reversals(error, swing);
+  // The torque is no less than the load, so that friction in proportion to it is none too small.
+  swing = friction_swing(log, joint, friction, swing, log.tau.col(static_cast<Index>(joint)), options.of_velocity);
+  error -= log.filter_columns(error);
+  const auto above = error.segment(log.first, count);
+  const double sigma = median_size(above) / median_of_sigma;
   to.seconds += static_cast<double>(count) * log.step_s;
   if (!(sigma > 0)) return;  // most of it is one step of the torque's
   const auto apart = static_cast<Index>(options.together_s / log.step_s);
   Index last = -apart - 1;
   for (Index k = 0; k < count; ++k) {
     const double size = std::fabs(above[k]);
-    if (size < options.beyond * sigma) continue;
+    if (size < options.beyond * sigma + swing[log.first + k]) continue;
     if (size > to.worst.largest) {
       to.worst.largest = size;
       to.worst.log = log.name;
@@ -79,10 +90,11 @@ std::vector<std::optional<Impacts>> find_impacts(const IdentifiedModel& model, c
   std::vector<Count> train(n), judges(n), old(n);
   const auto count = [n, &options](const IdentifiedModel& of, const std::vector<ProcessedLog>& logs, auto&& list_of) {
     for (const ProcessedLog& log : logs) {
-      MatrixXd error = predict(of, log);  // in place: a long log's columns are held once
-      error = log.tau - error;
+      MatrixXd error = log.tau;
+      add_prediction(-1, of, log, error);
       std::vector<Count>& list = list_of(log);
-      parallel_for(n, [&](std::size_t j) { add(list[j], log, j, error.col(static_cast<Index>(j)), options); });
+      parallel_for(
+          n, [&](std::size_t j) { add(list[j], log, j, error.col(static_cast<Index>(j)), of.joints[j], options); });
     }
   };
   count(model, now,

@@ -20,7 +20,8 @@ struct Impacts {
 
 /// What a few samples hold and the torque's filter takes away, of joints that the healthy session shows less of: parts
 /// that strike as a gap closes, a loose connector. Of the error h = e - lowpass(e), e = tau - predict(model), what is
-/// beyond 6 standard deviations (of the log, from its median) counts once every 20 ms. Today's train logs and the
+/// beyond 6 standard deviations (of the log, from its median) and what friction may change by where the velocity is
+/// uncertain (friction_swing) counts once every 20 ms. Today's train logs and the
 /// validate logs, where there are any, must each have three times as many a second as the healthy session.
 /// @param now at least one log @param healthy the model of `before`
 /// @returns by joint; nothing without a healthy session

@@ -177,6 +177,8 @@ struct GateOptions {
   double beyond_noise = 0.25;
   /// share of the gap; a law of friction may leave in the own motion and load, as its form is never exact; hand
   double law_error = 0.02;
+  /// share of the dry friction's power; .. and the smooth sign of the nominal model likewise; hand: 3 % of its torque
+  double sign_error = 1e-3;
   /// standard deviations; coefficients of a name are off nothing by, or those of a healthy session off where they were;
   /// theory: 2 Phi(-2) = 4.6 % of noise is further off
   double sure_deviations = 2;
@@ -206,6 +208,8 @@ struct CurveOptions {
 struct ImpactOptions {
   /// standard deviations; an impact; theory: noise at 500 Hz does so once in 12 days, 2 Phi(-6) = 2e-9
   double beyond = 6;
+  /// standard deviations of the velocity; within them friction may be anything; theory: 0.3 % of its noise is beyond
+  double of_velocity = 3;
   /// s; samples that are nearer are one impact; hand
   double together_s = 0.02;
   /// times the healthy session's rate; structure; hand

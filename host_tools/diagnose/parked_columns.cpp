@@ -56,6 +56,7 @@ bool ParkedColumns::park(MatrixXd& columns) {
 }
 
 void ParkedColumns::take_back() {
+  if (!parked_.empty()) give_back_memory();  // holes of what was looked at meanwhile are too small for these columns
   if (file_ && std::fseek(file_.get(), 0, SEEK_SET) != 0)
     throw DataError("what a temporary file held meanwhile can't be read again");
   for (const auto& [columns, count] : parked_) {

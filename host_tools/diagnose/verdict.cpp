@@ -308,7 +308,7 @@ class ReportWriter {
     const std::optional<Impacts>& impacts = conclusion_.impacts[j];
     const std::vector<std::size_t>& bends = conclusion_.deflections.unexplained;
     JointState state;
-    state.structured = conclusion_.outcome.structured(j);
+    state.structured = conclusion_.outcome.structured(j) && !conclusion_.gate.of_law[j];
     state.remains = conclusion_.gate.remains[j];
     state.established = any([](const NamedEffect& e) { return e.established; });
     state.reached = robot_reaches(k);

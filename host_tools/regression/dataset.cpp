@@ -383,31 +383,46 @@ std::optional<ModelValue> stiffened(const IdentifiedModel& model) {
 
 namespace {
 
-MatrixXd predict_by_blocks(const IdentifiedModel& model, const ProcessedLog& log) {
+void add_by_blocks(double factor, const IdentifiedModel& model, const ProcessedLog& log, MatrixXd& to) {
   Predictor predictor(with_load_of(log, model), log.step_s, age_of(model, log));
   constexpr Index block = 8192;
-  MatrixXd tau(log.samples(), log.q.cols());
+  const double lead = model.filter.torque_lead_s / log.step_s;
+  MatrixXd all, part;
+  if (lead != 0) all.resize(log.samples(), log.q.cols());
   for (Index from = 0; from < log.samples(); from += block) {
     const Index count = std::min(block, log.samples() - from);
     const MotionRows motion = log.motion(from, count);
-    predictor(motion.q, motion.dq, motion.ddq, tau.middleRows(from, count));
+    part.resize(count, log.q.cols());
+    predictor(motion.q, motion.dq, motion.ddq, part);
+    if (lead != 0) {
+      all.middleRows(from, count) = part;
+    } else {
+      to.middleRows(from, count) += factor * part;
+    }
   }
-  if (model.filter.torque_lead_s == 0) return tau;
-  return at_other_times(tau, model.filter.torque_lead_s / log.step_s);
+  for (Index j = 0; j < all.cols(); ++j) to.col(j) += factor * at_other_times(all.col(j), lead);
 }
 
 }  // namespace
 
-MatrixXd predict(const IdentifiedModel& model, const ProcessedLog& log) {
+void add_prediction(double factor, const IdentifiedModel& model, const ProcessedLog& log, MatrixXd& to) {
   const double cutoff = bending_hz(log);
   const auto stiff = cutoff > 0 ? stiffened(model) : std::nullopt;
-  if (!stiff) return predict_by_blocks(model, log);
+  if (!stiff) return add_by_blocks(factor, model, log, to);
+  add_by_blocks(factor, *stiff, log, to);
   ProcessedLog slow = log;
   const ZeroPhaseFilter filter(cutoff, log.step_s);
   for (MatrixXd* columns : {&slow.q, &slow.measured_dq, &slow.measured_ddq}) {
     if (columns->size() > 0) *columns = filter.apply(*columns);
   }
-  return predict_by_blocks(*stiff, log) + predict_by_blocks(model, slow) - predict_by_blocks(*stiff, slow);
+  add_by_blocks(factor, model, slow, to);
+  add_by_blocks(-factor, *stiff, slow, to);
+}
+
+MatrixXd predict(const IdentifiedModel& model, const ProcessedLog& log) {
+  MatrixXd tau = MatrixXd::Zero(log.samples(), log.q.cols());
+  add_prediction(1, model, log, tau);
+  return tau;
 }
 
 std::vector<MatrixXd> structural_torque(const IdentifiedModel& model, const std::vector<ProcessedLog>& logs) {

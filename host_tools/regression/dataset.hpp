@@ -121,6 +121,9 @@ std::optional<ModelValue> stiffened(const IdentifiedModel& model);
 /// (age_of()), and at the times at which the log's torque column shows them (torque_lead_s of the model's filter):
 /// samples x joints [N*m | N]. What gears bend by follows the motion below bending_hz(), the rest all of it.
 Eigen::MatrixXd predict(const IdentifiedModel& model, const ProcessedLog& log);
+/// The same times a factor, added: a long log's torques are held once.
+/// @param to samples x joints
+void add_prediction(double factor, const IdentifiedModel& model, const ProcessedLog& log, Eigen::MatrixXd& to);
 
 /// Rigid-body torque of the model over each log as the effects of a tick see it: after deflections, with the log's
 /// known load, at the motion's own times.

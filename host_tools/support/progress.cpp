@@ -7,6 +7,7 @@
 #include <mutex>
 #include <utility>
 
+#include "host_tools/support/heap.hpp"
 #include "host_tools/support/progress_listener.hpp"
 #include "host_tools/support/quiet.hpp"
 
@@ -27,6 +28,7 @@ bool is_quiet() { return quiet; }
 void set_progress_listener(ProgressListener listener) { told = std::move(listener); }
 
 void Progress::stage(const std::string& name, std::size_t total) {
+  give_back_memory();  // the next stage needs other matrices than the last
   done();
   name_ = name;
   total_ = total;

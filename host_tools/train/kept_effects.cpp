@@ -122,16 +122,15 @@ std::vector<MatrixXd> KeptEffects::torque(const IdentifiedModel& model, const st
   parallel_for(logs.size(), [&](std::size_t l) {
     const ProcessedLog& log = logs[l];
     MatrixXd& torque = out[l];  // first of what is kept, then of the rest: a long log's columns are held once
+    torque.setZero(log.tau.rows(), log.tau.cols());
     if (any) {
       // Where there is a link encoder the Fitter's rigid body moves as the link does, bent gear included.
       IdentifiedModel seen = with;
       for (std::size_t j = 0; j < seen.joints.size(); ++j) {
         if (log.has_link[j]) std::erase_if(seen.joints[j].effects, acts_on_position);
       }
-      torque = predict(seen, log);
-      torque -= predict(without, log);
-    } else {
-      torque.setZero(log.tau.rows(), log.tau.cols());
+      add_prediction(1, seen, log, torque);
+      add_prediction(-1, without, log, torque);
     }
     for (Index j = 0; j < torque.cols(); ++j) {
       MatrixXd tau = log.tau.col(j);

@@ -70,6 +70,32 @@ TEST_F(ImpactsTest, AreFoundOnAJointThatRests) {
   EXPECT_TRUE(find(now, {resting(Role::baseline, 3, 0)})[joint]);
 }
 
+// At rest an encoder's noise does not say which way friction acts, so that friction may turn from sample to sample.
+TEST_F(ImpactsTest, AreBeyondFrictionWhereTheVelocityIsUncertain) {
+  constexpr double friction = 5;
+  model_.joints[joint].effects = {test::effect("coulomb", {}, {friction})};
+  model_.joints[joint].sign_width = 0.01;
+  const auto resting = [&](Role role, std::uint64_t seed, double size) {
+    ProcessedLog out = log(role, seed);
+    out.q.col(joint).setConstant(0.3);
+    out.filter.position_noise.assign(6, 1e-3);
+    out.filter.encoder_step.assign(6, 0);
+    out.tau = predict(model_, out);
+    Random random(seed);
+    for (double& tau : out.tau.reshaped()) tau += 0.01 * friction * random.normal();
+    for (Index k = 100; k < out.samples(); k += 125) out.tau(k, joint) += size;
+    return out;
+  };
+  const auto found_of = [&](double size) {
+    return find({resting(Role::train, 1, size), resting(Role::validate, 2, size)},
+                {resting(Role::baseline, 3, 0)})[joint];
+  };
+  EXPECT_FALSE(found_of(friction));
+  EXPECT_TRUE(found_of(4 * friction));
+  options_.of_velocity = 0;
+  EXPECT_TRUE(found_of(friction));
+}
+
 TEST_F(ImpactsTest, AreNoneInNoise) {
   for (const auto& found : find({log(Role::train, 1), log(Role::validate, 2)}, {log(Role::baseline, 3)}))
     EXPECT_FALSE(found.has_value());

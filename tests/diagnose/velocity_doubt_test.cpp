@@ -185,5 +185,16 @@ TEST_F(Doubt, IsNoneWithoutFrictionOrNoiseOrWithAMeasuredVelocity) {
   EXPECT_EQ(doubt(), none);
 }
 
+TEST_F(Doubt, SwingsByAllFrictionAtRestAndByNoneInMotion) {
+  log_.filter.position_noise = {1e-3};
+  const VectorXd swing = friction_swing(log_, 0, joint_, dq_, load_, 3);
+  ASSERT_EQ(swing.size(), samples);
+  EXPECT_GT(swing.head(samples / 2).minCoeff(), 0.9 * 2 * 2);
+  EXPECT_LE(swing.maxCoeff(), 2 * 2);
+  EXPECT_LT(swing.tail(samples / 2).maxCoeff(), 1e-3);
+  log_.filter.position_noise = {0};
+  EXPECT_EQ(friction_swing(log_, 0, joint_, dq_, load_, 3), VectorXd::Zero(samples));
+}
+
 }  // namespace
 }  // namespace fxdyn::diagnosis

@@ -100,6 +100,12 @@ for acts_on in torque position body; do
   fi
 done
 
+expect 2 "unknown effect 'stribek'; nearest is 'stribeck'" effects viscous stribek
+[ "$("$fxdyn" effects spring viscous --json | grep -c '"equation"')" = 2 ] || {
+  echo "FAILED: fxdyn effects spring viscous shows other than two effects"
+  failures=$((failures + 1))
+}
+
 echo '{"schema": "fxdyn.model/1"}' >"$work/model.json"
 expect 2 "model.json" predict --model "$work/model.json" --log "$work/good.csv" --out "$work/out"
 expect 1 "the mass of the load cannot be identified from this motion: no joint of this robot lifts" payload --model "$work/good/model.json" --log "$work/good.csv" --out "$work/out"

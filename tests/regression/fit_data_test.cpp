@@ -70,6 +70,21 @@ TEST(FitData, AKnownLoadHasItsOwnTorque) {
   }
 }
 
+TEST(Prediction, IsAddedTimesAFactorAtItsOwnTimes) {
+  const auto logs = test::processed({test::exact_log(plant, Role::train, 1)});
+  for (const double lead_s : {0.0, 0.0017}) {
+    IdentifiedModel model = plant;
+    model.filter.torque_lead_s = lead_s;
+    const Eigen::MatrixXd torque = predict(model, logs[0]);
+    ASSERT_EQ(torque.rows(), logs[0].samples());
+    Eigen::MatrixXd rest = logs[0].tau;
+    add_prediction(-2, model, logs[0], rest);
+    EXPECT_LT((rest - (logs[0].tau - 2 * torque)).norm(), 1e-12 * torque.norm());
+    const double off = (torque - logs[0].tau).norm() / torque.norm();
+    EXPECT_TRUE(lead_s == 0 ? off < 1e-6 : off > 1e-4) << off;
+  }
+}
+
 TEST(FitData, SaturatedRowsAndJointsThatAreLeftOutAreNotUsable) {
   auto logs = test::processed({test::exact_log(plant, Role::train, 1), test::exact_log(plant, Role::train, 2)});
   logs[0].saturated[0] = {{1000, 1200}};
