@@ -235,7 +235,9 @@ void conclude(Gate& gate, const Outcome& outcome, const std::vector<bool>& still
     const bool left = outcome.structured(k) && held.excess[j] > counts;
     gate.of_law.push_back(outcome.structured(k) && is_error_of_law(outcome, held, gate.gap[j], k));
     gate.remains.push_back(!still[k] && (misnamed[k] || (left && !gate.of_law[k])));
-    gate.accepted.push_back(gate.closure[j] >= (gate.remains.back() ? options.sure_closure : options.least_closure));
+    // Names have to close what may be a law's error, too, to be more than that.
+    const bool closely = !still[k] && (misnamed[k] || left);
+    gate.accepted.push_back(gate.closure[j] >= (closely ? options.sure_closure : options.least_closure));
   }
 }
 

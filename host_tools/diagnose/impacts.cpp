@@ -54,10 +54,10 @@ double median_size(const Eigen::Ref<const VectorXd>& of) {
 void add(Count& to, const ProcessedLog& log, std::size_t joint, VectorXd error, const JointFit& friction,
          const ImpactOptions& options) {
   const Index count = log.last - log.first;
-  VectorXd swing = log.joint_velocity(static_cast<Index>(joint));  // a long log's columns: as few as will do
+  const VectorXd predicted = log.tau.col(static_cast<Index>(joint)) - error;  // its load, without the impacts
+  VectorXd swing = log.joint_velocity(static_cast<Index>(joint));             // a long log's columns: as few as will do
   bridge_reversals(error, swing);
-  // The torque is no less than the load, so that friction in proportion to it is none too small.
-  swing = friction_swing(log, joint, friction, swing, log.tau.col(static_cast<Index>(joint)), options.of_velocity);
+  swing = friction_swing(log, joint, friction, swing, predicted, options.of_velocity);
   error -= log.filter_columns(error);
   const auto above = error.segment(log.first, count);
   const double sigma = median_size(above) / median_of_sigma;
@@ -67,7 +67,7 @@ void add(Count& to, const ProcessedLog& log, std::size_t joint, VectorXd error, 
   Index last = -apart - 1;
   for (Index k = 0; k < count; ++k) {
     const double size = std::fabs(above[k]);
-    if (size < options.beyond * sigma + swing[log.first + k]) continue;
+    if (!(size >= options.beyond * sigma + swing[log.first + k])) continue;
     if (size > to.worst.largest) {
       to.worst.largest = size;
       to.worst.log = log.name;

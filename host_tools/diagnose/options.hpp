@@ -208,8 +208,8 @@ struct CurveOptions {
 struct ImpactOptions {
   /// standard deviations; an impact; theory: noise at 500 Hz does so once in 12 days, 2 Phi(-6) = 2e-9
   double beyond = 6;
-  /// standard deviations of the velocity; within them friction may be anything; theory: 0.3 % of its noise is beyond
-  double of_velocity = 3;
+  /// standard deviations of the velocity; within them friction may be anything; theory: 6e-5 of its noise is beyond
+  double of_velocity = 4;
   /// s; samples that are nearer are one impact; hand
   double together_s = 0.02;
   /// times the healthy session's rate; structure; hand

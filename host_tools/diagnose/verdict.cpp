@@ -230,6 +230,12 @@ class ReportWriter {
         joint_of(j).name, figures.after, joint_of(j).torque_unit(), figures.gate_after));
   }
 
+  void note_error_of_law(std::size_t j) {
+    notes_.push_back(fmt::format(
+        "{}: something small beside its dry friction is left in its own motion; it is taken for the form of "
+        "the friction's sign, tanh(dq / width)",
+        joint_of(j).name));
+  }
   void note_impacts(std::size_t j) {
     const std::optional<Impacts>& impacts = conclusion_.impacts[j];
     if (!impacts) return;
@@ -322,6 +328,7 @@ class ReportWriter {
 
     note_other_test_logs(j, of);
     note_impacts(j);
+    if (conclusion_.gate.of_law[j] && out.verdict == Verdict::nothing_missing) note_error_of_law(j);
     const bool changed = state.established || state.there || state.reached;
     // A finding elsewhere may reach this joint through the base parameters.
     if (changed || of.after != of.before) out.carries_over = carries_over(of);

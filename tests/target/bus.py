@@ -45,18 +45,18 @@ class SlcanBus:
         self.unsent += f't{identifier:03X}{len(data)}{data.hex().upper()}\r'.encode()
 
     def receive_line(self, timeout=10):
-        """The next line without its end: CR, or BEL, which refuses a line and has no CR after it."""
+        """The next line without its end, a CR. A BEL, which refuses a line and has no CR after it, is a line of its own."""
         self.line.sendall(self.unsent)
         self.unsent = b''
         deadline = time.monotonic() + timeout
-        while not (end := re.search(rb'[\r\a]', self.text)):
+        while not (line := re.match(rb'\a|[^\r\a]*\r|[^\r\a]+(?=\a)', self.text)):
             ready, _, _ = select.select([self.line], [], [], max(0, deadline - time.monotonic()))
             more = self.line.recv(4096) if ready else b''
             if not more:
                 raise Silent(f'no line within {timeout} s')
             self.text += more
-        line, self.text = self.text[:end.start()], self.text[end.end():]
-        return line.decode()
+        self.text = self.text[line.end():]
+        return line[0].rstrip(b'\r').decode()
 
     def receive(self, timeout=10):
         while True:

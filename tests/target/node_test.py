@@ -139,8 +139,8 @@ def main():
         else:
             assert bus.receive_line(30) == f't{0x700 + NODE:03X}100', 'the first frame is not the boot-up message'
             bus.command(b'V\rt12\r')  # an adapter's answers: version; a line that is no frame
-            answers = [bus.receive_line(), bus.receive_line()]
-            while not any(answer.startswith('V') for answer in answers):
+            answers = [bus.receive_line()]
+            while '\a' not in answers or not any(answer.startswith('V') for answer in answers):
                 answers.append(bus.receive_line())
         assert node.expect(0x700 + NODE) == b'\x7f', 'not pre-operational'
 
