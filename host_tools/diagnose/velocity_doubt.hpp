@@ -23,7 +23,8 @@ Eigen::VectorXd velocity_doubt(const ProcessedLog& log, std::size_t joint, const
 
 /// What friction may change by within an uncertain velocity, at full rate [N*m | N]:
 ///   F (tanh((|dq| + d sigma_dq) / width) - tanh((|dq| - d sigma_dq) / width)), F and sigma_dq as above.
-/// @param load of which load friction is a part @param deviations d @returns one a sample; zeros where the velocity is measured or the joint has no friction
+/// @param load of which load friction is a part @param deviations d
+/// @returns one a sample; zeros where the velocity is measured or the joint has no friction
 Eigen::VectorXd friction_swing(const ProcessedLog& log, std::size_t joint, const JointFit& friction,
                                const Eigen::Ref<const Eigen::VectorXd>& dq,
                                const Eigen::Ref<const Eigen::VectorXd>& load, double deviations);
