@@ -175,9 +175,11 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
   }
   if (one) session = {windows.front()[0], windows.back()[1]};
   std::vector<Recording> recordings;
+  recordings.reserve(now.size() + before.size());
   for (const ProcessedLog& log : now) recordings.emplace_back(log, false, one ? windows.front()[0] : log.t[0], options);
   for (const ProcessedLog& log : before) recordings.emplace_back(log, true, log.t[0], options);
   std::vector<SessionLog> frames;
+  frames.reserve(recordings.size());
   for (const Recording& recording : recordings) frames.push_back(recording.frame);
   keep_alike_rows(frames, options);
   for (std::size_t r = 0; r < frames.size(); ++r) recordings[r].frame.log.decimation = frames[r].log.decimation;
