@@ -172,7 +172,7 @@ struct EffectTraits {
   bool friction = false;        ///< differs from day to day as friction does
   bool several = false;         ///< a joint may have more than one
   bool needs_revolute = false;  ///< a function of an angle
-  /// A change since the baseline is one more of it, with a shape of its own.
+  /// A change since the baseline is one more of it.
   bool changes_by_one_more = false;
   /// Of inertia that base parameters may hold: then it can't be told from them.
   bool in_base = false;

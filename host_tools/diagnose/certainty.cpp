@@ -91,6 +91,32 @@ void weigh_evidence(Outcome& outcome, const Gate& gate) {
 
 namespace {
 
+/// What is left of a joint's gap, in noise variances, where it is no noise: structure, or what a curve closes.
+double left_at(const Outcome& outcome, const Gate& gate, std::size_t joint, const std::optional<CurveResult>& curve) {
+  const auto j = static_cast<Index>(joint);
+  const double excess = outcome.structured(joint) && !gate.of_law[joint] ? gate.held.excess[j] : 0;
+  if (!curve) return excess;
+  const double closes = std::clamp(curve->closes, 0.0, 0.99);
+  if (curve->of_motion()) return std::max(excess, closes * gate.held.after[j]);
+  return excess + closes / (1 - closes) * gate.held.after[j];  // taken off the logs that judged
+}
+
+}  // namespace
+
+void doubt_beside_more(Outcome& outcome, const Gate& gate, const Curves& curves) {
+  const double least = outcome.models.options.gate.least_closure;
+  for (Finding& finding : outcome.found) {
+    const std::size_t joint = finding.id.joint;
+    const auto j = static_cast<Index>(joint);
+    if (finding.id.body || finding.evidence.certainty != Certainty::established) continue;
+    const double closed = std::max(gate.held.before[j] - gate.held.after[j], 0.0);
+    if (closed < least * (closed + left_at(outcome, gate, joint, curves[joint])))
+      finding.evidence.certainty = Certainty::likely;
+  }
+}
+
+namespace {
+
 /// Whether the second of two outcomes errs less on what judges, in the geometric mean of the joints, by more than one
 /// further pass of the search brings by itself: it is the likelier one, with variances unknown.
 bool errs_less_in_all(const VectorXd& before, const VectorXd& after) {
@@ -226,21 +252,24 @@ bool settle_rivals(Outcome& outcome, Gate& gate, const Retrial& retrial, Progres
   return settled;
 }
 
-std::vector<Likely> set_aside(Outcome& outcome, Gate& gate, const IdentifiedModel& nominal,
-                              const std::vector<SessionLog>& logs, const std::vector<bool>& still) {
-  const auto goes = [](const Finding& f) { return !f.evidence.there; };
-  std::vector<Likely> out;
-  if (std::none_of(outcome.found.begin(), outcome.found.end(), goes)) return out;
+namespace {
+
+bool is_not_there(const Finding& finding) { return !finding.evidence.there; }
+
+/// Takes out what is not there, fits what is left again and judges it. @param likely what of it is likely
+void take_out_what_is_not_there(Outcome& outcome, Gate& gate, const IdentifiedModel& nominal,
+                                const std::vector<SessionLog>& logs, const std::vector<bool>& still,
+                                std::vector<Likely>& likely) {
   Models with = outcome.models;
   add_deviations(with, *outcome.problem);
   std::vector<EffectId> gone;
   for (const Finding& finding : outcome.found) {
-    if (!goes(finding)) continue;
+    if (!is_not_there(finding)) continue;
     gone.push_back(finding.id);
     if (finding.evidence.certainty == Certainty::unlisted) continue;
     const std::size_t i = gate.place(*outcome.problem, finding.id);
     const double felt = outcome.models.options.gate.least_gain;
-    out.push_back({finding, fit_of(with.current, finding.id), felt_at(gate, i, felt)});
+    likely.push_back({finding, fit_of(with.current, finding.id), felt_at(gate, i, felt)});
   }
   while (!gone.empty()) {
     const EffectId one = gone.back();
@@ -256,7 +285,18 @@ std::vector<Likely> set_aside(Outcome& outcome, Gate& gate, const IdentifiedMode
   outcome.look_again(logs);
   fit_without_harm(outcome, nominal, logs);
   gate = judge_again(outcome, logs, still);
-  return out;
+}
+
+}  // namespace
+
+void set_aside(Outcome& outcome, Gate& gate, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs,
+               const std::vector<bool>& still, std::vector<Likely>& likely) {
+  weigh_evidence(outcome, gate);
+  // What goes may have carried others, whose evidence was weighed beside it.
+  while (std::any_of(outcome.found.begin(), outcome.found.end(), is_not_there)) {
+    take_out_what_is_not_there(outcome, gate, nominal, logs, still, likely);
+    weigh_evidence(outcome, gate);
+  }
 }
 
 }  // namespace fxdyn::diagnosis

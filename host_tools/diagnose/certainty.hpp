@@ -5,6 +5,7 @@
 
 #include "host_tools/diagnose/explore.hpp"
 #include "host_tools/diagnose/gate.hpp"
+#include "host_tools/diagnose/left_curves.hpp"
 #include "host_tools/effects/joint_fit.hpp"
 
 namespace fxdyn::diagnosis {
@@ -23,6 +24,12 @@ double new_since_baseline(Linearised& problem, const std::vector<std::size_t>& g
 
 /// What speaks for each finding, with all of them in the model.
 void weigh_evidence(Outcome& outcome, const Gate& gate);
+
+/// Where names close less of their joint's gap than is left of it, and that is no noise (structure, what a curve
+/// closes, or 95 % sure by left_of()), they may resemble what is left: none of them is established. What is there stays
+/// in the model.
+/// @param curves of what is left, by joint; those of time were taken off the logs before they judged
+void doubt_beside_more(Outcome& outcome, const Gate& gate, const Curves& curves);
 
 /// What a model was before the search, and what the search may do.
 struct Retrial {
@@ -64,10 +71,10 @@ struct Likely {
   std::vector<std::size_t> joints;  ///< an effect on the robot: those that feel it, from 0
 };
 
-/// Takes all that is not there for sure out of the model, fits the rest again and judges it.
-/// @returns what of it is likely
-/// @param nominal the model before the search
-std::vector<Likely> set_aside(Outcome& outcome, Gate& gate, const IdentifiedModel& nominal,
-                              const std::vector<SessionLog>& logs, const std::vector<bool>& still);
+/// Weighs the evidence, takes all that is not there for sure out of the model, fits the rest again and judges it, until
+/// nothing goes.
+/// @param nominal the model before the search @param likely gets what of it is likely
+void set_aside(Outcome& outcome, Gate& gate, const IdentifiedModel& nominal, const std::vector<SessionLog>& logs,
+               const std::vector<bool>& still, std::vector<Likely>& likely);
 
 }  // namespace fxdyn::diagnosis

@@ -23,7 +23,7 @@ std::vector<EffectCandidate> changed_effects(const Linearised& problem) {
   for (const Unknown& u : problem.unknowns()) {
     if (!is_changed(u, problem.options().gate.sure_deviations)) continue;
     const EffectFit& fit = problem.log_columns().joint(u.joint).effects[u.effect];
-    // Of these, one that comes on top is the change: torques that add up, with shapes of their own.
+    // Of these, one that comes on top is the change: torques that add up.
     const EffectInfo& info = *find_effect(fit.effect);
     const bool memory_or_curve = info.friction && !info.nominal && !info.shape.empty() && !info.drifts();
     if (info.changes_by_one_more || memory_or_curve) out.push_back({fit.effect, u.joint, fit.shape});

@@ -115,26 +115,29 @@ class Diagnoser {
     }
     add_deviations(before, Linearised(before, logs_));
     result.nominal = before.current;
-
     Gate gate;
     ParkedColumns parked(data_.logs);
     Outcome outcome = found_effects(start, gate);
     // What wanders may have got the name of an effect, and hides others.
     const Curves wandering = take_off_what_wanders(outcome, gate, still_, logs_);
     if (is_any(wandering)) search_without(start, outcome, gate);
-    const std::vector<Likely> likely = set_aside(outcome, gate, models_.current, logs_, still_);
+    std::vector<Likely> likely;
+    set_aside(outcome, gate, models_.current, logs_, still_, likely);
     parked.take_back();
     result.nominal = finished(result.nominal);
     const IdentifiedModel judged_against = deflections_.found.empty() ? result.nominal : finished(models_.current);
     result.model = concluded(outcome, gate);
-    // What came after the gate (likely names set aside, possible bodies) may have made a finding harm.
+    // What came after the gate (likely names set aside, possible bodies) may have made a finding harm, or vanish.
     while (const std::optional<EffectId> harmful = harmful_finding(outcome, judged_against, result.model, logs_)) {
       if (!fit_without_harm(outcome, judged_against, logs_)) take_out(outcome, *harmful, logs_);
       gate = judge_again(outcome, logs_, still_);
+      set_aside(outcome, gate, models_.current, logs_, still_, likely);
       result.model = concluded(outcome, gate);
     }
     if (models_.has_baseline) add_notes(changed_parameters(*outcome.problem));
     const Curves curves = curves_of_the_rest(outcome, gate, still_, wandering, logs_);
+    doubt_beside_more(outcome, gate, curves);
+    mark_named(result.model, outcome);
     const auto impacts = find_impacts(result.model, data_.logs, outcome.models.healthy, baseline_, options().impact);
     result.report = verdicts({result.nominal, result.model, outcome, gate, likely, deflections_, impacts, curves,
                               still_, data_.logs, test_});

@@ -9,6 +9,7 @@
 #include "host_tools/diagnose/explore.hpp"
 #include "host_tools/diagnose/harmless.hpp"
 #include "host_tools/diagnose/refit.hpp"
+#include "host_tools/diagnose/vanished.hpp"
 #include "host_tools/diagnose/without.hpp"
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/effects.hpp"
@@ -160,6 +161,8 @@ bool holds(const Outcome& outcome, const Group& group, const HeldOut& held, std:
     return false;
   if (group.on_body) return true;
   const std::size_t j = group.candidate.joint;
+  const JointFit& joint = joints_of(outcome.models.current)[j];
+  if (is_at_nothing(*outcome.problem, group, joint.effects[group.id.effect])) return false;
   if (held.alone[i][static_cast<Index>(j)] <= 0) return false;  // whatever it does at others
   // With nothing left over the noise is what it says it is, and a small effect beside a large one is no less sure.
   return !outcome.structured(j) || brings > options.least_share_in_structure * gap_of(held)[static_cast<Index>(j)];
@@ -195,19 +198,19 @@ void choose_time_constants(Outcome& outcome, const std::vector<SessionLog>& logs
 bool form_holds(const OwnEvidence& own, const GateOptions& options) {
   const bool several = own.alike > 1;
   if (own.is_stack(options)) return false;
-  if (own.of_position && own.curve_gain >= options.established * variances_per_decade)
-    return own.form >= (several ? options.several_closure : options.sure_closure);
+  if (own.curve_gain >= options.established * variances_per_decade)
+    return own.form >= (several && own.of_position ? options.several_closure : options.sure_closure);
   return own.form >= (several ? options.sure_closure : options.least_closure);
 }
 
-/// By joint: what is there has a place, and another form than the names that it got.
+/// By joint: what is there has another form than the names that it got.
 std::vector<bool> lacking_form(const Gate& gate, const Outcome& outcome) {
   const GateOptions& options = outcome.models.options.gate;
   std::vector<bool> out(outcome.lack.size(), false);
   for (std::size_t i = 0; i < gate.groups.size(); ++i) {
     const Group& group = outcome.problem->groups()[gate.groups[i]];
     const OwnEvidence& own = gate.own[i];
-    if (group.on_body || !own.of_position || form_holds(own, options)) continue;
+    if (group.on_body || form_holds(own, options)) continue;
     out[group.candidate.joint] = out[group.candidate.joint] || own.is_stack(options) ||
                                  own.curve_gain >= options.established * variances_per_decade;
   }
@@ -457,7 +460,7 @@ std::optional<EffectId> harmful_finding(const Outcome& outcome, const Identified
                                         [&](const Finding& a, const Finding& b) { return rank(a) < rank(b); });
     return first == outcome.found.end() ? std::nullopt : std::optional(first->id);
   }
-  return {};
+  return vanished_finding(outcome, after);
 }
 
 VectorXd judged_error(const Models& models, const std::vector<SessionLog>& logs) {

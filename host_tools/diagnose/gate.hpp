@@ -74,7 +74,7 @@ Gate pass(Outcome& outcome, const IdentifiedModel& nominal, const std::vector<Se
           const std::vector<bool>& still);
 
 /// Where a model errs more than the one before at a joint (harmed_joints()): the finding there with the least score,
-/// else one on the robot, else one at another joint. None: it does not, or nothing was found.
+/// else one on the robot, else one at another joint. Else one that is at nothing in that model. None: there is no such.
 std::optional<EffectId> harmful_finding(const Outcome& outcome, const IdentifiedModel& before,
                                         const IdentifiedModel& after, const std::vector<SessionLog>& logs);
 /// Takes a finding out of the outcome and fits what is left again.

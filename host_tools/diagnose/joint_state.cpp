@@ -6,8 +6,8 @@ namespace fxdyn::diagnosis {
 
 Verdict verdict_of(const JointState& state) {
   const bool explained = state.established || state.there || state.reached;
-  const bool left = state.remains || (!explained && (state.structured || state.impacts || state.curved)) ||
-                    state.bends || state.wanders;
+  const bool without_a_name = state.structured || state.impacts || state.curved || state.nameless;
+  const bool left = state.remains || (!explained && without_a_name) || state.bends || state.wanders;
   if (left) return explained ? Verdict::partly_explained : Verdict::unexplained;
   return explained ? Verdict::explained : Verdict::nothing_missing;
 }

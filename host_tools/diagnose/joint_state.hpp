@@ -12,7 +12,8 @@ struct JointState {
   bool remains = false;  ///< it does on the data that judge, so much that it counts, or has another form than its names
   bool established = false;  ///< an effect of its own
   bool reached = false;      ///< an established effect on the robot is felt here
-  bool there = false;        ///< an effect is there for sure, and its name is not established
+  bool there = false;        ///< an effect is there for sure, under a likely name or as one of two
+  bool nameless = false;     ///< .. and no name of it is listed
   bool impacts = false;      ///< shorter than the torque's band shows
   bool wanders = false;      ///< something comes and goes with time
   bool curved = false;       ///< a free curve of the motion closes some of it, on data that did not fit the curve

@@ -361,7 +361,7 @@ LackOfFit lack_of_fit(const Linearised& problem, std::size_t joint, const Linear
   StateTest test(problem, joint, fit, alone, all_features, residual);
   out.state_p = test.smallest_chance();
   const LackOfFitOptions& options = problem.options().lack_of_fit;
-  if (out.state_p < std::max(options.state, options.suspected) && test.expect_encoder_errors())
+  if (out.state_p < std::max({options.state, options.suspected, options.curve}) && test.expect_encoder_errors())
     out.state_p = test.smallest_chance();
   out.time_p = in_time(problem, joint, residual, problem.blocks().fit, residual).p;
   if (out.state_p < options.state) out.elsewhere_p = test.smallest_chance_elsewhere();

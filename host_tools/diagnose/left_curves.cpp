@@ -35,7 +35,7 @@ Curves of_motion(Models& models, const Outcome& outcome, const Gate& gate, const
   for (std::size_t j = 0; j < still.size(); ++j) {
     const bool nameless = std::none_of(outcome.found.begin(), outcome.found.end(),
                                        [&](const Finding& f) { return !f.id.body && f.id.joint == j; });
-    const bool suspect = suspects && nameless && outcome.lack[j].state_p < models.options.lack_of_fit.suspected;
+    const bool suspect = suspects && nameless && outcome.lack[j].state_p < models.options.lack_of_fit.curve;
     without[j] = without[j] || !(suspect || outcome.structured(j) || gate.remains[j]);
   }
   for (const FreeCurve& curve : add_free_curves(models, logs, without))

@@ -127,9 +127,11 @@ struct SearchOptions {
 struct LackOfFitOptions {
   /// chance; noise resembles a function of the state as much; hand: F's tail is used far beyond where it is exact
   double state = 1e-8;
-  /// chance; .. so that a free curve is tried at a joint without a name, and judged on data that did not fit it, or
-  /// that an error of a law (GateOptions::law_error) is not one of the own motion alone; hand
+  /// chance; .. so that an error of a law (GateOptions::law_error) is not one of the own motion alone; hand
   double suspected = 1e-6;
+  /// chance; .. so that a free curve is tried at a joint without a name, and judged on data that did not fit it; hand:
+  /// one of some 40 healthy joints
+  double curve = 1e-5;
   /// chance; noise resembles something periodic or slow in time as much; hand
   double time = 1e-6;
   /// chance; lines that noise makes as seldom count as a share of the residual; hand
@@ -159,11 +161,12 @@ struct GateOptions {
   /// times the plain error before, on train logs, where no others judge; what is worse is no fit of them; hand: names
   /// are fitted to whitened rows, which may cost some of the error in the whole band
   double worse_fitted = 1.1;
-  /// share of the gap above the noise; what a name closes; hand: more than is left. Likewise of what a free curve of
-  /// its variable closes in its place
+  /// share of the gap above the noise; what a name closes, and what the names of a joint with a sure name close
+  /// together; hand: more than is left. Likewise of what a free curve of its variable closes in its place
   double least_closure = 0.5;
   /// share of the gap above the noise; .. where structure remains; hand: another effect may only resemble it. Likewise
-  /// of what a free curve closes: several names in one variable, and those that are believed whatever else is missing
+  /// of what a free curve closes: several names in one variable, those that are believed whatever else is missing, and
+  /// those that the curve is more likely than by 1000 to 1
   double sure_closure = 0.8;
   /// share of what a free curve closes; .. several names in the own position where the curve is more likely by 1000 to
   /// 1; hand: in the place of a stop or a square wave they closed 0.72 and 0.82, beside a small bump a true pair closes

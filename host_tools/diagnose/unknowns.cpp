@@ -152,13 +152,13 @@ class Builder {
   double usual_change(const Unknown& shared, const ParameterInfo& parameter) const {
     const JointFit& joint = joints_of(now_)[shared.joint];
     const EffectFit* friction = dry_friction_of(joints_of(common_)[shared.joint]);
-    // Of motions of unit size: a coefficient's own scale.
     const PriorOptions& prior = models_.options.prior;
     const bool in_proportion = parameter.quantity == Quantity::velocity;
     double scale = (in_proportion ? prior.friction_change : prior.dry_friction_change) * std::fabs(shared.value);
     if (joint.effects[shared.effect].effect == constant_effect().name && friction != nullptr)
       scale += prior.offset_change * std::fabs(friction->linear[0]);
-    const double motion = in_proportion ? joint.dq_limit : 1.0;
+    // Of motions of unit size: a coefficient's own scale. One without a unit is a factor of a torque.
+    const double motion = in_proportion ? joint.dq_limit : parameter.unit == "-" ? joint.rated_torque : 1.0;
     return std::hypot(scale, prior.smallest_change * joint.rated_torque / std::max(motion, 1e-9));
   }
 

@@ -290,10 +290,13 @@ class ReportWriter {
   }
 
   /// Whether the model has an effect that a joint feels and whose name is not established.
-  bool is_there(std::size_t j) const {
+  /// @param listed such that are listed, or undecided, else such that are not
+  bool is_there(std::size_t j, bool listed) const {
     const auto& found = conclusion_.outcome.found;
     return std::any_of(found.begin(), found.end(), [&](const Finding& f) {
-      return f.evidence.there && f.evidence.certainty != Certainty::established &&
+      const Certainty certainty = f.evidence.certainty;
+      return f.evidence.there && certainty != Certainty::established &&
+             (f.evidence.undecided || certainty == Certainty::likely) == listed &&
              (f.id.body ? is_felt(f.id, j) : f.id.joint == j);
     });
   }
@@ -318,7 +321,8 @@ class ReportWriter {
     state.remains = conclusion_.gate.remains[j];
     state.established = any([](const NamedEffect& e) { return e.established; });
     state.reached = robot_reaches(k);
-    state.there = is_there(j);
+    state.there = is_there(j, true);
+    state.nameless = is_there(j, false);
     state.impacts = impacts.has_value();
     const std::optional<CurveResult>& curve = conclusion_.curves[j];
     state.wanders = curve && !curve->of_motion();
@@ -329,13 +333,13 @@ class ReportWriter {
     note_other_test_logs(j, of);
     note_impacts(j);
     if (conclusion_.gate.of_law[j] && out.verdict == Verdict::nothing_missing) note_error_of_law(j);
-    const bool changed = state.established || state.there || state.reached;
+    const bool changed = state.established || state.there || state.nameless || state.reached;
     // A finding elsewhere may reach this joint through the base parameters.
     if (changed || of.after != of.before) out.carries_over = carries_over(of);
     if (out.carries_over == false) note_risen_error(j, of);
     const bool left = out.verdict == Verdict::unexplained || out.verdict == Verdict::partly_explained;
     // What only bends leaves no gap in the torque, and noise alone has nothing to close.
-    const bool of_torque = state.there || state.reached ||
+    const bool of_torque = state.there || state.nameless || state.reached ||
                            (left && (state.structured || state.remains || state.wanders || state.curved)) ||
                            any([](const NamedEffect& e) { return e.established && e.signal.empty(); });
     const bool only_impacts = state.impacts && !changed && !state.structured && !state.wanders && !state.curved;

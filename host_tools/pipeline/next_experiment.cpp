@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "host_tools/diagnose/options.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/excite/excite.hpp"
@@ -43,6 +44,9 @@ class Questions {
   void likely(const NamedEffect& named, std::size_t joint) {
     const EffectInfo* info = find_effect(named.effect);
     if (named.established || info == nullptr) return;
+    // What else is left at the joint keeps this name from being sure: no motion changes that.
+    const double sure = diagnosis::GateOptions{}.established;
+    if (named.odds_nothing >= sure && named.odds_rival.value_or(sure) >= sure) return;
     EffectQuestion question{
         {named.effect, joint, values_of(info->shape, named.parameters)}, {}, asked_share, "", joint, {}, "likely"};
     // The columns of a load are mass and first moments, not its parameters.

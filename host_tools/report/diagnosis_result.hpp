@@ -11,7 +11,8 @@
 namespace fxdyn {
 
 /// What is there, and what is left: `explained`, what is left is within the noise; `partly_explained`, effects are
-/// established and structure is left; `unexplained`, structure is left and nothing is established.
+/// there and structure is left; `unexplained`, structure is left, or a torque without a name, and nothing else is
+/// there.
 enum class Verdict { nothing_missing, explained, partly_explained, unexplained, not_excited };
 std::string_view to_string(Verdict verdict);
 /// @throws InputError: there is none of that name
@@ -52,7 +53,7 @@ struct NamedEffect {
   std::optional<double> held_out_closure;
   std::string signal;  ///< "q - qlink": a deflection shows it; empty: the torque does
   std::vector<std::string> alternatives;
-  bool established = false;  ///< else it is likely: not part of the model
+  bool established = false;  ///< else it is likely: in the model without a name, or not at all
   /// On data that did not fit it, log10 of the odds against nothing, whatever else is missing at its joint, and against
   /// the effect that comes nearest.
   double odds_nothing = 0;

@@ -123,7 +123,8 @@ std::string effect_table(const DiagnosisResult& diagnosis) {
          paragraph(
              "± is one standard deviation. Established: 1000 to 1 against nothing and against the closest rival, on "
              "data "
-             "that did not fit it. Likely: 20 to 1, or its name is open. Closes: the share of the gap that comes "
+             "that did not fit it. Likely: 20 to 1, or its name is open, or more is left at its joint than names "
+             "close. Closes: the share of the gap that comes "
              "back when this effect alone is taken out. Could as well be: what these logs don't tell apart from it.");
 }
 

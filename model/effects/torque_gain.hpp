@@ -12,6 +12,7 @@ struct TorqueGain {
   static constexpr bool needs_total = true;
   static constexpr EffectTraits traits{.words = "the drive's torque is not what it says by a factor",
                                        .experiments = {experiments::loaded_poses, experiments::warm_robot},
+                                       .changes_by_one_more = true,
                                        .of_total = OfTotal::scales};
   static constexpr std::array<ParameterInfo, 0> shape{};
   static constexpr std::array linear{ParameterInfo{"gain", "-", "-", -0.9, 10, Quantity::torque,

@@ -51,6 +51,66 @@ TEST(Certainty, WhatIsThereForSureStaysWhateverItsName) {
   EXPECT_FALSE(judged(40, 5, 20).undecided);
 }
 
+/// A joint at which a name closes 40 noise variances, and its certainty then.
+class NameBesideMore : public testing::Test {
+ protected:
+  NameBesideMore() {
+    outcome_.lack.resize(1);
+    outcome_.lack[0].state_p = 1e-20;
+    gate_.held.before = Eigen::VectorXd::Constant(1, 240);
+    gate_.held.after = Eigen::VectorXd::Constant(1, 200);
+    gate_.held.excess = Eigen::VectorXd::Constant(1, 0);
+    gate_.of_law = {false};
+  }
+  Certainty certainty() {
+    outcome_.found = {{{false, 0, 0}, 100, {}}};
+    outcome_.found[0].evidence.certainty = Certainty::established;
+    doubt_beside_more(outcome_, gate_, curves_);
+    return outcome_.found[0].evidence.certainty;
+  }
+
+  Outcome outcome_;
+  Gate gate_;
+  Curves curves_ = Curves(1);
+};
+
+TEST_F(NameBesideMore, IsLikelyAtMost) {
+  EXPECT_EQ(certainty(), Certainty::established);
+  gate_.held.excess[0] = 39;
+  EXPECT_EQ(certainty(), Certainty::established);
+  gate_.held.excess[0] = 41;
+  EXPECT_EQ(certainty(), Certainty::likely);
+}
+
+TEST_F(NameBesideMore, IsEstablishedWhereTheRestIsNoiseOrTheErrorOfALaw) {
+  gate_.held.excess[0] = 60;
+  gate_.of_law = {true};
+  EXPECT_EQ(certainty(), Certainty::established);
+  gate_.of_law = {false};
+  outcome_.lack[0].state_p = 0.1;
+  EXPECT_EQ(certainty(), Certainty::established);
+}
+
+TEST_F(NameBesideMore, CountsWhatWandersThoughItWasTakenOff) {
+  outcome_.lack[0].state_p = 0.1;
+  curves_[0].emplace();
+  curves_[0]->signal = "t";
+  curves_[0]->closes = 0.16;  // of 200 / (1 - 0.16): 38
+  EXPECT_EQ(certainty(), Certainty::established);
+  curves_[0]->closes = 0.18;  // 44
+  EXPECT_EQ(certainty(), Certainty::likely);
+}
+
+TEST_F(NameBesideMore, CountsWhatACurveOfTheMotionCloses) {
+  outcome_.lack[0].state_p = 0.1;
+  curves_[0].emplace();
+  curves_[0]->signal = "q";
+  curves_[0]->closes = 0.18;  // of 200: 36
+  EXPECT_EQ(certainty(), Certainty::established);
+  curves_[0]->closes = 0.22;
+  EXPECT_EQ(certainty(), Certainty::likely);
+}
+
 TEST(LeftOver, IsTheExcessWithAnIntervalFromItsStretches) {
   // Of 10 stretches of 100 rows with noise of variance 1: 300 of power above it before, 60 after.
   HeldOut held;
@@ -84,6 +144,14 @@ TEST(VerdictOfAJoint, IsWhatIsThereAndWhatIsLeft) {
   EXPECT_EQ(verdict_of(state), Verdict::partly_explained);
   state.established = false;
   EXPECT_EQ(verdict_of(state), Verdict::unexplained);
+}
+
+TEST(VerdictOfAJoint, ATorqueThatGotNoNameIsUnexplained) {
+  JointState state;
+  state.nameless = true;
+  EXPECT_EQ(verdict_of(state), Verdict::unexplained);
+  state.established = true;  // beside a name it is not told
+  EXPECT_EQ(verdict_of(state), Verdict::explained);
 }
 
 TEST(VerdictOfAJoint, AnEffectOnTheRobotExplainsIt) {

@@ -44,6 +44,11 @@ TEST(Changes, ARippleThatGrewIsHeld) {
   EXPECT_EQ(changed(test::effect("ripple", {14}, {4, 0}), 4, 8), Names{"ripple"});
 }
 
+TEST(Changes, AGainThatGrewIsHeld) {
+  EXPECT_EQ(changed(test::effect("torque_gain", {}, {0.05}), 0.05, 0.09), Names{"torque_gain"});
+  EXPECT_EQ(changed(test::effect("torque_gain", {}, {0.05}), 0.05, 0.055), Names{});
+}
+
 /// Two sessions of a PUMA whose second joint has an effect, of this size before and now.
 std::vector<SessionLog> two_sessions(EffectFit effect, double before, double now) {
   std::vector<SessionLog> out;
@@ -57,20 +62,34 @@ std::vector<SessionLog> two_sessions(EffectFit effect, double before, double now
   return out;
 }
 
-TEST(Changes, TheOneOnTopIsFound) {
-  const EffectFit presliding = test::effect("presliding", {0.01}, {4});
-  const std::vector<SessionLog> logs = two_sessions(presliding, 4, 8);
+/// What is found of an effect of joint 2 whose coefficient was `before` and is `now`, as that is held.
+std::vector<EffectFit> found_on_top(const EffectFit& effect, double before, double now) {
+  const std::vector<SessionLog> logs = two_sessions(effect, before, now);
   Models models = test::around(test::fitted_puma());
   models.has_baseline = true;
-  models.current->joints[1].effects.push_back(presliding);
+  models.current->joints[1].effects.push_back(effect);
   models.healthy = models.current;
-  models.held = {{"presliding", 1, {0.01}}};
+  models.held = {{effect.effect, 1, effect.shape}};
   Progress progress;
   const Outcome outcome = explore(models, logs, {}, 1, progress);
-  ASSERT_EQ(outcome.found.size(), 1U);
-  const EffectFit& found = outcome.models.current->joints[1].effects.at(outcome.found[0].id.effect);
-  EXPECT_EQ(found.effect, "presliding");
-  EXPECT_NEAR(found.linear[0], 4, 0.4);
+  std::vector<EffectFit> out;
+  for (const Finding& finding : outcome.found)
+    out.push_back(outcome.models.current->joints[1].effects.at(finding.id.effect));
+  return out;
+}
+
+TEST(Changes, TheOneOnTopIsFound) {
+  const std::vector<EffectFit> found = found_on_top(test::effect("presliding", {0.01}, {4}), 4, 8);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].effect, "presliding");
+  EXPECT_NEAR(found[0].linear[0], 4, 0.4);
+}
+
+TEST(Changes, AGainOnTopScalesTheOther) {
+  const std::vector<EffectFit> found = found_on_top(test::effect("torque_gain", {}, {0.05}), 0.05, 0.15);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].effect, "torque_gain");
+  EXPECT_NEAR(found[0].linear[0], 0.1 / 1.05, 0.01);
 }
 
 /// What speaks for quadratic friction of joint 2 as a change, where the healthy session has as much of it or none.

@@ -3,7 +3,9 @@
 #include "host_tools/diagnose/gate.hpp"
 #include "host_tools/diagnose/certainty.hpp"
 #include "host_tools/diagnose/explore.hpp"
+#include "host_tools/diagnose/left_curves.hpp"
 #include "host_tools/diagnose/refit.hpp"
+#include "host_tools/diagnose/vanished.hpp"
 
 #include <gtest/gtest.h>
 
@@ -155,6 +157,19 @@ TEST(AStackAtTheGate, HasNoNamesWhateverItCloses) {
 
 TEST_F(NamesAtTheGate, NothingStaysBelowItsThresholds) {
   outcome_.models.options.gate.least_gain = 1e6;
+  EXPECT_TRUE(pass(outcome_, nominal_, logs_, still_).groups.empty());
+}
+
+TEST_F(NamesAtTheGate, WhatTheFitTookToNothingGoesWhateverALinearFitSays) {
+  auto& joints = outcome_.models.current->joints;
+  joints[2].effects.pop_back();  // else a fit without it would find the ripple again
+  outcome_.found.pop_back();
+  joints[1].effects[outcome_.found[0].id.effect].linear = {1e-9, -1e-9};
+  outcome_.look_again(logs_);
+  EXPECT_GT(judge_again(outcome_, logs_, still_).held.alone[0][1], outcome_.models.options.gate.least_gain);
+  const std::optional<EffectId> vanished = vanished_finding(outcome_, outcome_.models.current);
+  ASSERT_TRUE(vanished);
+  EXPECT_EQ(*vanished, outcome_.found[0].id);
   EXPECT_TRUE(pass(outcome_, nominal_, logs_, still_).groups.empty());
 }
 
@@ -324,14 +339,17 @@ TEST_F(NamesWithoutValidation, GoWhereTheWholeModelNoLongerFitsTheTrainLogs) {
             std::vector<bool>(6, false));
 }
 
-/// A PUMA 560 with a further torque of the second joint's position, and names that it gets.
-class NamesInThePosition : public NamesAtTheGate {
+/// A PUMA 560 with a further torque of the second joint's motion, and names that it gets.
+class NamesOfAnother : public NamesAtTheGate {
  protected:
-  Gate judged(const std::function<double(double)>& torque, const std::vector<EffectFit>& names) {
+  Gate judged(const std::function<double(double q, double ddq, double load)>& torque,
+              const std::vector<EffectFit>& names) {
     for (std::size_t l = 0; l < logs_.size(); ++l) {
       logs_[l] = test::small_session_log(nominal_, l == 0 ? Role::train : Role::validate, l + 1);
       ProcessedLog& log = logs_[l].log;
-      for (Eigen::Index k = 0; k < log.samples(); ++k) log.tau(k, 1) += torque(log.q(k, 1));
+      const MotionRows motion = log.joint_motion(1);
+      for (Eigen::Index k = 0; k < log.samples(); ++k)
+        log.tau(k, 1) += torque(motion.q(k, 0), motion.ddq(k, 0), log.tau(k, 1));
     }
     auto& joints = outcome_.models.current->joints;
     joints[2].effects.pop_back();
@@ -342,8 +360,8 @@ class NamesInThePosition : public NamesAtTheGate {
   }
 };
 
-TEST_F(NamesInThePosition, LeaveWhatIsPlainBesideTheNoise) {
-  const auto torque = [](double q) { return 20 * std::cos(14 * q) + 0.15 * std::sin(9 * q); };
+TEST_F(NamesOfAnother, LeaveWhatIsPlainBesideTheNoise) {
+  const auto torque = [](double q, double, double) { return 20 * std::cos(14 * q) + 0.15 * std::sin(9 * q); };
   const std::vector<EffectFit> names{test::named_effect("ripple", {14}, {20, 0})};
   const Gate gate = judged(torque, names);
   EXPECT_GT(gate.closure[1], 0.99);
@@ -354,15 +372,96 @@ TEST_F(NamesInThePosition, LeaveWhatIsPlainBesideTheNoise) {
   EXPECT_FALSE(judge_again(outcome_, logs_, still_).remains[1]);
 }
 
-TEST_F(NamesInThePosition, AreNotBelievedForAStop) {
+TEST_F(NamesOfAnother, AreNotBelievedForAStop) {
   const Gate gate =
-      judged([](double q) { return -6 * std::max(q - 0.3, 0.0); },
+      judged([](double q, double, double) { return -6 * std::max(q - 0.3, 0.0); },
              {test::named_effect("gravity_compensator", {}, {0.5, 0.5}), test::named_effect("spring", {}, {-1, 0})});
   ASSERT_EQ(gate.groups.size(), 2U);
   EXPECT_FALSE(gate.believed[0]);
   EXPECT_FALSE(gate.believed[1]);
   EXPECT_TRUE(gate.remains[1]);
   EXPECT_FALSE(gate.remains[2]);
+}
+
+TEST_F(NamesOfAnother, AreNotBelievedForASquareOfTheAcceleration) {
+  const Gate gate = judged([](double, double ddq, double load) { return 0.06 * ddq * ddq + 0.02 * load; },
+                           {test::named_effect("torque_gain", {}, {0.02})});
+  ASSERT_EQ(gate.groups.size(), 1U);
+  EXPECT_LT(gate.own[0].form, outcome_.models.options.gate.sure_closure);
+  EXPECT_GT(gate.own[0].form, outcome_.models.options.gate.least_closure);
+  EXPECT_FALSE(gate.believed[0]);
+  EXPECT_TRUE(gate.remains[1]);
+}
+
+TEST_F(NamesOfAnother, AreMissedByACurveWhereNoiseHardlyLooksLikeIt) {
+  Gate gate = judged([](double q, double, double) { return std::exp(-100 * (q - 0.2) * (q - 0.2)); }, {});
+  outcome_.found.clear();
+  gate.remains.assign(6, false);
+  const auto curve_at = [&](double chance) {
+    for (LackOfFit& lack : outcome_.lack) lack = {};
+    outcome_.lack[1].state_p = chance;
+    return curves_of_the_rest(outcome_, gate, still_, Curves(6), logs_)[1];
+  };
+  const LackOfFitOptions& options = outcome_.models.options.lack_of_fit;
+  const std::optional<CurveResult> curve = curve_at(0.5 * options.curve);
+  ASSERT_TRUE(curve);
+  EXPECT_EQ(curve->effect, "position_curve");
+  EXPECT_FALSE(curve_at(2 * options.curve));
+}
+
+TEST_F(NamesAtTheGate, AreWeighedAgainWithoutWhatIsSetAside) {
+  Gate gate = judge_again(outcome_, logs_, still_);
+  std::vector<Likely> likely;
+  set_aside(outcome_, gate, nominal_, logs_, still_, likely);
+  EXPECT_TRUE(likely.empty());  // a spring that is not there is not even that
+  ASSERT_EQ(outcome_.found.size(), 1U);
+  EXPECT_EQ(outcome_.models.current->joints[2].find("spring"), nullptr);
+  EXPECT_EQ(outcome_.found[0].evidence.certainty, Certainty::established);
+  EXPECT_EQ(gate.groups.size(), 1U);
+}
+
+TEST_F(NamesAtTheGate, ACoefficientIsNothingByItsTorque) {
+  const Linearised& problem = *outcome_.problem;
+  const Group& ripple = problem.groups()[in_model(problem)[0]];
+  const double rated = outcome_.models.current->joints[1].rated_torque;
+  EXPECT_TRUE(is_at_nothing(problem, ripple, test::named_effect("ripple", {14}, {5e-7 * rated, 0})));
+  EXPECT_FALSE(is_at_nothing(problem, ripple, test::named_effect("ripple", {14}, {5e-6 * rated, 0})));
+  // Of a soft gear a compliance of 1e-5 rad / (N*m) bends, whatever the rated torque.
+  Models models = outcome_.models;
+  models.current->joints[1].effects.back() = test::named_effect("elasticity", {0}, {1e-5});
+  const Linearised bent(models, logs_, test::no_whitening());
+  const Group& elasticity = bent.groups()[in_model(bent)[0]];
+  EXPECT_FALSE(is_at_nothing(bent, elasticity, models.current->joints[1].effects.back()));
+}
+
+TEST_F(NamesAtTheGate, ATorqueWithoutAListedNameLeavesItsJointUnexplained) {
+  const Gate gate = pass(outcome_, nominal_, logs_, still_);
+  weigh_evidence(outcome_, gate);
+  ASSERT_EQ(outcome_.found.size(), 1U);
+  const Deflections no_deflections;
+  const std::vector<std::optional<Impacts>> no_impacts(6);
+  const std::vector<std::optional<CurveResult>> no_curves(6);
+  const std::vector<ProcessedLog> no_test;
+  const auto verdict_with = [&](Certainty certainty) {
+    outcome_.found[0].evidence.certainty = certainty;
+    return verdicts({nominal_,
+                     outcome_.models.current,
+                     outcome_,
+                     gate,
+                     {},
+                     no_deflections,
+                     no_impacts,
+                     no_curves,
+                     still_,
+                     processed_,
+                     no_test})
+        .joints[1];
+  };
+  EXPECT_EQ(verdict_with(Certainty::likely).verdict, Verdict::explained);
+  const JointDiagnosis nameless = verdict_with(Certainty::unlisted);
+  EXPECT_EQ(nameless.verdict, Verdict::unexplained);
+  EXPECT_TRUE(nameless.effects.empty());
+  EXPECT_TRUE(nameless.left);
 }
 
 /// A large ripple and, beside it at the same joint, one with half a percent of its power.

@@ -84,6 +84,18 @@ TEST_F(UnknownsOfAModel, FrictionMayChangeALittleFromSessionToSession) {
   EXPECT_NEAR(viscous->prior_std, std::hypot(0.3 * 1, 1e-3 * 100 / 3), 1e-12);
 }
 
+TEST_F(UnknownsOfAModel, AGainMayChangeByAShareOfItselfAndOfTheRatedTorque) {
+  models_.has_baseline = true;
+  models_.current->joints[0].effects.push_back(test::effect("torque_gain", {}, {0.05}));
+  models_.healthy = models_.current;
+  const Unknowns unknowns = make_unknowns(models_);
+  const std::size_t last = models_.current->joints[0].effects.size() - 1;
+  const auto change = std::find_if(unknowns.all.begin(), unknowns.all.end(),
+                                   [&](const Unknown& u) { return u.change && u.joint == 0 && u.effect == last; });
+  ASSERT_NE(change, unknowns.all.end());
+  EXPECT_NEAR(change->prior_std, std::hypot(0.1 * 0.05, 1e-3), 1e-12);
+}
+
 TEST_F(UnknownsOfAModel, StribeckIsWiderThanTheSign) {
   const EffectInfo &stribeck = *find_effect("stribeck"), &lugre = *find_effect("lugre");
   EXPECT_DOUBLE_EQ(shape_limits(models_, 1, stribeck, stribeck.shape[0]).first, 1.5 * 0.02);
