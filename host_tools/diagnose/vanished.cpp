@@ -11,7 +11,7 @@ bool is_at_nothing(const Linearised& problem, const Group& group, const EffectFi
   const JointRows& rows = problem.solver().rows(group.candidate.joint);
   const Eigen::Index place = rows.place(group.first), count = std::max<Eigen::Index>(rows.x.rows(), 1);
   const auto linear = Eigen::Map<const Eigen::VectorXd>(fit.linear.data(), group.count);
-  const double torque = (rows.x.middleCols(place, group.count) * linear).norm() / std::sqrt(double(count));
+  const double torque = (rows.x.middleCols(place, group.count) * linear).norm() / std::sqrt(static_cast<double>(count));
   return torque <= none * joints_of(problem.models().current)[group.candidate.joint].rated_torque;
 }
 
