@@ -32,24 +32,95 @@ constexpr double rounding = 1e-14;
 /// Rows a coefficient at least.
 constexpr double fewest_rows = 5;
 
+/// Heights' factors at a time: of the first of four, and theirs. The others are nothing.
+std::pair<Index, Eigen::Matrix<double, 4, 1>> bumps_at(const TimeFit& fit, double t) {
+  const Index pieces = fit.heights.size() - 3;
+  const double place = std::clamp((t - fit.from) / fit.knot_s, 0.0, static_cast<double>(pieces));
+  const auto piece = std::min(pieces - 1, static_cast<Index>(place));
+  // The last knot belongs to the piece before it.
+  const Curve<Real> four = Curve<Real>::at(std::min(place - static_cast<double>(piece), std::nextafter(1.0, 0.0)));
+  return {piece + static_cast<Index>(four.first), Eigen::Map<const Eigen::Matrix<double, 4, 1>>(four.weights.data())};
+}
+
+struct Sums {
+  MatrixXd gram;
+  VectorXd projection;
+  double square = 0;
+};
+
+/// Columns of rows that each function has a value in.
+struct DenseColumns {
+  const MatrixXd& x;
+  Index count() const { return x.cols(); }
+  void add(Index first, Index rows, const VectorXd& e, Sums& to) const {
+    const auto part = x.middleRows(first, rows);
+    to.gram.noalias() += part.transpose() * part;
+    to.projection.noalias() += part.transpose() * e.segment(first, rows);
+  }
+};
+
+/// Columns of a curve over time: a row has a value in four of them, so they are made as they are needed. A long log
+/// has tens of thousands of rows times hundreds of columns.
+class TimeColumns {
+ public:
+  using Weights = Eigen::Matrix<double, 4, 1>;
+  TimeColumns(const TimeFit& fit, const TimedRows& rows) : fit_(fit), rows_(rows) {}
+  Index count() const { return fit_.heights.size(); }
+  /// The first of the four, and their values.
+  std::pair<Index, Weights> of_row(Index i) const {
+    const auto [first, weights] = bumps_at(fit_, rows_.t[i]);
+    return {first, (fit_.friction ? rows_.sign[i] : 1) * weights};
+  }
+  void add(Index first, Index rows, const VectorXd& e, Sums& to) const {
+    for (Index i = first; i < first + rows; ++i) {
+      const auto [k, weights] = of_row(i);
+      to.gram.block<4, 4>(k, k).noalias() += weights * weights.transpose();
+      to.projection.segment<4>(k) += weights * e[i];
+    }
+  }
+  double times(const VectorXd& heights, Index row) const {
+    const auto [k, weights] = of_row(row);
+    return weights.dot(heights.segment<4>(k));
+  }
+  /// (other columns)^T of rows, times these.
+  MatrixXd products(const MatrixXd& others) const {
+    MatrixXd out = MatrixXd::Zero(others.cols(), count());
+    for (Index i = 0; i < others.rows(); ++i) {
+      const auto [k, weights] = of_row(i);
+      out.middleCols<4>(k).noalias() += others.row(i).transpose() * weights.transpose();
+    }
+    return out;
+  }
+
+ private:
+  const TimeFit& fit_;
+  const TimedRows& rows_;
+};
+
 /// Sums of products of some rows' columns by the stretch of time that they are in, every fifth or so together.
 class FoldSums {
  public:
-  FoldSums(const MatrixXd& x, const TimedRows& rows, double stretch_s) {
-    for (Index i = 0; i < rows.t.size(); ++i) {
+  template <class Columns>
+  FoldSums(const Columns& x, const TimedRows& rows, double stretch_s) {
+    const Sums none{MatrixXd::Zero(x.count(), x.count()), VectorXd::Zero(x.count()), 0};
+    whole_ = none;
+    fold_.fill(none);
+    const auto fold_of = [&](Index i) {
       // One more each time: a motion that repeats itself would be left out at one phase.
       const auto stretch = static_cast<std::size_t>(std::floor((rows.t[i] - rows.t[0]) / stretch_s));
-      rows_[(stretch + stretch / turns) % turns].push_back(i);
+      return (stretch + stretch / turns) % turns;
+    };
+    for (Index first = 0, end = 0; first < rows.t.size(); first = end) {
+      const std::size_t k = fold_of(first);
+      while (end < rows.t.size() && fold_of(end) == k) ++end;
+      x.add(first, end - first, rows.e, fold_[k]);
+      fold_[k].square += rows.e.segment(first, end - first).squaredNorm();
+      runs_.push_back({k, first, end});
     }
-    whole_.gram.setZero(x.cols(), x.cols());
-    whole_.projection.setZero(x.cols());
-    for (std::size_t k = 0; k < turns; ++k) {
-      const MatrixXd part = x(rows_[k], Eigen::all);
-      const VectorXd e = rows.e(rows_[k]);
-      fold_[k] = {part.transpose() * part, part.transpose() * e, e.squaredNorm()};
-      whole_.gram += fold_[k].gram;
-      whole_.projection += fold_[k].projection;
-      whole_.square += fold_[k].square;
+    for (const Sums& fold : fold_) {
+      whole_.gram += fold.gram;
+      whole_.projection += fold.projection;
+      whole_.square += fold.square;
     }
   }
   /// Squares that fits leave on what they have not seen.
@@ -70,18 +141,21 @@ class FoldSums {
     return std::sqrt(std::max(0.0, square - sum * sum / turns) / (turns * (turns - 1)));
   }
   /// Errors of fits on what they have not seen.
-  VectorXd errors(double prior, const MatrixXd& x, const VectorXd& e) const {
+  VectorXd errors(double prior, const TimeColumns& x, const VectorXd& e) const {
+    std::array<VectorXd, turns> heights;
+    for (std::size_t k = 0; k < turns; ++k) heights[k] = without(prior, fold_[k]);
     VectorXd out = e;
-    for (std::size_t k = 0; k < turns; ++k) out(rows_[k]) -= x(rows_[k], Eigen::all) * without(prior, fold_[k]);
+    for (const Run& run : runs_) {
+      for (Index i = run.first; i < run.end; ++i) out[i] -= x.times(heights[run.fold], i);
+    }
     return out;
   }
-  double square() const { return whole_.square; }
+  const Sums& whole() const { return whole_; }
 
  private:
-  struct Sums {
-    MatrixXd gram;
-    VectorXd projection;
-    double square = 0;
+  struct Run {
+    std::size_t fold;
+    Index first, end;
   };
   VectorXd without(double prior, const Sums& judge) const {
     return solve(prior, whole_.gram - judge.gram, whole_.projection - judge.projection);
@@ -98,21 +172,15 @@ class FoldSums {
     return with(prior, gram).ldlt().solve(projection);
   }
 
-  std::array<std::vector<Index>, turns> rows_;
+  std::vector<Run> runs_;
   std::array<Sums, turns> fold_;
-  Sums whole_{{}, {}, 0};
+  Sums whole_;
 };
 
 double mean_square(const VectorXd& e) { return e.squaredNorm() / static_cast<double>(std::max<Index>(e.size(), 1)); }
 
 /// Where the curve is drawn: both ends of every piece, and between them.
 Index points_of(const TimeFit& fit) { return points_a_piece * (fit.heights.size() - 3) + 1; }
-
-MatrixXd columns_of(const TimeFit& fit, const TimedRows& rows) {
-  MatrixXd out = bumps_over_time(fit, rows.t);
-  if (fit.friction) out = rows.sign.asDiagonal() * out;
-  return out;
-}
 
 /// Those that judge are fitted too: their errors would be of another kind.
 std::vector<std::size_t> all_blocks(const Linearised& problem) {
@@ -143,7 +211,12 @@ void draw(const TimeFit& fit, const TimedRows& rows, CurveResult& to) {
   const VectorXd t =
       VectorXd::LinSpaced(points, fit.from, fit.from + fit.knot_s * static_cast<double>(fit.heights.size() - 3));
   MatrixXd x = bumps_over_time(fit, t);
-  x.rowwise() -= bumps_over_time(fit, rows.t).colwise().mean().eval();
+  Eigen::RowVectorXd mean = Eigen::RowVectorXd::Zero(fit.heights.size());
+  for (const double at : rows.t) {
+    const auto [first, weights] = bumps_at(fit, at);
+    mean.segment<4>(first) += weights.transpose() / static_cast<double>(rows.t.size());
+  }
+  x.rowwise() -= mean;
   const VectorXd y = x * fit.heights;
   const VectorXd variance = (x * fit.covariance).cwiseProduct(x).rowwise().sum();
   const double *begin = rows.t.data(), *end = begin + rows.t.size(), *next = begin;
@@ -157,15 +230,10 @@ void draw(const TimeFit& fit, const TimedRows& rows, CurveResult& to) {
 }  // namespace
 
 MatrixXd bumps_over_time(const TimeFit& fit, const VectorXd& t) {
-  const Index pieces = fit.heights.size() - 3;
   MatrixXd out = MatrixXd::Zero(t.size(), fit.heights.size());
   for (Index i = 0; i < t.size(); ++i) {
-    const double place = std::clamp((t[i] - fit.from) / fit.knot_s, 0.0, static_cast<double>(pieces));
-    const auto piece = std::min(pieces - 1, static_cast<Index>(place));
-    // The last knot belongs to the piece before it.
-    const Curve<Real> four = Curve<Real>::at(std::min(place - static_cast<double>(piece), std::nextafter(1.0, 0.0)));
-    for (std::size_t k = 0; k < four.weights.size(); ++k)
-      out(i, piece + static_cast<Index>(four.first + k)) = four.weights[k];
+    const auto [first, weights] = bumps_at(fit, t[i]);
+    out.row(i).segment<4>(first) = weights.transpose();
   }
   return out;
 }
@@ -212,7 +280,7 @@ std::optional<TimeFit> fit_over_time(const TimedRows& rows, double size, double 
       fit.knot_s = seconds / static_cast<double>(pieces);
       fit.friction = friction;
       fit.heights.setZero(pieces + 3);
-      const double left = FoldSums(columns_of(fit, rows), rows, options.left_out_s).left(prior);
+      const double left = FoldSums(TimeColumns(fit, rows), rows, options.left_out_s).left(prior);
       ++tried;
       if (left >= least) continue;
       least = left;
@@ -220,31 +288,38 @@ std::optional<TimeFit> fit_over_time(const TimedRows& rows, double size, double 
     }
   }
   if (!best) return {};
-  const MatrixXd x = columns_of(*best, rows);
+  const TimeColumns x(*best, rows);
   const FoldSums sums(x, rows, options.left_out_s);
   Dilution dilution;
   dilution.add(sums.errors(prior, x, rows.e), row_s);
   const double diluted = dilution.value();
   // What was fitted before has some of the curve, which the residual lacks: with X its columns and C their covariance,
   // x is (1 - X C X^T) x to it.
-  MatrixXd shown = x;
-  if (rows.nominal.cols() > 0) shown -= rows.nominal * (rows.covariance * (rows.nominal.transpose() * x));
-  MatrixXd gram = x.transpose() * shown;
+  MatrixXd gram = sums.whole().gram, owned;
+  if (rows.nominal.cols() > 0) {
+    const MatrixXd products = x.products(rows.nominal);
+    owned = rows.covariance * products;
+    gram -= products.transpose() * owned;
+  }
   gram.diagonal().array() += prior;
   const MatrixXd inverse = SymmetricSolver(gram).inverse();
-  best->heights = inverse * (x.transpose() * rows.e);
+  best->heights = inverse * sums.whole().projection;
+  VectorXd rest = rows.e;
+  for (Index i = 0; i < count; ++i) rest[i] -= x.times(best->heights, i);
+  if (owned.size() > 0) rest += rows.nominal * (owned * best->heights);
   best->covariance = diluted * least / static_cast<double>(count) * inverse;
-  best->closes = std::min(1.0, 1 - least / sums.square());
-  best->misfit = misfit(*best, rows, rows.e - shown * best->heights, diluted);
+  best->closes = std::min(1.0, 1 - least / sums.whole().square);
+  best->misfit = misfit(*best, rows, rest, diluted);
   best->closes_std = sums.deviation(prior);
   best->odds_nothing =
-      static_cast<double>(count) / diluted * std::log(sums.square() / least) / variances_per_decade - std::log10(tried);
+      static_cast<double>(count) / diluted * std::log(sums.whole().square / least) / variances_per_decade -
+      std::log10(tried);
   // Many functions on few rows want to be held tighter: the best of a few priors counts.
   best->square_of_rivals = 1;
   if (rows.rivals.cols() == 0) return best;
-  const FoldSums rivals(rows.rivals, rows, options.left_out_s);
+  const FoldSums rivals(DenseColumns{rows.rivals}, rows, options.left_out_s);
   for (const double times : {1.0, 10.0, 100.0, 1000.0})
-    best->square_of_rivals = std::min(best->square_of_rivals, rivals.left(times * prior) / sums.square());
+    best->square_of_rivals = std::min(best->square_of_rivals, rivals.left(times * prior) / sums.whole().square);
   return best;
 }
 
