@@ -6,11 +6,12 @@
 #include <cmath>
 #include <map>
 
+#include "host_tools/diagnose/bumps.hpp"
 #include "host_tools/diagnose/curve_sentence.hpp"
 #include "host_tools/diagnose/curve_squares.hpp"
+#include "host_tools/diagnose/curveless.hpp"
 #include "host_tools/diagnose/deviations.hpp"
 #include "host_tools/diagnose/dictionary.hpp"
-#include "host_tools/diagnose/features.hpp"
 #include "host_tools/diagnose/gate.hpp"
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/effects/effects.hpp"
@@ -18,7 +19,6 @@
 #include "host_tools/regression/solver.hpp"
 #include "host_tools/support/parallel.hpp"
 #include "model/effects/curve.hpp"
-#include "model/numbers.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
@@ -109,6 +109,7 @@ class Trials {
     return out;
   }
   std::size_t count() const { return count_; }
+  const std::vector<VectorXd>& moving() const { return moving_; }
 
  private:
   static bool less(const Tried& a, const Tried& b) { return a.left < b.left; }
@@ -143,18 +144,6 @@ class Trials {
   std::size_t count_ = 0;
 };
 
-/// What functions of the other joints' velocities leave: a variable of which there is no curve.
-double left_by_velocities_of_others(const Linearised& problem, std::size_t joint, const std::vector<Index>& columns,
-                                    double prior, const std::vector<Fold>& folds) {
-  if (problem.joints() < 2) return 1e300;
-  const Family family = families(problem.joints())[problem.joints() - 1];  // after each other joint's position
-  MatrixXd functions = features(problem, joint).middleCols(family.first, family.count);
-  if (const Background* background = problem.background(joint)) functions = background->eliminate(functions);
-  double left = 0;
-  for (const Fold& fold : folds) left += judged_with_curves(problem, joint, columns, functions, prior, fold);
-  return left;
-}
-
 /// "cross_position of joint 4"
 std::string words_of_variable(const EffectCandidate& effect) {
   const std::size_t of = joint_of_variable(effect);
@@ -178,7 +167,9 @@ std::optional<FreeCurve> best_by(const Linearised& problem, std::size_t joint, d
   Trials trials(problem, joint, columns, prior, folds);
   const std::vector<Tried> tried = trials.best_of_each();
   tried_before += trials.count();
-  if (tried.empty() || left_by_velocities_of_others(problem, joint, columns, prior, folds) < tried[0].left) return {};
+  if (tried.empty()) return {};
+  const LeftBy other = left_without_curve(problem, joint, columns, prior, folds, trials.moving());
+  if (other.left < tried[0].left) return {};
   const auto odds = [&](double without, double with) {
     return rows * std::log(without / std::max(with, 1e-300)) / variances_per_decade;
   };
@@ -186,10 +177,9 @@ std::optional<FreeCurve> best_by(const Linearised& problem, std::size_t joint, d
   out.effect = tried[0].effect;
   out.closes = 1 - tried[0].left / before;
   out.odds_nothing = odds(before, tried[0].left) - std::log10(static_cast<double>(tried_before));
-  if (tried.size() > 1) {
-    out.odds_rival = odds(tried[1].left, tried[0].left);
-    out.rival = words_of_variable(tried[1].effect);
-  }
+  const bool by_curve = tried.size() > 1 && tried[1].left <= other.left;
+  out.odds_rival = odds(by_curve ? tried[1].left : other.left, tried[0].left);
+  out.rival = by_curve ? words_of_variable(tried[1].effect) : other.variable;
   if (out.odds_nothing < options.gate.established || out.closes < options.curve.least_share) return {};
   return out;
 }
@@ -239,25 +229,8 @@ bool is_flat(const Models& models, const FreeCurve& curve) {
   return std::all_of(heights.begin(), heights.end(), [](double h) { return h == 0 || !std::isfinite(h); });
 }
 
-/// Where a curve's knots are, as its shape ends.
-struct Knots {
-  explicit Knots(const EffectCandidate& of) : from(of.shape[of.shape.size() - 2]), span(of.shape.back()) {}
-  double place(double x) const { return (x - from) / span; }  ///< 0 .. 1 between them
-
-  double from, span;
-};
-
-/// The heights' factors at values of the variable, values x heights.
-MatrixXd bumps(const Knots& knots, const VectorXd& values) {
-  MatrixXd out = MatrixXd::Zero(values.size(), static_cast<Index>(curve_heights));
-  const auto pieces = static_cast<double>(curve_pieces);
-  for (Index i = 0; i < values.size(); ++i) {
-    const double x = std::clamp(pieces * knots.place(values[i]), 0.0, pieces);
-    Curve<Real>::at(x).each(
-        [&](auto, std::size_t height, double weight) { out(i, static_cast<Index>(height)) = weight; });
-  }
-  return out;
-}
+/// Where a curve's knots are: its shape ends with that.
+Knots knots_of(const EffectCandidate& curve) { return {curve.shape[curve.shape.size() - 2], curve.shape.back()}; }
 
 /// What a curve's variable is, as in GapRegion.
 std::string variable_of(const EffectInfo& info) {
@@ -301,7 +274,7 @@ MatrixXd nominal_part(const Linearised& problem, const FreeCurve& curve, const s
       cross = MatrixXd::Zero(nominal.cols(), heights);
     }
     gram += nominal.transpose() * nominal;
-    cross += nominal.transpose() * bumps(Knots(curve.effect), values);
+    cross += nominal.transpose() * bumps(knots_of(curve.effect), values);
   }
   return SymmetricSolver(gram).inverse() * cross;
 }
@@ -310,7 +283,7 @@ MatrixXd nominal_part(const Linearised& problem, const FreeCurve& curve, const s
 /// less what noise makes of them.
 /// @param residual of the joint, all rows
 double misfit(const Linearised& problem, const FreeCurve& curve, const CurveResult& of, const VectorXd& residual) {
-  const Knots knots(curve.effect);
+  const Knots knots = knots_of(curve.effect);
   VectorXd sum = VectorXd::Zero(drawn_points), count = VectorXd::Zero(drawn_points);
   double square = 0;
   for (std::size_t l = 0; l < problem.logs().size(); ++l) {
@@ -345,7 +318,7 @@ double misfit(const Linearised& problem, const FreeCurve& curve, const CurveResu
 /// Whether a curve of the load takes or gives more than all of the load: a drive loses no more than goes through it.
 bool exceeds_load(const Models& models, const FreeCurve& curve) {
   if (variable_of(*find_effect(curve.effect.effect)) != "load") return false;
-  const Knots knots(curve.effect);
+  const Knots knots = knots_of(curve.effect);
   const VectorXd at = VectorXd::LinSpaced(drawn_points, knots.from, knots.from + knots.span);
   const std::vector<double>& linear = joints_of(models.current)[curve.id.joint].effects[curve.id.effect].linear;
   const VectorXd y = bumps(knots, at) * Eigen::Map<const VectorXd>(linear.data(), static_cast<Index>(curve_heights));
@@ -443,7 +416,7 @@ CurveResult drawn(const Models& models, const FreeCurve& curve, const std::vecto
   out.odds_rival = curve.odds_rival;
   out.rival = curve.rival;
   out.closes = curve.closes;
-  const Knots knots(curve.effect);
+  const Knots knots = knots_of(curve.effect);
   const VectorXd x = VectorXd::LinSpaced(drawn_points, knots.from, knots.from + knots.span);
   const double width = joints_of(models.current)[curve.effect.joint].sign_width;
   const MatrixXd factors =

@@ -14,7 +14,7 @@ struct FreeCurve {
   EffectId id;                         ///< of Models::current
   EffectCandidate effect;              ///< its variable, and over which interval its knots are
   double odds_nothing = 0;             ///< log10, on data that did not fit it
-  std::optional<double> odds_rival{};  ///< .. against the best curve of another variable; none: there is none
+  std::optional<double> odds_rival{};  ///< .. against the best functions of another variable; none: there is none
   std::string rival{};
   double closes = 0;  ///< share of the error's power on what judges that it takes away
 };
@@ -23,8 +23,8 @@ struct FreeCurve {
 /// load; friction over the position; another joint's position), with knots over the whole motion and over halves,
 /// quarters and eighths of it, each judged by a fit of the others' folds with all that the model has. What one log
 /// alone has is judged by parts of it. Rows count as diluted_weights() says; the number of curves tried is taken off
-/// the odds. None where functions of the other joints' velocities explain more. Fits all of them together, and gives up
-/// those that harm a joint.
+/// the odds. None where functions of variables that have no curve explain more (left_without_curve()). Fits all of them
+/// together, and gives up those that harm a joint.
 /// @param models the curves are added, as named effects; @param without joints that get none
 std::vector<FreeCurve> add_free_curves(Models& models, const std::vector<SessionLog>& logs,
                                        const std::vector<bool>& without);

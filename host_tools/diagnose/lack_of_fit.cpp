@@ -151,6 +151,12 @@ Products products(const Linearised& problem, std::size_t joint, const LinearFit&
   out.size = (w * f.colwise().squaredNorm().transpose().array()).max(1e-300).sqrt().inverse();
   out.residual = w * f.transpose() * e;
   out.whole = w * e.squaredNorm();
+  if (healthy) {
+    // The columns were fitted beside the background: alone they take some of it.
+    const VectorXd along = times_columns(problem, joint, fit, w, e);
+    out.residual -= out.fitted.transpose() * along;
+    out.whole -= along.dot(SymmetricSolver(fit.information).solve(along));
+  }
   for (const std::size_t i : blocks) {
     if (problem.blocks().all[i].healthy == healthy) out.rows += static_cast<double>(problem.blocks().all[i].count);
   }

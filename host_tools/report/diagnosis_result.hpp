@@ -77,7 +77,7 @@ struct CurveResult {
   std::string sentence;              ///< "friction rises by 0.8 N*m between 0.85 and 1.05 rad"
   double from = 0, to = 0;           ///< that interval
   double odds_nothing = 0;           ///< log10, on data that did not fit it
-  std::optional<double> odds_rival;  ///< .. against the best curve of another variable; none: there is none
+  std::optional<double> odds_rival;  ///< .. against the best functions of another variable; none: there is none
   std::string rival;
   double closes = 0;      ///< share of the error's power, on data that did not fit it
   double closes_std = 0;  ///< of a curve over time; not in the file

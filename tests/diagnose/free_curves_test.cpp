@@ -6,15 +6,22 @@
 
 #include <functional>
 
+#include "host_tools/diagnose/curve_squares.hpp"
+#include "host_tools/diagnose/curveless.hpp"
 #include "host_tools/diagnose/gate.hpp"
 #include "host_tools/diagnose/left_curves.hpp"
+#include "host_tools/diagnose/linearised.hpp"
 #include "host_tools/diagnose/refit.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "tests/diagnose/small_problem.hpp"
 
 namespace fxdyn::diagnosis {
 namespace {
 
 using Eigen::ArrayXd;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
 /// A torque of the second joint, of its own position and velocity and of the fourth joint's.
 using Torque =
@@ -148,6 +155,36 @@ TEST(FreeCurves, WhatAnotherJointsVelocityDoesIsNoneOfThem) {
     return 2 * (4 * speed).tanh();
   });
   EXPECT_TRUE(a.curves.empty()) << a.curves[0].effect.effect;
+}
+
+/// Of the second joint's acceleration over one log.
+ArrayXd acceleration_of(const SessionLog& entry) { return entry.log.motion(0, entry.log.samples()).ddq.col(1).array(); }
+
+TEST(FreeCurves, WhatTheAccelerationDoesIsNoneOfThem) {
+  const Answer a = answer_on(test::fitted_puma(), [](const SessionLog& entry) -> ArrayXd {
+    const ArrayXd ddq = acceleration_of(entry);
+    return 4 * ddq * ddq.abs() / ddq.square().maxCoeff();
+  });
+  EXPECT_TRUE(a.curves.empty()) << a.curves[0].effect.effect;
+}
+
+TEST(VariablesWithoutCurve, HaveTheJerkAmongThem) {
+  std::vector<SessionLog> logs{test::small_session_log(test::fitted_puma(), Role::train, 1)};
+  logs[0].fits = true;
+  const ArrayXd jerk = differentiate(acceleration_of(logs[0]).matrix(), logs[0].log.step_s).array();
+  logs[0].log.tau.col(1).array() += 4 * jerk / jerk.abs().maxCoeff();
+  const Models models = test::around(test::fitted_puma());
+  const Linearised problem(models, logs, test::no_whitening());
+  const std::vector<Index> columns = problem.columns_of(in_model(problem));
+  const std::vector<VectorXd> moving{VectorXd::Ones(jerk.size())};
+  const auto left = [&](std::size_t joint) {
+    return left_without_curve(problem, joint, columns, 1e-2, problem.blocks().folds, moving);
+  };
+  double before = 0;
+  for (const Fold& fold : problem.blocks().folds)
+    before += judged_with_curves(problem, 1, columns, MatrixXd(problem.solver().rows(1).x.rows(), 0), 0, fold);
+  EXPECT_STREQ(left(1).variable, "jerk");
+  EXPECT_LT(left(1).left, 0.2 * before);
 }
 
 TEST(FreeCurves, ACurveStaysWhereAFitOfEverythingWouldHarmAnotherJoint) {
