@@ -7,7 +7,6 @@
 
 #include "host_tools/diagnose/curve_sentence.hpp"
 #include "host_tools/diagnose/deviations.hpp"
-#include "host_tools/diagnose/features.hpp"
 #include "host_tools/diagnose/finding.hpp"
 #include "host_tools/diagnose/models.hpp"
 #include "host_tools/effects/identified_model.hpp"
@@ -127,14 +126,25 @@ class FoldSums {
   /// @param prior the noise's variance over that of a coefficient
   double left(double prior) const {
     double out = 0;
-    for (const Sums& judge : fold_) out += left(prior, judge);
+    for (const Sums& judge : fold_) out += left(prior, whole_, judge);
+    return out;
+  }
+  /// .. of some columns alone.
+  double left(double prior, const Family& of) const {
+    const auto some = [&](const Sums& sums) {
+      return Sums{sums.gram.block(of.first, of.first, of.count, of.count), sums.projection.segment(of.first, of.count),
+                  sums.square};
+    };
+    const Sums whole = some(whole_);
+    double out = 0;
+    for (const Sums& fold : fold_) out += left(prior, whole, some(fold));
     return out;
   }
   /// Deviation of the share that they take away.
   double deviation(double prior) const {
     double sum = 0, square = 0;
     for (const Sums& judge : fold_) {
-      const double share = judge.square > 0 ? left(prior, judge) / judge.square : 1;
+      const double share = judge.square > 0 ? left(prior, whole_, judge) / judge.square : 1;
       sum += share;
       square += share * share;
     }
@@ -143,7 +153,7 @@ class FoldSums {
   /// Errors of fits on what they have not seen.
   VectorXd errors(double prior, const TimeColumns& x, const VectorXd& e) const {
     std::array<VectorXd, turns> heights;
-    for (std::size_t k = 0; k < turns; ++k) heights[k] = without(prior, fold_[k]);
+    for (std::size_t k = 0; k < turns; ++k) heights[k] = without(prior, whole_, fold_[k]);
     VectorXd out = e;
     for (const Run& run : runs_) {
       for (Index i = run.first; i < run.end; ++i) out[i] -= x.times(heights[run.fold], i);
@@ -157,11 +167,11 @@ class FoldSums {
     std::size_t fold;
     Index first, end;
   };
-  VectorXd without(double prior, const Sums& judge) const {
-    return solve(prior, whole_.gram - judge.gram, whole_.projection - judge.projection);
+  static VectorXd without(double prior, const Sums& whole, const Sums& judge) {
+    return solve(prior, whole.gram - judge.gram, whole.projection - judge.projection);
   }
-  double left(double prior, const Sums& judge) const {
-    const VectorXd c = without(prior, judge);
+  static double left(double prior, const Sums& whole, const Sums& judge) {
+    const VectorXd c = without(prior, whole, judge);
     return judge.square - 2 * c.dot(judge.projection) + c.dot(judge.gram * c);
   }
   static MatrixXd with(double prior, MatrixXd gram) {
@@ -263,6 +273,25 @@ double misfit(const TimeFit& fit, const TimedRows& rows, const VectorXd& residua
 
 }  // namespace
 
+namespace {
+
+/// What the best of the rivals leave: all of them, or a family. Many functions on few rows want to be held tighter: the
+/// best of a few priors counts.
+double square_of_rivals(const TimedRows& rows, double prior, double square, const CurveOptions& options) {
+  double out = 1;
+  if (rows.rivals.cols() == 0) return out;
+  const FoldSums rivals(DenseColumns{rows.rivals}, rows, options.left_out_s);
+  std::vector<Family> all = rows.families;
+  all.push_back({0, rows.rivals.cols()});
+  for (const Family& family : all) {
+    for (const double times : {1.0, 10.0, 100.0, 1000.0})
+      out = std::min(out, rivals.left(times * prior, family) / square);
+  }
+  return out;
+}
+
+}  // namespace
+
 std::optional<TimeFit> fit_over_time(const TimedRows& rows, double size, double row_s, const CurveOptions& options) {
   const Index count = rows.t.size();
   if (count == 0 || !(rows.e.squaredNorm() > 0) || !(size > 0)) return {};
@@ -314,12 +343,7 @@ std::optional<TimeFit> fit_over_time(const TimedRows& rows, double size, double 
   best->odds_nothing =
       static_cast<double>(count) / diluted * std::log(sums.whole().square / least) / variances_per_decade -
       std::log10(tried);
-  // Many functions on few rows want to be held tighter: the best of a few priors counts.
-  best->square_of_rivals = 1;
-  if (rows.rivals.cols() == 0) return best;
-  const FoldSums rivals(DenseColumns{rows.rivals}, rows, options.left_out_s);
-  for (const double times : {1.0, 10.0, 100.0, 1000.0})
-    best->square_of_rivals = std::min(best->square_of_rivals, rivals.left(times * prior) / sums.whole().square);
+  best->square_of_rivals = square_of_rivals(rows, prior, sums.whole().square, options);
   return best;
 }
 
@@ -359,7 +383,7 @@ TimedRows TimeCurves::rows_of(const std::vector<std::size_t>& logs, std::size_t 
   const auto vector = [](const std::vector<double>& of) {
     return VectorXd(Eigen::Map<const VectorXd>(of.data(), static_cast<Index>(of.size())));
   };
-  return {vector(t), e(kept), vector(sign), state(kept, Eigen::all), {}, {}, kept};
+  return {vector(t), e(kept), vector(sign), state(kept, Eigen::all), {}, {}, {}, kept};
 }
 
 std::pair<MatrixXd, MatrixXd> TimeCurves::nominal_of(std::size_t joint) const {
@@ -380,12 +404,16 @@ std::vector<CurveResult> TimeCurves::at(std::size_t joint) const {
   if (!(fit_.square[j] > rounding * problem_.solver().rows(joint).y.squaredNorm())) return {};
   MatrixXd state = features(problem_, joint);
   state.conservativeResize(Eigen::NoChange, state.cols() - time_features);
+  std::vector<Family> of_state = families(problem_.joints());
+  of_state.pop_back();  // of time
   const auto [columns, covariance] = nominal_of(joint);
   std::vector<CurveResult> out;
   for (const std::vector<std::size_t>& clock : clocks_) {
     TimedRows rows = rows_of(clock, joint, state);
     rows.nominal = columns(rows.place, Eigen::all);
     rows.covariance = covariance;
+    rows.rivals -= rows.nominal * (covariance * (rows.nominal.transpose() * rows.rivals));
+    rows.families = of_state;
     if (std::optional<CurveResult> curve = over(clock, joint, rows)) out.push_back(std::move(*curve));
   }
   std::sort(out.begin(), out.end(),

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "host_tools/diagnose/features.hpp"
 #include "host_tools/diagnose/linearised.hpp"
 #include "host_tools/report/diagnosis_result.hpp"
 
@@ -17,6 +18,7 @@ struct TimedRows {
   Eigen::VectorXd e;                  ///< what the model leaves [N*m | N]
   Eigen::VectorXd sign;               ///< tanh(dq / width), as Coulomb friction has it
   Eigen::MatrixXd rivals;             ///< functions of the state, that may explain it as well
+  std::vector<Family> families{};     ///< of them
   Eigen::MatrixXd nominal{};          ///< columns that were fitted before: they have taken some of a curve, too
   Eigen::MatrixXd covariance{};       ///< .. of their coefficients, over the variance of the noise
   std::vector<Eigen::Index> place{};  ///< of each among the rows of the problem

@@ -135,6 +135,25 @@ TEST(TimeCurve, AFunctionOfTheMotionIsNoneOfTime) {
   EXPECT_LT(fit->square_of_rivals, 1 - fit->closes);
 }
 
+TEST(TimeCurve, AFunctionOfTheMotionIsSeenAmongManyThatOnlyFitNoise) {
+  Minutes session(4);
+  const Index count = session.rows.t.size(), many = 120;
+  Random random(5);
+  session.rows.rivals.resize(count, 1 + many);
+  session.rows.rivals.col(0) = session.wave(20);
+  for (Index k = 1; k <= many; ++k) {
+    double slow = 0;
+    for (double& value : session.rows.rivals.col(k)) value = slow = 0.98 * slow + 0.2 * random.normal();
+  }
+  session.rows.e += 0.2 * session.rows.rivals.col(0);
+  const auto together = session.fit();
+  session.rows.families = {{0, 1}};
+  const auto alone = session.fit();
+  ASSERT_TRUE(together && alone);
+  EXPECT_GT(together->square_of_rivals, 1 - together->closes);
+  EXPECT_LT(alone->square_of_rivals, 1 - alone->closes);
+}
+
 TEST(TimeCurve, EndsAtItsLastKnot) {
   TimeFit fit;
   fit.knot_s = 2;
