@@ -48,7 +48,7 @@ MatrixXd columns_over(const Linearised& problem, std::size_t joint, const Values
   for (std::size_t l = 0; l < values.size(); ++l) {
     const ProcessedLog& log = problem.logs()[l].log;
     if (problem.logs()[l].healthy) continue;
-    const MatrixXd full = moving[l].asDiagonal() * bumps(knots, values[l]);
+    const MatrixXd full = moving[l].asDiagonal() * problem.log_columns().follow(l, joint, bumps(knots, values[l]));
     const Block& block = problem.blocks().of_log[l];
     out.middleRows(block.first, block.count) = problem.noise().apply(l, joint, log.decimate(log.filter_columns(full)));
   }

@@ -169,17 +169,19 @@ std::optional<FreeCurve> best_by(const Linearised& problem, std::size_t joint, d
   tried_before += trials.count();
   if (tried.empty()) return {};
   const LeftBy other = left_without_curve(problem, joint, columns, prior, folds, trials.moving());
-  if (other.left < tried[0].left) return {};
   const auto odds = [&](double without, double with) {
     return rows * std::log(without / std::max(with, 1e-300)) / variances_per_decade;
   };
+  if (odds(tried[0].left, other.left) >= options.gate.established) return {};
   FreeCurve out;
   out.effect = tried[0].effect;
   out.closes = 1 - tried[0].left / before;
   out.odds_nothing = odds(before, tried[0].left) - std::log10(static_cast<double>(tried_before));
   const bool by_curve = tried.size() > 1 && tried[1].left <= other.left;
-  out.odds_rival = odds(by_curve ? tried[1].left : other.left, tried[0].left);
-  out.rival = by_curve ? words_of_variable(tried[1].effect) : other.variable;
+  if (by_curve || other.left < before) {
+    out.odds_rival = odds(by_curve ? tried[1].left : other.left, tried[0].left);
+    out.rival = by_curve ? words_of_variable(tried[1].effect) : other.variable;
+  }
   if (out.odds_nothing < options.gate.established || out.closes < options.curve.least_share) return {};
   return out;
 }

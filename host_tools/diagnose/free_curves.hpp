@@ -23,7 +23,7 @@ struct FreeCurve {
 /// load; friction over the position; another joint's position), with knots over the whole motion and over halves,
 /// quarters and eighths of it, each judged by a fit of the others' folds with all that the model has. What one log
 /// alone has is judged by parts of it. Rows count as diluted_weights() says; the number of curves tried is taken off
-/// the odds. None where functions of variables that have no curve explain more (left_without_curve()). Fits all of them
+/// the odds. None where functions of variables that have no curve are surer (left_without_curve()). Fits all of them
 /// together, and gives up those that harm a joint.
 /// @param models the curves are added, as named effects; @param without joints that get none
 std::vector<FreeCurve> add_free_curves(Models& models, const std::vector<SessionLog>& logs,

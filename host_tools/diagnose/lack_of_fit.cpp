@@ -151,8 +151,9 @@ Products products(const Linearised& problem, std::size_t joint, const LinearFit&
   out.size = (w * f.colwise().squaredNorm().transpose().array()).max(1e-300).sqrt().inverse();
   out.residual = w * f.transpose() * e;
   out.whole = w * e.squaredNorm();
-  if (healthy) {
-    // The columns were fitted beside the background: alone they take some of it.
+  if (healthy && problem.background(joint) != nullptr) {
+    // A background is eliminated over both sessions. On these rows alone what is left of it has some of the columns,
+    // which the functions' products lack.
     const VectorXd along = times_columns(problem, joint, fit, w, e);
     out.residual -= out.fitted.transpose() * along;
     out.whole -= along.dot(SymmetricSolver(fit.information).solve(along));

@@ -41,7 +41,7 @@ std::pair<Index, Eigen::Matrix<double, 4, 1>> bumps_at(const TimeFit& fit, doubl
   return {piece + static_cast<Index>(four.first), Eigen::Map<const Eigen::Matrix<double, 4, 1>>(four.weights.data())};
 }
 
-struct Sums {
+struct FoldSum {
   MatrixXd gram;
   VectorXd projection;
   double square = 0;
@@ -51,7 +51,7 @@ struct Sums {
 struct DenseColumns {
   const MatrixXd& x;
   Index count() const { return x.cols(); }
-  void add(Index first, Index rows, const VectorXd& e, Sums& to) const {
+  void add(Index first, Index rows, const VectorXd& e, FoldSum& to) const {
     const auto part = x.middleRows(first, rows);
     to.gram.noalias() += part.transpose() * part;
     to.projection.noalias() += part.transpose() * e.segment(first, rows);
@@ -70,7 +70,7 @@ class TimeColumns {
     const auto [first, weights] = bumps_at(fit_, rows_.t[i]);
     return {first, (fit_.friction ? rows_.sign[i] : 1) * weights};
   }
-  void add(Index first, Index rows, const VectorXd& e, Sums& to) const {
+  void add(Index first, Index rows, const VectorXd& e, FoldSum& to) const {
     for (Index i = first; i < first + rows; ++i) {
       const auto [k, weights] = of_row(i);
       to.gram.block<4, 4>(k, k).noalias() += weights * weights.transpose();
@@ -96,12 +96,12 @@ class TimeColumns {
   const TimedRows& rows_;
 };
 
-/// Sums of products of some rows' columns by the stretch of time that they are in, every fifth or so together.
+/// FoldSum of products of some rows' columns by the stretch of time that they are in, every fifth or so together.
 class FoldSums {
  public:
   template <class Columns>
   FoldSums(const Columns& x, const TimedRows& rows, double stretch_s) {
-    const Sums none{MatrixXd::Zero(x.count(), x.count()), VectorXd::Zero(x.count()), 0};
+    const FoldSum none{MatrixXd::Zero(x.count(), x.count()), VectorXd::Zero(x.count()), 0};
     whole_ = none;
     fold_.fill(none);
     const auto fold_of = [&](Index i) {
@@ -116,7 +116,7 @@ class FoldSums {
       fold_[k].square += rows.e.segment(first, end - first).squaredNorm();
       runs_.push_back({k, first, end});
     }
-    for (const Sums& fold : fold_) {
+    for (const FoldSum& fold : fold_) {
       whole_.gram += fold.gram;
       whole_.projection += fold.projection;
       whole_.square += fold.square;
@@ -126,24 +126,24 @@ class FoldSums {
   /// @param prior the noise's variance over that of a coefficient
   double left(double prior) const {
     double out = 0;
-    for (const Sums& judge : fold_) out += left(prior, whole_, judge);
+    for (const FoldSum& judge : fold_) out += left(prior, whole_, judge);
     return out;
   }
   /// .. of some columns alone.
   double left(double prior, const Family& of) const {
-    const auto some = [&](const Sums& sums) {
-      return Sums{sums.gram.block(of.first, of.first, of.count, of.count), sums.projection.segment(of.first, of.count),
-                  sums.square};
+    const auto some = [&](const FoldSum& sums) {
+      return FoldSum{sums.gram.block(of.first, of.first, of.count, of.count),
+                     sums.projection.segment(of.first, of.count), sums.square};
     };
-    const Sums whole = some(whole_);
+    const FoldSum whole = some(whole_);
     double out = 0;
-    for (const Sums& fold : fold_) out += left(prior, whole, some(fold));
+    for (const FoldSum& fold : fold_) out += left(prior, whole, some(fold));
     return out;
   }
   /// Deviation of the share that they take away.
   double deviation(double prior) const {
     double sum = 0, square = 0;
-    for (const Sums& judge : fold_) {
+    for (const FoldSum& judge : fold_) {
       const double share = judge.square > 0 ? left(prior, whole_, judge) / judge.square : 1;
       sum += share;
       square += share * share;
@@ -160,17 +160,17 @@ class FoldSums {
     }
     return out;
   }
-  const Sums& whole() const { return whole_; }
+  const FoldSum& whole() const { return whole_; }
 
  private:
   struct Run {
     std::size_t fold;
     Index first, end;
   };
-  static VectorXd without(double prior, const Sums& whole, const Sums& judge) {
+  static VectorXd without(double prior, const FoldSum& whole, const FoldSum& judge) {
     return solve(prior, whole.gram - judge.gram, whole.projection - judge.projection);
   }
-  static double left(double prior, const Sums& whole, const Sums& judge) {
+  static double left(double prior, const FoldSum& whole, const FoldSum& judge) {
     const VectorXd c = without(prior, whole, judge);
     return judge.square - 2 * c.dot(judge.projection) + c.dot(judge.gram * c);
   }
@@ -183,8 +183,8 @@ class FoldSums {
   }
 
   std::vector<Run> runs_;
-  std::array<Sums, turns> fold_;
-  Sums whole_;
+  std::array<FoldSum, turns> fold_;
+  FoldSum whole_;
 };
 
 double mean_square(const VectorXd& e) { return e.squaredNorm() / static_cast<double>(std::max<Index>(e.size(), 1)); }
@@ -270,10 +270,6 @@ double misfit(const TimeFit& fit, const TimedRows& rows, const VectorXd& residua
   const double noise = std::max(0.0, residual.squaredNorm() - of_means) / std::max(count.sum() - used, 1.0);
   return std::max(0.0, of_means - used * noise * diluted) / std::max(count.sum(), 1.0);
 }
-
-}  // namespace
-
-namespace {
 
 /// What the best of the rivals leave: all of them, or a family. Many functions on few rows want to be held tighter: the
 /// best of a few priors counts.
@@ -407,12 +403,16 @@ std::vector<CurveResult> TimeCurves::at(std::size_t joint) const {
   std::vector<Family> of_state = families(problem_.joints());
   of_state.pop_back();  // of time
   const auto [columns, covariance] = nominal_of(joint);
+  // As the fit leaves them, over all of its rows: so the residual has them.
+  if (const Background* background = problem_.background(joint))
+    state = background->eliminate(state).topRows(state.rows());
+  const auto nominal = columns.topRows(state.rows());
+  state.noalias() -= nominal * (covariance * (nominal.transpose() * state));
   std::vector<CurveResult> out;
   for (const std::vector<std::size_t>& clock : clocks_) {
     TimedRows rows = rows_of(clock, joint, state);
     rows.nominal = columns(rows.place, Eigen::all);
     rows.covariance = covariance;
-    rows.rivals -= rows.nominal * (covariance * (rows.nominal.transpose() * rows.rivals));
     rows.families = of_state;
     if (std::optional<CurveResult> curve = over(clock, joint, rows)) out.push_back(std::move(*curve));
   }

@@ -14,10 +14,10 @@ namespace fxdyn::diagnosis {
 
 /// Rows of a joint that a curve over time is fitted to.
 struct TimedRows {
-  Eigen::VectorXd t;                  ///< of the session's clock [s]
-  Eigen::VectorXd e;                  ///< what the model leaves [N*m | N]
-  Eigen::VectorXd sign;               ///< tanh(dq / width), as Coulomb friction has it
-  Eigen::MatrixXd rivals;             ///< functions of the state, that may explain it as well
+  Eigen::VectorXd t;       ///< of the session's clock [s]
+  Eigen::VectorXd e;       ///< what the model leaves [N*m | N]
+  Eigen::VectorXd sign;    ///< tanh(dq / width), as Coulomb friction has it
+  Eigen::MatrixXd rivals;  ///< functions of the state as the nominal fit leaves them: may they explain it as well
   std::vector<Family> families{};     ///< of them
   Eigen::MatrixXd nominal{};          ///< columns that were fitted before: they have taken some of a curve, too
   Eigen::MatrixXd covariance{};       ///< .. of their coefficients, over the variance of the noise

@@ -50,13 +50,31 @@ double chance(double ratio, double freedom, double other) {
   return 0.5 * std::erfc(z / std::numbers::sqrt2);
 }
 
+namespace {
+
+/// Blocks that follow one another in a log as one: the longer, the slower a line may be.
+std::vector<Block> joined(const Blocks& blocks, const std::vector<std::size_t>& of) {
+  std::vector<Block> out;
+  for (const std::size_t i : of) {
+    const Block& b = blocks.all[i];
+    const bool follows = !out.empty() && out.back().log == b.log && out.back().first + out.back().count == b.first;
+    if (follows) {
+      out.back().count += b.count;
+    } else {
+      out.push_back(b);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
 TimeStructure spectral_lines(const std::vector<SessionLog>& logs, const Blocks& blocks, const VectorXd& e,
                              const std::vector<std::size_t>& of, const LackOfFitOptions& options) {
   std::vector<Line> lines;
   double whole = 0;
   Eigen::FFT<double> fft;
-  for (const std::size_t i : of) {
-    const Block& b = blocks.all[i];
+  for (const Block& b : joined(blocks, of)) {
     const ProcessedLog& log = logs[b.log].log;
     const double seconds = static_cast<double>(b.count * log.decimation) * log.step_s;
     // Towards the cut-off the filter's slope is no line.

@@ -55,6 +55,14 @@ TEST_F(StructureInTime, ALineIsFoundWithItsShare) {
   EXPECT_NEAR(found.share, 0.5 / (0.5 + 16.0 / 25), 0.1);  // of the power below 16 of 25 Hz
 }
 
+TEST_F(StructureInTime, ALineMayBeSlowerThanTheBlocksOfALog) {
+  blocks_.all.pop_back();
+  for (Index part = 0; part < 5; ++part) blocks_.all.push_back({1, rows + part * rows / 5, rows / 5, false, true});
+  const VectorXd e = with([](double t) { return 0.4 * std::sin(2 * std::numbers::pi * t / 13); });
+  EXPECT_LT(spectral_lines(logs_, blocks_, e, {1, 2, 3, 4, 5}, {}).p, 1e-6);
+  EXPECT_GT(spectral_lines(logs_, blocks_, e, {1, 3, 5}, {}).p, 1e-3);  // no two of them touch
+}
+
 TEST_F(StructureInTime, WandersWhereMeansDo) {
   const VectorXd e = with([](double t) { return t < 20 ? 0.5 : -0.5; });
   const TimeStructure found = slow_changes(logs_, blocks_, e, {1}, {});
