@@ -9,6 +9,7 @@
 #include "host_tools/diagnose/linearised.hpp"
 #include "host_tools/effects/effect_roles.hpp"
 #include "host_tools/effects/joint_fit.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "host_tools/support/random.hpp"
 
 namespace fxdyn::diagnosis {
@@ -242,23 +243,41 @@ MatrixXd features(const LogColumns& columns, const NoiseModel& noise, const Bloc
   return out;
 }
 
-MatrixXd position_waves(const Linearised& problem, std::size_t joint, Index count) {
-  const LogColumns& columns = problem.log_columns();
+namespace {
+
+/// Functions of a log's motion at full rate, as rows of the problem.
+template <class Of>
+MatrixXd of_motions(const Linearised& problem, std::size_t joint, Index count, Of&& of) {
   const Blocks& blocks = problem.blocks();
-  const Scales scales = scales_of(columns, blocks);
-  const auto j = static_cast<Index>(joint);
   MatrixXd out = MatrixXd::Zero(blocks.rows(), count);
-  for (std::size_t l = 0; l < columns.logs().size(); ++l) {
-    const SessionLog& entry = columns.logs()[l];
+  for (std::size_t l = 0; l < problem.logs().size(); ++l) {
+    const SessionLog& entry = problem.logs()[l];
     if (entry.healthy) continue;
-    const ArrayXd u = (columns.motion(l).q.col(j).array() - scales.low[j]) / scales.range[j];
-    MatrixXd full(u.size(), count);
-    for (Index m = 0; m < count; ++m) full.col(m) = (static_cast<double>(m + 1) * std::numbers::pi * u).cos();
     const Block& b = blocks.of_log[l];
+    const MatrixXd full = of(problem.motion(l));
     out.middleRows(b.first, b.count) =
         problem.noise().apply(l, joint, entry.log.decimate(entry.log.filter_columns(full)));
   }
   return out;
+}
+
+}  // namespace
+
+MatrixXd position_waves(const Linearised& problem, std::size_t joint, Index count) {
+  const Scales scales = scales_of(problem.log_columns(), problem.blocks());
+  const auto j = static_cast<Index>(joint);
+  return of_motions(problem, joint, count, [&](const Motion& motion) {
+    const ArrayXd u = (motion.q.col(j).array() - scales.low[j]) / scales.range[j];
+    MatrixXd full(u.size(), count);
+    for (Index m = 0; m < count; ++m) full.col(m) = (static_cast<double>(m + 1) * std::numbers::pi * u).cos();
+    return full;
+  });
+}
+
+MatrixXd jerk(const Linearised& problem, std::size_t joint) {
+  return of_motions(problem, joint, 1, [&](const Motion& motion) {
+    return differentiate(motion.ddq.col(static_cast<Index>(joint)), motion.step_s);
+  });
 }
 
 MatrixXd features(const Linearised& problem, std::size_t joint, bool healthy) {

@@ -21,6 +21,9 @@ Eigen::MatrixXd features(const Linearised& problem, std::size_t joint, bool heal
 /// session's rows.
 Eigen::MatrixXd position_waves(const Linearised& problem, std::size_t joint, Eigen::Index count);
 
+/// The own jerk, d(ddq)/dt, made likewise: no effect's, but noise has little of it. One column.
+Eigen::MatrixXd jerk(const Linearised& problem, std::size_t joint);
+
 /// Features of time alone: what changes with time does not come back.
 constexpr Eigen::Index time_features = 15;
 

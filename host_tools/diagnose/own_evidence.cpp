@@ -28,11 +28,14 @@ class Curves {
   Curves(const Linearised& problem, std::size_t joint, const MatrixXd& features)
       : joints_(problem.joints()), families_(families(problem.joints())) {
     // The own position's are finer here: a curve has to follow what several effects in a row would.
-    const std::size_t own = place_of_own_position(problem.joints());
     const MatrixXd fine = position_waves(problem, joint, fine_waves);
-    all_.resize(features.rows(), features.cols() + fine.cols());
-    all_ << features, fine;
-    families_[own] = {features.cols(), fine.cols()};
+    families_[place_of_own_position(problem.joints())] = {features.cols(), fine.cols()};
+    // Laws of friction resemble a torque with the jerk, of which there is no effect.
+    Family& motion = families_[place_of_own_motion(problem.joints())];
+    const MatrixXd of_motion = features.middleCols(motion.first, motion.count);
+    motion = {features.cols() + fine.cols(), motion.count + 1};
+    all_.resize(features.rows(), motion.first + motion.count);
+    all_ << features, fine, of_motion, jerk(problem, joint);
     for (Index row = 0; row < all_.rows(); ++row) {
       if (problem.noise().is_doubtful(joint, row)) all_.row(row).setZero();
     }

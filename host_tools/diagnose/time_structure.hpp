@@ -14,7 +14,7 @@ struct TimeStructure {
   double share = 0;  ///< of the squared residual
 };
 
-/// Lines in the periodograms of today's blocks against their neighbourhood.
+/// Lines in the periodograms of today's blocks against their neighbourhood; blocks that touch are one.
 TimeStructure spectral_lines(const std::vector<SessionLog>& logs, const Blocks& blocks, const Eigen::VectorXd& e,
                              const std::vector<std::size_t>& of, const LackOfFitOptions& options);
 
