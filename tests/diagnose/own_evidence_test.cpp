@@ -8,6 +8,7 @@
 
 #include "host_tools/diagnose/features.hpp"
 #include "host_tools/diagnose/refit.hpp"
+#include "host_tools/signals/filter.hpp"
 #include "tests/diagnose/small_problem.hpp"
 
 namespace fxdyn::diagnosis {
@@ -16,19 +17,15 @@ namespace {
 using Eigen::ArrayXd;
 using Eigen::MatrixXd;
 
-/// A torque of the second joint, of its own position and of the fourth's [rad].
-using TorqueOfPositions = std::function<ArrayXd(const ArrayXd& own, const ArrayXd& other)>;
-
-/// A PUMA 560 with that torque at its second joint, and a model with effects there instead.
+/// A PUMA 560 with a torque at its second joint, and a model with effects there instead.
 /// @param second role of the log that judges; train: both do
-std::vector<OwnEvidence> evidence(const TorqueOfPositions& torque, const std::vector<EffectFit>& effects,
-                                  Role second = Role::validate) {
+std::vector<OwnEvidence> evidence_on(const std::function<ArrayXd(const SessionLog&)>& torque,
+                                     const std::vector<EffectFit>& effects, Role second = Role::validate) {
   const IdentifiedModel nominal = test::fitted_puma();
   std::vector<SessionLog> logs;
   for (const auto& [role, seed] : {std::pair{Role::train, 1}, std::pair{second, 2}}) {
     logs.push_back(test::small_session_log(nominal, role, static_cast<std::uint64_t>(seed)));
-    const MatrixXd& q = logs.back().log.q;
-    logs.back().log.tau.col(1).array() += torque(q.col(1).array(), q.col(3).array());
+    logs.back().log.tau.col(1).array() += torque(logs.back());
   }
   Models models = test::around(nominal);
   for (const EffectFit& fit : effects) models.current->joints[1].effects.push_back(fit);
@@ -36,6 +33,17 @@ std::vector<OwnEvidence> evidence(const TorqueOfPositions& torque, const std::ve
   std::vector<MatrixXd> functions(problem.joints());
   for (std::size_t j = 0; j < functions.size(); ++j) functions[j] = features(problem, j);
   return own_evidence(problem, in_model(problem), functions);
+}
+
+/// A torque of the second joint, of its own position and of the fourth's [rad].
+using TorqueOfPositions = std::function<ArrayXd(const ArrayXd& own, const ArrayXd& other)>;
+
+std::vector<OwnEvidence> evidence(const TorqueOfPositions& torque, const std::vector<EffectFit>& effects,
+                                  Role second = Role::validate) {
+  const auto of_positions = [&](const SessionLog& entry) {
+    return torque(entry.log.q.col(1).array(), entry.log.q.col(3).array());
+  };
+  return evidence_on(of_positions, effects, second);
 }
 
 ArrayXd nothing(const ArrayXd& q) { return ArrayXd::Zero(q.size()); }
@@ -69,6 +77,18 @@ TEST(EvidenceOfItsOwn, DoesNotSpeakForANameThatOnlyResemblesWhatIsMissing) {
   const auto own = evidence([](const ArrayXd&, const ArrayXd& other) -> ArrayXd { return 3 * wave(other); },
                             {test::named_effect("viscous_cubic", {}, {0.05})});
   EXPECT_LT(own[0].gain, 16);
+}
+
+// Where a joint turns round, its jerk is as sudden as its friction.
+TEST(EvidenceOfItsOwn, FrictionLosesAgainstTheJerk) {
+  const auto torque = [](const SessionLog& entry) -> ArrayXd {
+    const ProcessedLog& log = entry.log;
+    const ArrayXd jerk = differentiate(log.motion(0, log.samples()).ddq.col(1), log.step_s).array();
+    return 2 * jerk / jerk.abs().maxCoeff();
+  };
+  const auto own = evidence_on(torque, {test::named_effect("presliding", {0.02}, {-1})});
+  EXPECT_LT(own[0].form, 0.5);
+  EXPECT_GT(own[0].curve_gain, 100);
 }
 
 // The inertia of a joint that carries one link is the same in every position. Seen through a gear that bends, it may do
