@@ -103,16 +103,26 @@ double left_at(const Outcome& outcome, const Gate& gate, std::size_t joint, cons
 
 }  // namespace
 
-void doubt_beside_more(Outcome& outcome, const Gate& gate, const Curves& curves) {
+void doubt_beside_more(Outcome& outcome, const Gate& gate, const Curves& curves, std::vector<Likely>& likely) {
   const double least = outcome.models.options.gate.least_closure;
+  const auto closed = [&](Index j) { return std::max(gate.held.before[j] - gate.held.after[j], 0.0); };
+  const auto there = [&](std::size_t joint) {
+    return closed(static_cast<Index>(joint)) + left_at(outcome, gate, joint, curves[joint]);
+  };
+  // A part that is not the larger one is what a larger effect of another form leaves, sooner than an effect.
+  const auto smaller_part = [&](const Finding& finding) {
+    const auto j = static_cast<Index>(finding.id.joint);
+    return finding.evidence.closure * gate.gap[j] < least * std::max(gate.gap[j], there(finding.id.joint));
+  };
   for (Finding& finding : outcome.found) {
+    Certainty& certainty = finding.evidence.certainty;
+    if (finding.id.body) continue;
     const std::size_t joint = finding.id.joint;
-    const auto j = static_cast<Index>(joint);
-    if (finding.id.body || finding.evidence.certainty != Certainty::established) continue;
-    const double closed = std::max(gate.held.before[j] - gate.held.after[j], 0.0);
-    if (closed < least * (closed + left_at(outcome, gate, joint, curves[joint])))
-      finding.evidence.certainty = Certainty::likely;
+    const bool more_left = closed(static_cast<Index>(joint)) < least * there(joint);
+    const bool doubted = certainty == Certainty::established ? more_left : smaller_part(finding);
+    if (doubted) certainty = Certainty::unlisted;
   }
+  std::erase_if(likely, [&](const Likely& one) { return !one.finding.id.body && smaller_part(one.finding); });
 }
 
 namespace {

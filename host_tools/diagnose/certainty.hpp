@@ -25,11 +25,20 @@ double new_since_baseline(Linearised& problem, const std::vector<std::size_t>& g
 /// What speaks for each finding, with all of them in the model.
 void weigh_evidence(Outcome& outcome, const Gate& gate);
 
-/// Where names close less of their joint's gap than is left of it, and that is no noise (structure, what a curve
-/// closes, or 95 % sure by left_of()), they may resemble what is left: none of them is established. What is there stays
-/// in the model.
+/// An effect that is not sure enough for the model.
+struct Likely {
+  Finding finding;  ///< its id tells the joint
+  EffectFit fit;
+  std::vector<std::size_t> joints;  ///< an effect on the robot: those that feel it, from 0
+};
+
+/// Where names close less of their joint's gap than is left of it, and that is no noise (structure, or what a curve
+/// closes), they may resemble what is left: none of them is listed. Nor is a likely one that is not the larger part of
+/// what is at its joint: sooner than an effect it is what a larger one leaves, whose form is another than its name's.
+/// What is there stays in the model.
 /// @param curves of what is left, by joint; those of time were taken off the logs before they judged
-void doubt_beside_more(Outcome& outcome, const Gate& gate, const Curves& curves);
+/// @param likely loses such, too
+void doubt_beside_more(Outcome& outcome, const Gate& gate, const Curves& curves, std::vector<Likely>& likely);
 
 /// What a model was before the search, and what the search may do.
 struct Retrial {
@@ -63,13 +72,6 @@ void search_again(const std::vector<EffectCandidate>& before, Outcome& outcome, 
 /// @param outcome, gate with evidence; what they become has it too
 /// @returns whether a rival took a place
 bool settle_rivals(Outcome& outcome, Gate& gate, const Retrial& retrial, Progress& progress);
-
-/// An effect that is not sure enough for the model.
-struct Likely {
-  Finding finding;  ///< its id tells the joint
-  EffectFit fit;
-  std::vector<std::size_t> joints;  ///< an effect on the robot: those that feel it, from 0
-};
 
 /// Weighs the evidence, takes all that is not there for sure out of the model, fits the rest again and judges it, until
 /// nothing goes.

@@ -136,7 +136,7 @@ class Diagnoser {
     }
     if (models_.has_baseline) add_notes(changed_parameters(*outcome.problem));
     const Curves curves = curves_of_the_rest(outcome, gate, still_, wandering, logs_);
-    doubt_beside_more(outcome, gate, curves);
+    doubt_beside_more(outcome, gate, curves, likely);
     mark_named(result.model, outcome);
     const auto impacts = find_impacts(result.model, data_.logs, outcome.models.healthy, baseline_, options().impact);
     result.report = verdicts({result.nominal, result.model, outcome, gate, likely, deflections_, impacts, curves,

@@ -60,26 +60,39 @@ class NameBesideMore : public testing::Test {
     gate_.held.before = Eigen::VectorXd::Constant(1, 240);
     gate_.held.after = Eigen::VectorXd::Constant(1, 200);
     gate_.held.excess = Eigen::VectorXd::Constant(1, 0);
+    gate_.gap = Eigen::VectorXd::Constant(1, 40);
     gate_.of_law = {false};
   }
-  Certainty certainty() {
-    outcome_.found = {{{false, 0, 0}, 100, {}}};
-    outcome_.found[0].evidence.certainty = Certainty::established;
-    doubt_beside_more(outcome_, gate_, curves_);
+  static Finding finding(Certainty certainty, double closure) {
+    Finding out{{false, 0, 0}, 100, {}};
+    out.evidence.certainty = certainty;
+    out.evidence.closure = closure;
+    return out;
+  }
+  Certainty certainty(Certainty before = Certainty::established, double closure = 1) {
+    outcome_.found = {finding(before, closure)};
+    doubt_beside_more(outcome_, gate_, curves_, likely_);
     return outcome_.found[0].evidence.certainty;
+  }
+  /// Whether a likely name that was taken out of the model stays listed.
+  bool stays_likely(double closure) {
+    likely_ = {{finding(Certainty::likely, closure), {}, {}}};
+    doubt_beside_more(outcome_, gate_, curves_, likely_);
+    return !likely_.empty();
   }
 
   Outcome outcome_;
   Gate gate_;
   Curves curves_ = Curves(1);
+  std::vector<Likely> likely_;
 };
 
-TEST_F(NameBesideMore, IsLikelyAtMost) {
+TEST_F(NameBesideMore, IsNotListed) {
   EXPECT_EQ(certainty(), Certainty::established);
   gate_.held.excess[0] = 39;
   EXPECT_EQ(certainty(), Certainty::established);
   gate_.held.excess[0] = 41;
-  EXPECT_EQ(certainty(), Certainty::likely);
+  EXPECT_EQ(certainty(), Certainty::unlisted);
 }
 
 TEST_F(NameBesideMore, IsEstablishedWhereTheRestIsNoiseOrTheErrorOfALaw) {
@@ -98,7 +111,7 @@ TEST_F(NameBesideMore, CountsWhatWandersThoughItWasTakenOff) {
   curves_[0]->closes = 0.16;  // of 200 / (1 - 0.16): 38
   EXPECT_EQ(certainty(), Certainty::established);
   curves_[0]->closes = 0.18;  // 44
-  EXPECT_EQ(certainty(), Certainty::likely);
+  EXPECT_EQ(certainty(), Certainty::unlisted);
 }
 
 TEST_F(NameBesideMore, CountsWhatACurveOfTheMotionCloses) {
@@ -108,7 +121,23 @@ TEST_F(NameBesideMore, CountsWhatACurveOfTheMotionCloses) {
   curves_[0]->closes = 0.18;  // of 200: 36
   EXPECT_EQ(certainty(), Certainty::established);
   curves_[0]->closes = 0.22;
-  EXPECT_EQ(certainty(), Certainty::likely);
+  EXPECT_EQ(certainty(), Certainty::unlisted);
+}
+
+TEST_F(NameBesideMore, IsLikelyOnlyAsTheLargerPart) {
+  EXPECT_EQ(certainty(Certainty::established, 0.1), Certainty::established);
+  EXPECT_EQ(certainty(Certainty::likely, 0.6), Certainty::likely);
+  EXPECT_EQ(certainty(Certainty::likely, 0.4), Certainty::unlisted);
+  EXPECT_TRUE(stays_likely(0.6));
+  EXPECT_FALSE(stays_likely(0.4));
+  gate_.held.excess[0] = 20;  // 60 are there
+  gate_.gap[0] = 60;
+  EXPECT_TRUE(stays_likely(0.6));
+  curves_[0].emplace();
+  curves_[0]->signal = "t";
+  curves_[0]->closes = 0.16;  // 38 more, which the gap has lost
+  EXPECT_FALSE(stays_likely(0.6));
+  EXPECT_TRUE(stays_likely(0.9));
 }
 
 TEST(LeftOver, IsTheExcessWithAnIntervalFromItsStretches) {
