@@ -80,7 +80,8 @@ void weigh_evidence(Outcome& outcome, const Gate& gate) {
     if (finding.rival) evidence.against_rival = finding.rival->gain / variances_per_decade;
     evidence.deviations = off_nothing[i];
     const auto j = static_cast<Index>(group.candidate.joint);
-    const double share = gate.gap[j] > 0 ? gate.held.alone[i][j] / gate.gap[j] : 0;
+    evidence.gain = gate.held.alone[i][j];
+    const double share = gate.gap[j] > 0 ? evidence.gain / gate.gap[j] : 0;
     evidence.closure = group.on_body ? gate.robot_closure[i] : share;
     const double form = group.on_body                   ? std::max(gate.robot_closure[i], gate.robot_form[i])
                         : gate.own[i].is_stack(options) ? 0.0  // something else is there
@@ -106,21 +107,21 @@ double left_at(const Outcome& outcome, const Gate& gate, std::size_t joint, cons
 void doubt_beside_more(Outcome& outcome, const Gate& gate, const Curves& curves, std::vector<Likely>& likely) {
   const double least = outcome.models.options.gate.least_closure;
   const auto closed = [&](Index j) { return std::max(gate.held.before[j] - gate.held.after[j], 0.0); };
-  const auto there = [&](std::size_t joint) {
+  const auto all_at = [&](std::size_t joint) {
     return closed(static_cast<Index>(joint)) + left_at(outcome, gate, joint, curves[joint]);
   };
   // A part that is not the larger one is what a larger effect of another form leaves, sooner than an effect.
   const auto smaller_part = [&](const Finding& finding) {
-    const auto j = static_cast<Index>(finding.id.joint);
-    return finding.evidence.closure * gate.gap[j] < least * std::max(gate.gap[j], there(finding.id.joint));
+    const double gap = gate.gap[static_cast<Index>(finding.id.joint)];
+    return finding.evidence.gain < least * std::max({finding.evidence.gain, gap, all_at(finding.id.joint)});
   };
   for (Finding& finding : outcome.found) {
     Certainty& certainty = finding.evidence.certainty;
     if (finding.id.body) continue;
     const std::size_t joint = finding.id.joint;
-    const bool more_left = closed(static_cast<Index>(joint)) < least * there(joint);
-    const bool doubted = certainty == Certainty::established ? more_left : smaller_part(finding);
-    if (doubted) certainty = Certainty::unlisted;
+    if (certainty == Certainty::likely && smaller_part(finding)) certainty = Certainty::unlisted;
+    const bool more_left = closed(static_cast<Index>(joint)) < least * all_at(joint);
+    if (certainty == Certainty::established && more_left) certainty = Certainty::likely;
   }
   std::erase_if(likely, [&](const Likely& one) { return !one.finding.id.body && smaller_part(one.finding); });
 }

@@ -33,9 +33,9 @@ struct Likely {
 };
 
 /// Where names close less of their joint's gap than is left of it, and that is no noise (structure, or what a curve
-/// closes), they may resemble what is left: none of them is listed. Nor is a likely one that is not the larger part of
-/// what is at its joint: sooner than an effect it is what a larger one leaves, whose form is another than its name's.
-/// What is there stays in the model.
+/// closes), they may resemble what is left: none of them is established. One that was only likely before has to be the
+/// larger part of what is at its joint: sooner than an effect it is what a larger one leaves, whose form is another
+/// than its name's. What is there stays in the model.
 /// @param curves of what is left, by joint; those of time were taken off the logs before they judged
 /// @param likely loses such, too
 void doubt_beside_more(Outcome& outcome, const Gate& gate, const Curves& curves, std::vector<Likely>& likely);

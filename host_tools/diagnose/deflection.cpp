@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "host_tools/diagnose/deflection_fit.hpp"
@@ -258,6 +259,33 @@ Deflections find_deflections(const IdentifiedModel& model, const MatrixXd& base_
     out.found.insert(out.found.end(), found[j].found.begin(), found[j].found.end());
     out.unexplained.insert(out.unexplained.end(), found[j].unexplained.begin(), found[j].unexplained.end());
     background.insert(background.end(), learned[j].begin(), learned[j].end());
+  }
+  return out;
+}
+
+std::vector<DeflectionEffect> at_joint(const Deflections& all, std::size_t joint) {
+  std::vector<DeflectionEffect> out;
+  for (const DeflectionEffect& effect : all.found) {
+    if (effect.joint == joint) out.push_back(effect);
+  }
+  std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.fit.effect < b.fit.effect; });
+  return out;
+}
+
+Refitted take_where_better(const Deflections& before, const Deflections& again, std::size_t joints,
+                           const DeflectionOptions& options) {
+  const auto closes = [](const std::vector<DeflectionEffect>& all) {
+    return std::accumulate(all.begin(), all.end(), 0.0,
+                           [](double sum, const DeflectionEffect& effect) { return sum + effect.closure; });
+  };
+  Refitted out;
+  for (std::size_t j = 0; j < joints; ++j) {
+    const auto now = at_joint(again, j), was = at_joint(before, j);
+    const bool same = std::equal(now.begin(), now.end(), was.begin(), was.end(),
+                                 [](const auto& a, const auto& b) { return a.fit.effect == b.fit.effect; });
+    const bool better = same && !was.empty() && closes(now) >= closes(was) - options.lost_closure;
+    std::vector<DeflectionEffect>& to = better ? out.taken.found : out.kept.found;
+    to.insert(to.end(), better ? now.begin() : was.begin(), better ? now.end() : was.end());
   }
   return out;
 }

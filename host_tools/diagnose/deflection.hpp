@@ -41,4 +41,15 @@ Deflections find_deflections(const IdentifiedModel& model, const Eigen::MatrixXd
                              const std::vector<ProcessedLog>& now, const std::vector<ProcessedLog>& before,
                              std::vector<DeflectionEffect>& background, const DeflectionOptions& options);
 
+/// What was found at a joint, by name.
+std::vector<DeflectionEffect> at_joint(const Deflections& all, std::size_t joint);
+
+/// What was found with one load and with another, joint by joint.
+struct Refitted {
+  Deflections taken;  ///< of the later one, where it is the same set of effects and closes at most `lost_closure` less
+  Deflections kept;   ///< of the former, where it is not
+};
+Refitted take_where_better(const Deflections& before, const Deflections& again, std::size_t joints,
+                           const DeflectionOptions& options);
+
 }  // namespace fxdyn::diagnosis

@@ -4,8 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <memory>
 #include <optional>
+#include <utility>
 
 #include "host_tools/diagnose/certainty.hpp"
 #include "host_tools/diagnose/changes.hpp"
@@ -22,6 +23,7 @@
 #include "host_tools/diagnose/refit.hpp"
 #include "host_tools/diagnose/sessions.hpp"
 #include "host_tools/diagnose/verdict.hpp"
+#include "host_tools/diagnose/windows.hpp"
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/effects/identified_model.hpp"
 #include "host_tools/identify/estimate.hpp"
@@ -64,6 +66,8 @@ class Diagnoser {
     // A change beside a baseline is something or other; without one every joint may lack all that it is asked for.
     task_.settings.most = 4 + joints() * (models_.has_baseline ? 1 : task_.settings.max_effects);
     logs_ = sessions(data_.logs, baseline_, session_, options.session);
+    if (std::vector<ProcessedLog> windows = windows_as_recorded(data_.logs, logs_, options.session); !windows.empty())
+      windows_ = with_other_logs(data_, std::move(windows));
     add_notes(note_of_windows(logs_, options.session));
     for (std::size_t j = 0; j < joints(); ++j) {
       if (!still_[j]) continue;
@@ -76,13 +80,12 @@ class Diagnoser {
   Diagnosis run() {
     check_lengths(logs_, options().session);
     note_who_judges();
+    std::optional<ParkedColumns> parked;
+    if (windows_) parked.emplace(data_.logs);  // nothing looks at the whole logs until all is settled
     if (models_.has_baseline) {
-      ParkedColumns parked(data_.logs);
       learn_baseline();
-      parked.take_back();
     } else {
-      models_.current = nominal_model(project_, data_, false, progress_);
-      give_back_memory();
+      models_.current = nominal();
       mute(logs_, models_.current, still_, options().session);
       look_at_links(models_.current, logs_);
     }
@@ -102,7 +105,7 @@ class Diagnoser {
       before = models_;
       refit(before, logs_, plain(), 8);
     }
-    add_notes(check_judges(before.current, data_.logs, still_, options().session));
+    add_notes(check_judges(before.current, fitted().logs, still_, options().session));
     add_notes(check_judges(before.current, test_, still_, options().session));
     if (deflections_.found.empty()) {
       models_ = before;
@@ -116,14 +119,12 @@ class Diagnoser {
     add_deviations(before, Linearised(before, logs_));
     result.nominal = before.current;
     Gate gate;
-    ParkedColumns parked(data_.logs);
     Outcome outcome = found_effects(start, gate);
     // What wanders may have got the name of an effect, and hides others.
     const Curves wandering = take_off_what_wanders(outcome, gate, still_, logs_);
     if (is_any(wandering)) search_without(start, outcome, gate);
     std::vector<Likely> likely;
     set_aside(outcome, gate, models_.current, logs_, still_, likely);
-    parked.take_back();
     result.nominal = finished(result.nominal);
     const IdentifiedModel judged_against = deflections_.found.empty() ? result.nominal : finished(models_.current);
     result.model = concluded(outcome, gate);
@@ -138,16 +139,19 @@ class Diagnoser {
     const Curves curves = curves_of_the_rest(outcome, gate, still_, wandering, logs_);
     doubt_beside_more(outcome, gate, curves, likely);
     mark_named(result.model, outcome);
-    const auto impacts = find_impacts(result.model, data_.logs, outcome.models.healthy, baseline_, options().impact);
-    result.report = verdicts({result.nominal, result.model, outcome, gate, likely, deflections_, impacts, curves,
-                              still_, data_.logs, test_});
-    take_curves(outcome, result);
-    for (std::size_t j = 0; j < joints(); ++j) {
-      // What stands still has no friction that these logs show.
-      if (!still_[j]) continue;
-      result.model.joints[j].effects.clear();
-      result.nominal.joints[j].effects.clear();
+    const std::vector<EffectId> judged = judged_by(gate, *outcome.problem);
+    const std::vector<double> doubtful = doubtful_shares(*outcome.problem);
+    if (windows_) {  // the whole logs come back: what was searched goes, which is as large
+      outcome.put_down();
+      for (SessionLog& log : logs_) log.cache = std::make_shared<RowCache>();
+      parked->take_back();
     }
+    const auto impacts = find_impacts(result.model, data_.logs, outcome.models.healthy, baseline_, options().impact);
+    result.report = verdicts({result.nominal, result.model, outcome, gate, judged, doubtful, likely, deflections_,
+                              impacts, curves, still_, data_.logs, test_});
+    take_curves(outcome, result);
+    clear_still_joints(result.model);
+    clear_still_joints(result.nominal);
     add_notes(result.report.notes);
     result.report.notes = notes_;
     return result;
@@ -155,6 +159,11 @@ class Diagnoser {
   const std::vector<std::string>& notes() const { return notes_; }
 
  private:
+  /// What stands still has no friction that these logs show.
+  void clear_still_joints(IdentifiedModel& model) const {
+    for (std::size_t j = 0; j < joints(); ++j)
+      if (still_[j]) model.joints[j].effects.clear();
+  }
   Retrial retrial() const { return {models_.current, logs_, still_, task_}; }
   void note_who_judges() {
     const auto judges = [](const ProcessedLog& log) { return log.role == Role::validate; };
@@ -163,12 +172,12 @@ class Diagnoser {
                        "; other trajectories would judge better");
     }
   }
-  IdentifiedModel finished(const IdentifiedModel& model) const {
+  IdentifiedModel finished(const IdentifiedModel& model) {
     const bool moves = std::find(still_.begin(), still_.end(), true) == still_.end();
-    return finish_ && moves ? finish_(model, data_.logs) : model;
+    return finish_ && moves ? finish_(model, fitted().logs) : model;
   }
   /// The model of what passed the gate.
-  IdentifiedModel concluded(Outcome& outcome, const Gate& gate) const {
+  IdentifiedModel concluded(Outcome& outcome, const Gate& gate) {
     Models& found = outcome.models;
     if (gate.groups.empty() && deflections_.found.empty()) {
       back_to_start(outcome, models_, logs_);
@@ -190,7 +199,9 @@ class Diagnoser {
   /// @param start for faults of the recordings
   Outcome found_effects(const Models& start, Gate& gate) {
     Outcome outcome = explore(models_, logs_, task_, 2, progress_);
-    refuse_faulty_recordings(start, outcome);
+    ParkedColumns parked(outcome.features);
+    if (const auto fault = likely_recording_fault(start, logs_, outcome)) throw DataError(fault->complaint);
+    parked.take_back();
     std::optional<Outcome> released = with_free_background(outcome, logs_);
     const std::vector<EffectCandidate> named = named_in(outcome);
     gate = pass(outcome, models_.current, logs_, still_);
@@ -222,7 +233,7 @@ class Diagnoser {
     return out.size() > 0 ? out : judged_error(models, logs_);
   }
   /// The model has the curves that are told of, where the data that judge confirm them.
-  void take_curves(const Outcome& outcome, Diagnosis& result) const {
+  void take_curves(const Outcome& outcome, Diagnosis& result) {
     if (task_.settings.max_effects == 0) return;  // the BLS is to learn what is left
     std::vector<JointDiagnosis>& told = result.report.joints;
     std::vector<bool> without = still_;
@@ -256,10 +267,6 @@ class Diagnoser {
       for (const FreeCurve& curve : curves) told[curve.effect.joint].curve->in_model = true;
       return;
     }
-  }
-  /// A fault of the recording would get the name of an effect.
-  void refuse_faulty_recordings(const Models& nominal, const Outcome& outcome) const {
-    if (const auto fault = likely_recording_fault(nominal, logs_, outcome)) throw DataError(fault->complaint);
   }
   std::size_t joints() const { return project_.robot.size(); }
   bool is_worse_anywhere(const IdentifiedModel& before, const IdentifiedModel& after) const {
@@ -328,14 +335,6 @@ class Diagnoser {
   /// closes less on the data that judge, stays as it was.
   bool refit_links(Outcome& outcome) {
     if (deflections_.found.empty() || outcome.found.empty()) return false;
-    const auto at_joint = [](const Deflections& all, std::size_t joint) {
-      std::vector<DeflectionEffect> out;
-      for (const DeflectionEffect& effect : all.found) {
-        if (effect.joint == joint) out.push_back(effect);
-      }
-      std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.fit.effect < b.fit.effect; });
-      return out;
-    };
     // Which part of the inertia is the rotor's is found anew where the deflection separates it.
     const auto without_rotors = [&](Models models, const Deflections& seen, std::vector<EffectId>& ids) {
       for (const DeflectionEffect& effect : seen.found) {
@@ -350,19 +349,7 @@ class Diagnoser {
     std::vector<DeflectionEffect> already;
     const Deflections again = find_deflections(asked.current, base_covariance(Linearised(asked, logs_)), data_.logs,
                                                baseline_, already, options().deflection);
-    Deflections taken, kept;
-    for (std::size_t j = 0; j < joints(); ++j) {
-      const auto now = at_joint(again, j), was = at_joint(deflections_, j);
-      const auto closes = [](const std::vector<DeflectionEffect>& all) {
-        return std::accumulate(all.begin(), all.end(), 0.0,
-                               [](double sum, const DeflectionEffect& effect) { return sum + effect.closure; });
-      };
-      const bool same = std::equal(now.begin(), now.end(), was.begin(), was.end(),
-                                   [](const auto& a, const auto& b) { return a.fit.effect == b.fit.effect; });
-      const bool better = same && !was.empty() && closes(now) >= closes(was) - options().deflection.lost_closure;
-      taken.found.insert(taken.found.end(), now.begin(), better ? now.end() : now.begin());
-      kept.found.insert(kept.found.end(), was.begin(), better ? was.begin() : was.end());
-    }
+    auto [taken, kept] = take_where_better(deflections_, again, joints(), options().deflection);
     if (taken.found.empty()) return false;
     Deflections replaced;  // where the old rotor goes
     for (const DeflectionEffect& effect : deflections_.found) {
@@ -386,6 +373,16 @@ class Diagnoser {
     outcome.look_again(logs_);
     return true;
   }
+
+  /// Without a baseline. It is fitted again on what is searched, so that of long logs it needs no more.
+  IdentifiedModel nominal() {
+    IdentifiedModel out = nominal_model(project_, fitted(), false, progress_);
+    if (windows_) data_.notes.insert(data_.notes.end(), windows_->notes.begin(), windows_->notes.end());
+    give_back_memory();
+    return out;
+  }
+  /// Train and validate logs at the rate of the fit, of long ones windows.
+  GateData& fitted() { return windows_ ? *windows_ : data_; }
 
   /// @throws DataError that names the baseline
   IdentifiedModel healthy_model(const Project& project, GateData& healthy) const {
@@ -461,6 +458,7 @@ class Diagnoser {
   SearchTask task_;
   std::optional<Session> session_;
   std::vector<SessionLog> logs_;
+  std::optional<GateData> windows_;  ///< of train and validate logs that are not searched whole; none: all are
   Deflections deflections_;
   std::vector<DeflectionEffect> bent_already_;
   std::vector<std::string> notes_;

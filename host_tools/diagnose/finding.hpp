@@ -26,7 +26,8 @@ struct Evidence {
   double against_nothing = 0;
   std::optional<double> against_rival{};  ///< none: nothing else comes near
   double deviations = 0;                  ///< standard deviations by which its coefficients are off nothing
-  double closure = 0;                     ///< share of the gap that comes back without it
+  double gain = 0;                        ///< noise variances that come back without it, at its joint
+  double closure = 0;                     ///< .. as a share of the gap
   bool there = false;      ///< something like it is there for sure: the model keeps it, whatever its name
   bool undecided = false;  ///< .. its form holds, and that of its rival as well
   Certainty certainty = Certainty::unlisted;

@@ -18,9 +18,8 @@ bool is_validate(const ProcessedLog& log) { return log.role == Role::validate; }
 
 }  // namespace
 
-VectorXd error_of(const ProcessedLog& log, const MatrixXd& torque, std::size_t joint) {
-  const auto j = static_cast<Index>(joint);
-  return log.filter_columns(log.tau.col(j) - torque.col(j)).col(0);
+VectorXd error_of(const ProcessedLog& log, const Eigen::Ref<const VectorXd>& torque, std::size_t joint) {
+  return log.filter_columns(log.tau.col(static_cast<Index>(joint)) - torque).col(0);
 }
 
 GapErrors::GapErrors(const Conclusion& conclusion) : conclusion_(conclusion) {
@@ -52,8 +51,9 @@ void GapErrors::sum_up(Set& set) const {
       const MatrixXd torque = predict(model, log);
       VectorXd out(torque.cols());
       for (Index j = 0; j < out.size(); ++j)
-        out[j] =
-            error_of(log, torque, static_cast<std::size_t>(j)).segment(log.first, log.last - log.first).squaredNorm();
+        out[j] = error_of(log, torque.col(j), static_cast<std::size_t>(j))
+                     .segment(log.first, log.last - log.first)
+                     .squaredNorm();
       return out;
     };
     set.before[l] = squares(conclusion_.nominal);

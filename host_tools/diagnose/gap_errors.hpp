@@ -8,8 +8,8 @@
 
 namespace fxdyn::diagnosis {
 
-/// Filtered error of a joint over a log, full rate [N*m | N]. @param torque of a model, of all joints
-Eigen::VectorXd error_of(const ProcessedLog& log, const Eigen::MatrixXd& torque, std::size_t joint);
+/// Filtered error of a joint over a log, full rate [N*m | N]. @param torque of a model, of that joint
+Eigen::VectorXd error_of(const ProcessedLog& log, const Eigen::Ref<const Eigen::VectorXd>& torque, std::size_t joint);
 
 /// RMS errors of a joint [N*m | N]: of the model before and with what was found.
 struct GapFigures {

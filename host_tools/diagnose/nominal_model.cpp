@@ -1,5 +1,7 @@
 #include "host_tools/diagnose/nominal_model.hpp"
 
+#include <utility>
+
 #include "host_tools/effects/effects.hpp"
 #include "host_tools/identify/estimate.hpp"
 
@@ -18,10 +20,10 @@ double lead_beside_effects(Project project, GateData& data, Progress& progress) 
 
 }  // namespace
 
-GateData with_other_logs(const GateData& data, const std::vector<ProcessedLog>& logs) {
+GateData with_other_logs(const GateData& data, std::vector<ProcessedLog> logs) {
   GateData out;
   out.filter = data.filter;
-  out.logs = logs;
+  out.logs = std::move(logs);
   out.references = data.references;
   out.largest_torque = data.largest_torque;
   out.q_lower = data.q_lower;

@@ -12,6 +12,6 @@ namespace fxdyn::diagnosis {
 IdentifiedModel nominal_model(Project project, GateData& data, bool healthy, Progress& progress);
 
 /// What is known of the train logs, with other logs in their place: those may fill the memory.
-GateData with_other_logs(const GateData& data, const std::vector<ProcessedLog>& logs);
+GateData with_other_logs(const GateData& data, std::vector<ProcessedLog> logs);
 
 }  // namespace fxdyn::diagnosis

@@ -35,7 +35,7 @@ struct SessionLog {
   bool fits = true;        ///< else it judges only (validate)
   double age_s = 0;        ///< of the session when the log begins: what drifts has drifted so far
   double bending_hz = 0;   ///< gears bend by the load of the motion below; 0: of all of it
-  bool continues = false;  ///< a later window of the same recording as the log before (in_windows())
+  bool window = false;     ///< of a longer recording (in_windows())
   std::shared_ptr<RowCache> cache = std::make_shared<RowCache>();
 };
 

@@ -23,6 +23,7 @@
 namespace fxdyn::diagnosis {
 namespace {
 
+using Eigen::ArrayXd;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -190,8 +191,7 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
 }
 
 std::vector<std::string> note_of_windows(const std::vector<SessionLog>& logs, const SessionOptions& options) {
-  const auto is_window = [](const SessionLog& entry) { return entry.continues || entry.log.ran_s > 0; };
-  const auto windows = std::count_if(logs.begin(), logs.end(), is_window);
+  const auto windows = std::count_if(logs.begin(), logs.end(), [](const SessionLog& entry) { return entry.window; });
   if (windows == 0) return {};
   return {
       fmt::format("the logs are longer than the search for effects needs: it looks at {} windows of {:g} s, spread "
@@ -363,21 +363,27 @@ std::vector<std::string> check_judges(const IdentifiedModel& model, const std::v
                                       const std::vector<bool>& still, const SessionOptions& options) {
   const double factor = options.other_units_factor;
   std::vector<std::string> notes;
-  for (const ProcessedLog& log : logs) {
+  ArrayXd xy, xx, yy;  // of a recording: model with measurement, model, measurement
+  for (std::size_t l = 0; l < logs.size(); ++l) {
+    const ProcessedLog& log = logs[l];
     if (log.role != Role::validate && log.role != Role::test) continue;
     const MatrixXd ours = log.filter_columns(predict(model, log)), theirs = log.filter_columns(log.tau);
-    const Index count = log.last - log.first;
+    if (!log.continues) xy = xx = yy = ArrayXd::Zero(ours.cols());
+    const auto x = ours.middleRows(log.first, log.last - log.first).array();
+    const auto y = theirs.middleRows(log.first, log.last - log.first).array();
+    xy += (x * y).colwise().sum().transpose();
+    xx += x.square().colwise().sum().transpose();
+    yy += y.square().colwise().sum().transpose();
+    if (l + 1 < logs.size() && logs[l + 1].continues) continue;
     std::size_t judged = 0, odd = 0;
     double last = 1;
     for (std::size_t j = 0; j < still.size(); ++j) {
       if (still[j]) continue;
       ++judged;
       const auto k = static_cast<Index>(j);
-      const auto x = ours.col(k).segment(log.first, count), y = theirs.col(k).segment(log.first, count);
-      const double xy = x.dot(y), xx = x.squaredNorm(), yy = y.squaredNorm();
-      const double times = xy / std::max(xx, 1e-300);
+      const double times = xy[k] / std::max(xx[k], 1e-300);
       const bool scaled = times < 1 / factor || times > factor;
-      if (!scaled || xy * xy < options.other_units * xx * yy) continue;
+      if (!scaled || xy[k] * xy[k] < options.other_units * xx[k] * yy[k]) continue;
       ++odd;
       last = times;
       notes.push_back(

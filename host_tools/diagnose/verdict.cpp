@@ -46,8 +46,8 @@ class ReportWriter {
  public:
   explicit ReportWriter(const Conclusion& conclusion)
       : conclusion_(conclusion),
-        problem_(*conclusion.outcome.problem),
-        report_(conclusion.outcome.models.options.report),
+        options_(conclusion.outcome.models.options),
+        report_(options_.report),
         errors_(conclusion) {}
 
   DiagnosisResult all() {
@@ -65,8 +65,9 @@ class ReportWriter {
     for (const std::string& effect : conclusion_.outcome.not_identifiable.back()) {
       // What of a load or a tilt is not part of the base parameters, the poses show.
       advise(fmt::format("{}: {}", effect,
-                         problem_.has_baseline() ? "other poses and loads"
-                                                 : "the same motions recorded without it (role = \"baseline\")"));
+                         conclusion_.outcome.models.has_baseline
+                             ? "other poses and loads"
+                             : "the same motions recorded without it (role = \"baseline\")"));
     }
     std::vector<Verdict> of_joints;
     for (const JointDiagnosis& joint : out.joints) of_joints.push_back(joint.verdict);
@@ -78,7 +79,7 @@ class ReportWriter {
     out.next_experiment = next_;
     out.gate = gate_of(conclusion_.now);
     out.figures_on = errors_.figures_on();
-    out.baseline = problem_.has_baseline();
+    out.baseline = conclusion_.outcome.models.has_baseline;
     out.notes = notes_;
     return out;
   }
@@ -215,7 +216,7 @@ class ReportWriter {
     out.score = seen.score;
     // The score is twice the logarithm of a Bayes factor.
     out.odds_nothing = seen.score / (2 * std::numbers::ln10);
-    out.established = out.odds_nothing >= problem_.options().gate.established;
+    out.established = out.odds_nothing >= options_.gate.established;
     if (seen.held_out) out.held_out_closure = seen.closure;
     out.signal = "q - qlink";
     out.model_share = model_share(seen.joint, static_cast<std::size_t>(place - joint.effects.begin()));
@@ -261,7 +262,7 @@ class ReportWriter {
   }
 
   void note_doubtful_direction(std::size_t j) {
-    const double doubtful = problem_.noise().doubtful_share(j);
+    const double doubtful = conclusion_.doubtful[j];
     if (doubtful <= report_.much_doubt) return;
     const double step = conclusion_.now.front().filter.encoder_step[j];
     const bool lost = std::any_of(conclusion_.now.begin(), conclusion_.now.end(), [&](const ProcessedLog& log) {
@@ -300,10 +301,15 @@ class ReportWriter {
              (f.id.body ? is_felt(f.id, j) : f.id.joint == j);
     });
   }
+  /// In the gate; the number of what it judged: it has none.
+  std::size_t place_at_gate(const EffectId& id) const {
+    const std::vector<EffectId>& all = conclusion_.judged;
+    return static_cast<std::size_t>(std::find(all.begin(), all.end(), id) - all.begin());
+  }
   bool is_felt(const EffectId& on_robot, std::size_t j) const {
-    const Gate& gate = conclusion_.gate;
-    const std::size_t i = gate.place(problem_, on_robot);
-    return i < gate.groups.size() && gate.held.alone[i][static_cast<Index>(j)] > problem_.options().gate.least_gain;
+    const std::size_t i = place_at_gate(on_robot);
+    return i < conclusion_.judged.size() &&
+           conclusion_.gate.held.alone[i][static_cast<Index>(j)] > options_.gate.least_gain;
   }
 
   JointDiagnosis moving(std::size_t j) {
@@ -407,8 +413,8 @@ class ReportWriter {
     }
     for (const ProcessedLog& log : conclusion_.now) {
       logs.push_back(&log);
-      loads.emplace_back(predict(rigid, log).col(static_cast<Index>(j)));
-      errors.push_back(error_of(log, predict(conclusion_.nominal, log), j));
+      loads.push_back(predict_joint(rigid, log, j));
+      errors.push_back(error_of(log, predict_joint(conclusion_.nominal, log, j), j));
     }
     std::optional<GapRegion> of_curve;
     if (curve) of_curve = place_of(*curve);
@@ -417,10 +423,10 @@ class ReportWriter {
 
   /// Whether a named effect on the robot is felt at a joint.
   bool robot_reaches(Index joint) const {
-    for (std::size_t i = 0; i < conclusion_.gate.groups.size(); ++i) {
-      const Group& group = problem_.groups()[conclusion_.gate.groups[i]];
-      if (group.on_body && body_of(conclusion_.model)[group.id.effect].named &&
-          conclusion_.gate.held.alone[i][joint] > problem_.options().gate.least_gain)
+    for (std::size_t i = 0; i < conclusion_.judged.size(); ++i) {
+      const EffectId& id = conclusion_.judged[i];
+      if (id.body && body_of(conclusion_.model)[id.effect].named &&
+          conclusion_.gate.held.alone[i][joint] > options_.gate.least_gain)
         return true;
     }
     return false;
@@ -428,7 +434,6 @@ class ReportWriter {
 
   std::vector<NamedEffect> of_robot(std::vector<std::vector<std::string>>& open) {
     std::vector<NamedEffect> robot;
-    const Gate& gate = conclusion_.gate;
     for (std::size_t e = 0; e < body_of(conclusion_.model).size(); ++e) {
       const EffectId id{true, 0, e};
       const Finding* finding = finding_of(id);
@@ -436,11 +441,9 @@ class ReportWriter {
       if (finding->evidence.undecided) open.push_back(undecided(body_of(conclusion_.model)[e], *finding));
       if (finding->evidence.certainty == Certainty::unlisted) continue;
       NamedEffect one = named(body_of(conclusion_.model)[e], *finding);
-      const std::size_t i = gate.place(problem_, id);
       one.joints.emplace();
       for (std::size_t j = 0; j < joints_of(conclusion_.model).size(); ++j) {
-        if (gate.held.alone[i][static_cast<Index>(j)] > problem_.options().gate.least_gain)
-          one.joints->push_back(j + 1);
+        if (is_felt(id, j)) one.joints->push_back(j + 1);
       }
       one.model_share = body_share(e);
       robot.push_back(std::move(one));
@@ -456,7 +459,7 @@ class ReportWriter {
   }
 
   const Conclusion& conclusion_;
-  const Linearised& problem_;
+  const Options& options_;
   const ReportOptions& report_;
   const GapErrors errors_;
   std::string next_;
@@ -464,6 +467,18 @@ class ReportWriter {
 };
 
 }  // namespace
+
+std::vector<EffectId> judged_by(const Gate& gate, const Linearised& problem) {
+  std::vector<EffectId> out;
+  for (const std::size_t g : gate.groups) out.push_back(problem.groups()[g].id);
+  return out;
+}
+
+std::vector<double> doubtful_shares(const Linearised& problem) {
+  std::vector<double> out;
+  for (std::size_t j = 0; j < problem.joints(); ++j) out.push_back(problem.noise().doubtful_share(j));
+  return out;
+}
 
 std::string gate_of(const std::vector<ProcessedLog>& now) {
   if (std::any_of(now.begin(), now.end(), [](const ProcessedLog& log) { return log.role == Role::validate; }))

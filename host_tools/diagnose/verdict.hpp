@@ -17,8 +17,10 @@ namespace fxdyn::diagnosis {
 struct Conclusion {
   const IdentifiedModel& nominal;
   const IdentifiedModel& model;  ///< with the effects; what is not believed is not `named`
-  const Outcome& outcome;
+  const Outcome& outcome;        ///< its problem and features may have been put down
   const Gate& gate;
+  std::vector<EffectId> judged;  ///< in the gate's order
+  std::vector<double> doubtful;  ///< by joint: share of rows in which its encoder does not tell which way it moves
   const std::vector<Likely>& likely;
   const Deflections& deflections;
   const std::vector<std::optional<Impacts>>& impacts;
@@ -27,6 +29,10 @@ struct Conclusion {
   const std::vector<ProcessedLog>& now;   ///< train and validate
   const std::vector<ProcessedLog>& test;  ///< for figures only
 };
+
+/// Of a problem, for a conclusion that outlives it.
+std::vector<EffectId> judged_by(const Gate& gate, const Linearised& problem);
+std::vector<double> doubtful_shares(const Linearised& problem);
 
 /// What judged the names.
 std::string gate_of(const std::vector<ProcessedLog>& now);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "host_tools/signals/whole.hpp"
+
 namespace fxdyn::diagnosis {
 namespace {
 
@@ -68,7 +70,7 @@ bool Ranges::reach(double share, const Ranges& others) const {
 std::vector<std::vector<std::size_t>> by_recording(const std::vector<SessionLog>& logs) {
   std::vector<std::vector<std::size_t>> out;
   for (std::size_t l = 0; l < logs.size(); ++l) {
-    if (!logs[l].continues) out.emplace_back();
+    if (!logs[l].log.continues) out.emplace_back();
     out.back().push_back(l);
   }
   return out;
@@ -111,6 +113,36 @@ ProcessedLog part_of(const ProcessedLog& log, Index from, Index to, Index first,
   return out;
 }
 
+std::vector<ProcessedLog> windows_as_recorded(const std::vector<ProcessedLog>& recorded,
+                                              const std::vector<SessionLog>& logs, const SessionOptions& options) {
+  if (std::none_of(logs.begin(), logs.end(), [](const SessionLog& l) { return l.window && !l.healthy; })) return {};
+  const std::vector<std::vector<std::size_t>> windows = by_recording(logs);
+  std::vector<ProcessedLog> out;
+  for (std::size_t r = 0; r < recorded.size(); ++r) {
+    const ProcessedLog& log = recorded[r];
+    const auto sample_at = [&](double t) {
+      return std::clamp<Index>(std::lround((t - log.t[0]) / log.step_s), log.first, log.last);
+    };
+    const Index margin = std::max(log.first, whole_up(options.run_in_s / log.step_s));
+    for (const std::size_t l : windows[r]) {
+      const ProcessedLog& seen = logs[l].log;
+      if (!logs[l].window) {
+        out.push_back(log);
+        continue;
+      }
+      const Index begin = sample_at(seen.t[seen.first]);
+      const Index end = std::min(sample_at(seen.t[seen.last - 1]) + 1, log.last);
+      const Index from = std::max<Index>(0, begin - margin), to = std::min(log.samples(), end + margin);
+      out.push_back(part_of(log, from, to, begin - from, end - from));
+      out.back().continues = seen.continues;
+      // The whole log's rows may be far apart: it has many.
+      const Index searched = std::lround(static_cast<double>(seen.decimation) * seen.step_s / log.step_s);
+      out.back().decimation = std::clamp<Index>(searched, 1, log.decimation);
+    }
+  }
+  return out;
+}
+
 std::vector<std::vector<Window>> plan_windows(const std::vector<SessionLog>& logs, Index joints,
                                               const SessionOptions& options) {
   double joint_rows = 0;
@@ -141,7 +173,8 @@ std::vector<SessionLog> in_windows(const SessionLog& entry, const std::vector<Wi
     window.log = part_of(entry.log, w.from, w.to, w.first, w.last);
     window.healthy = entry.healthy;
     window.fits = entry.fits;
-    window.continues = out.size() > 1;
+    window.window = true;
+    window.log.continues = out.size() > 1;
     window.age_s = entry.age_s + window.log.ran_s - entry.log.ran_s;
     window.bending_hz = entry.bending_hz;
   }

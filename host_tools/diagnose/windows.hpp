@@ -46,6 +46,13 @@ class Ranges {
   std::array<std::array<Eigen::ArrayXd, 2>, 2> of_;  ///< by session, the healthy one second: lowest, highest
 };
 
+/// The windows of today's logs as they were recorded, neither smoothed nor thinned more: what else is fitted around
+/// what was found needs no more of a long log than the search.
+/// @param recorded train and validate logs @param logs their sessions, see sessions()
+/// @returns empty: today's logs are whole
+std::vector<ProcessedLog> windows_as_recorded(const std::vector<ProcessedLog>& recorded,
+                                              const std::vector<SessionLog>& logs, const SessionOptions& options);
+
 /// Samples [from, to) of a log. What a filter's ends or an effect's memory spoil there has to be in it, and be left
 /// out: [first, last) are the samples that count, of the part.
 ProcessedLog part_of(const ProcessedLog& log, Eigen::Index from, Eigen::Index to, Eigen::Index first,

@@ -383,21 +383,22 @@ std::optional<ModelValue> stiffened(const IdentifiedModel& model) {
 
 namespace {
 
-void add_by_blocks(double factor, const IdentifiedModel& model, const ProcessedLog& log, MatrixXd& to) {
+void add_by_blocks(double factor, const IdentifiedModel& model, const ProcessedLog& log, MatrixXd& to, Index first) {
   Predictor predictor(with_load_of(log, model), log.step_s, age_of(model, log));
   constexpr Index block = 8192;
   const double lead = model.filter.torque_lead_s / log.step_s;
   MatrixXd all, part;
-  if (lead != 0) all.resize(log.samples(), log.q.cols());
+  if (lead != 0) all.resize(log.samples(), to.cols());
   for (Index from = 0; from < log.samples(); from += block) {
     const Index count = std::min(block, log.samples() - from);
     const MotionRows motion = log.motion(from, count);
     part.resize(count, log.q.cols());
     predictor(motion.q, motion.dq, motion.ddq, part);
+    const auto asked = part.middleCols(first, to.cols());
     if (lead != 0) {
-      all.middleRows(from, count) = part;
+      all.middleRows(from, count) = asked;
     } else {
-      to.middleRows(from, count) += factor * part;
+      to.middleRows(from, count) += factor * asked;
     }
   }
   for (Index j = 0; j < all.cols(); ++j) to.col(j) += factor * at_other_times(all.col(j), lead);
@@ -405,18 +406,24 @@ void add_by_blocks(double factor, const IdentifiedModel& model, const ProcessedL
 
 }  // namespace
 
-void add_prediction(double factor, const IdentifiedModel& model, const ProcessedLog& log, MatrixXd& to) {
+void add_prediction(double factor, const IdentifiedModel& model, const ProcessedLog& log, MatrixXd& to, Index first) {
   const double cutoff = bending_hz(log);
   const auto stiff = cutoff > 0 ? stiffened(model) : std::nullopt;
-  if (!stiff) return add_by_blocks(factor, model, log, to);
-  add_by_blocks(factor, *stiff, log, to);
+  if (!stiff) return add_by_blocks(factor, model, log, to, first);
+  add_by_blocks(factor, *stiff, log, to, first);
   ProcessedLog slow = log;
   const ZeroPhaseFilter filter(cutoff, log.step_s);
   for (MatrixXd* columns : {&slow.q, &slow.measured_dq, &slow.measured_ddq}) {
     if (columns->size() > 0) *columns = filter.apply(*columns);
   }
-  add_by_blocks(factor, model, slow, to);
-  add_by_blocks(-factor, *stiff, slow, to);
+  add_by_blocks(factor, model, slow, to, first);
+  add_by_blocks(-factor, *stiff, slow, to, first);
+}
+
+VectorXd predict_joint(const IdentifiedModel& model, const ProcessedLog& log, std::size_t joint) {
+  MatrixXd tau = MatrixXd::Zero(log.samples(), 1);
+  add_prediction(1, model, log, tau, static_cast<Index>(joint));
+  return tau;
 }
 
 MatrixXd predict(const IdentifiedModel& model, const ProcessedLog& log) {

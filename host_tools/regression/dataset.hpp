@@ -22,7 +22,8 @@ struct ProcessedLog {
   std::string name;  ///< file name for messages
   Role role = Role::train;
   double from_s = 0, to_s = 0, step_s = 0;
-  double ran_s = 0;  ///< of a part of a recording: how long that had run before [s]
+  double ran_s = 0;        ///< of a part of a recording: how long that had run before [s]
+  bool continues = false;  ///< a later part of the same recording as the log before: no trajectory of its own
   Eigen::VectorXd t;
   Eigen::MatrixXd q;                          ///< filtered at the position cut-off
   Eigen::MatrixXd measured_dq, measured_ddq;  ///< likewise; empty: differentiated from q
@@ -122,8 +123,11 @@ std::optional<ModelValue> stiffened(const IdentifiedModel& model);
 /// samples x joints [N*m | N]. What gears bend by follows the motion below bending_hz(), the rest all of it.
 Eigen::MatrixXd predict(const IdentifiedModel& model, const ProcessedLog& log);
 /// The same times a factor, added: a long log's torques are held once.
-/// @param to samples x joints
-void add_prediction(double factor, const IdentifiedModel& model, const ProcessedLog& log, Eigen::MatrixXd& to);
+/// @param to samples x joints, or as many of these as are asked for @param first of them
+void add_prediction(double factor, const IdentifiedModel& model, const ProcessedLog& log, Eigen::MatrixXd& to,
+                    Eigen::Index first = 0);
+/// The column of one joint: a long log's torques are not held at all.
+Eigen::VectorXd predict_joint(const IdentifiedModel& model, const ProcessedLog& log, std::size_t joint);
 
 /// Rigid-body torque of the model over each log as the effects of a tick see it: after deflections, with the log's
 /// known load, at the motion's own times.

@@ -128,7 +128,11 @@ FitData make_fit_data(const Robot& robot, const std::vector<ProcessedLog>& logs,
   Index rows = 0;
   for (const ProcessedLog& log : logs) {
     data.first_row.push_back(rows);
-    log_rows.push_back({log.role, log.rows()});
+    if (log.continues && !log_rows.empty()) {
+      log_rows.back().rows += log.rows();
+    } else {
+      log_rows.push_back({log.role, log.rows()});
+    }
     rows += log.rows();
   }
   check_length(log_rows, n, static_cast<Index>(columns.size()) + own_parameters);
@@ -136,6 +140,7 @@ FitData make_fit_data(const Robot& robot, const std::vector<ProcessedLog>& logs,
   mark_usable(data, rows);
   data.blocks = make_blocks(log_rows);
   data.split = make_split(log_rows);
+  data.one_recording = log_rows.size() == 1;
   return data;
 }
 

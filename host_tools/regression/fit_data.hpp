@@ -23,6 +23,7 @@ struct FitData {
   std::vector<Eigen::VectorXd> usable;     ///< per joint and row: 0 where saturated, else 1
   std::vector<LogBlock> blocks;
   Split split;
+  bool one_recording = false;  ///< its blocks judge one another
 };
 
 /// `logs` must outlive the result. `own_parameters`: unknowns beside the base parameters.

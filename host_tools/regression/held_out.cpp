@@ -40,7 +40,7 @@ std::vector<Judgement> Fitter::judged(std::size_t first, std::size_t last,
     const Solution solution = solve(assemble(data_->split.fit[fold], all, design));
     for (std::size_t j = first; j < last; ++j) tally.add(j - first, *this, j, fold, *all[j], *design[j], solution);
   }
-  return tally.done(logs().size() == 1);
+  return tally.done(data_->one_recording);
 }
 
 std::vector<Judgement> Fitter::held_out() const { return judged(0, joints(), current(), designs()); }
@@ -120,7 +120,7 @@ std::vector<std::vector<Judgement>> Fitter::held_out_with(std::size_t joint, con
   }
   std::vector<std::vector<Judgement>> out(sizes.size());
   for (std::size_t s = 0; s < sizes.size(); ++s) {
-    for (Tally& tally : tallies[s]) out[s].push_back(tally.done(logs().size() == 1)[0]);
+    for (Tally& tally : tallies[s]) out[s].push_back(tally.done(data_->one_recording)[0]);
   }
   return out;
 }

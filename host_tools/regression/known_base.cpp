@@ -75,7 +75,7 @@ std::vector<Judgement> Fitter::held_out_beside(const Eigen::VectorXd& beta) cons
     const Solution solution = solve_beside(assemble(data_->split.fit[fold], all, used), beta, false);
     for (std::size_t j = 0; j < joints(); ++j) tally.add(j, *this, j, fold, *all[j], *used[j], solution);
   }
-  return tally.done(logs().size() == 1);
+  return tally.done(data_->one_recording);
 }
 
 }  // namespace fxdyn

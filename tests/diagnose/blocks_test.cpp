@@ -58,7 +58,7 @@ TEST(BlocksOfLogs, WithoutValidateLogsAFoldIsAPartOfEveryTrainLog) {
 
 TEST(BlocksOfLogs, WindowsOfARecordingAreOne) {
   std::vector<SessionLog> logs{log(false, true), log(false, true), log(false, true, 30), log(true, true)};
-  logs[1].continues = true;
+  logs[1].log.continues = true;
   const Blocks blocks = make_blocks(logs);
   EXPECT_EQ(blocks.of_log.size(), 4U);
   ASSERT_EQ(blocks.all.size(), 11U);

@@ -63,10 +63,10 @@ class NameBesideMore : public testing::Test {
     gate_.gap = Eigen::VectorXd::Constant(1, 40);
     gate_.of_law = {false};
   }
-  static Finding finding(Certainty certainty, double closure) {
+  static Finding finding(Certainty certainty, double share) {
     Finding out{{false, 0, 0}, 100, {}};
     out.evidence.certainty = certainty;
-    out.evidence.closure = closure;
+    out.evidence.gain = 40 * share;
     return out;
   }
   Certainty certainty(Certainty before = Certainty::established, double closure = 1) {
@@ -87,12 +87,12 @@ class NameBesideMore : public testing::Test {
   std::vector<Likely> likely_;
 };
 
-TEST_F(NameBesideMore, IsNotListed) {
+TEST_F(NameBesideMore, IsLikelyAtMost) {
   EXPECT_EQ(certainty(), Certainty::established);
   gate_.held.excess[0] = 39;
   EXPECT_EQ(certainty(), Certainty::established);
   gate_.held.excess[0] = 41;
-  EXPECT_EQ(certainty(), Certainty::unlisted);
+  EXPECT_EQ(certainty(), Certainty::likely);
 }
 
 TEST_F(NameBesideMore, IsEstablishedWhereTheRestIsNoiseOrTheErrorOfALaw) {
@@ -111,7 +111,7 @@ TEST_F(NameBesideMore, CountsWhatWandersThoughItWasTakenOff) {
   curves_[0]->closes = 0.16;  // of 200 / (1 - 0.16): 38
   EXPECT_EQ(certainty(), Certainty::established);
   curves_[0]->closes = 0.18;  // 44
-  EXPECT_EQ(certainty(), Certainty::unlisted);
+  EXPECT_EQ(certainty(), Certainty::likely);
 }
 
 TEST_F(NameBesideMore, CountsWhatACurveOfTheMotionCloses) {
@@ -121,7 +121,7 @@ TEST_F(NameBesideMore, CountsWhatACurveOfTheMotionCloses) {
   curves_[0]->closes = 0.18;  // of 200: 36
   EXPECT_EQ(certainty(), Certainty::established);
   curves_[0]->closes = 0.22;
-  EXPECT_EQ(certainty(), Certainty::unlisted);
+  EXPECT_EQ(certainty(), Certainty::likely);
 }
 
 TEST_F(NameBesideMore, IsLikelyOnlyAsTheLargerPart) {
@@ -132,12 +132,13 @@ TEST_F(NameBesideMore, IsLikelyOnlyAsTheLargerPart) {
   EXPECT_FALSE(stays_likely(0.4));
   gate_.held.excess[0] = 20;  // 60 are there
   gate_.gap[0] = 60;
-  EXPECT_TRUE(stays_likely(0.6));
+  EXPECT_FALSE(stays_likely(0.6));
+  EXPECT_TRUE(stays_likely(0.8));
   curves_[0].emplace();
   curves_[0]->signal = "t";
   curves_[0]->closes = 0.16;  // 38 more, which the gap has lost
-  EXPECT_FALSE(stays_likely(0.6));
-  EXPECT_TRUE(stays_likely(0.9));
+  EXPECT_FALSE(stays_likely(0.8));
+  EXPECT_TRUE(stays_likely(1.3));
 }
 
 TEST(LeftOver, IsTheExcessWithAnIntervalFromItsStretches) {

@@ -42,6 +42,24 @@ class NamesAtTheGate : public testing::Test {
     outcome_.not_identifiable.resize(7);
     outcome_.look_again(logs_);
   }
+  DiagnosisResult result(const Gate& gate, const std::vector<ProcessedLog>& test = {}) const {
+    const Deflections deflections;
+    const std::vector<std::optional<Impacts>> impacts(6);
+    const Curves curves(6);
+    return verdicts({nominal_,
+                     outcome_.models.current,
+                     outcome_,
+                     gate,
+                     judged_by(gate, *outcome_.problem),
+                     doubtful_shares(*outcome_.problem),
+                     {},
+                     deflections,
+                     impacts,
+                     curves,
+                     still_,
+                     processed_,
+                     test});
+  }
 
   IdentifiedModel nominal_;
   std::vector<SessionLog> logs_;
@@ -70,21 +88,7 @@ TEST_F(NamesAtTheGate, OnlyWhatBringsSomethingStays) {
   EXPECT_TRUE(evidence.there);
   EXPECT_EQ(evidence.certainty, Certainty::established);
 
-  const Deflections no_deflections;
-  const std::vector<std::optional<Impacts>> no_impacts(6);
-  const std::vector<std::optional<CurveResult>> no_curves(6);
-  const std::vector<ProcessedLog> no_test;
-  const json report = to_json(verdicts({nominal_,
-                                        outcome_.models.current,
-                                        outcome_,
-                                        gate,
-                                        {},
-                                        no_deflections,
-                                        no_impacts,
-                                        no_curves,
-                                        still_,
-                                        processed_,
-                                        no_test}));
+  const json report = to_json(result(gate));
   EXPECT_EQ(report.at("verdict"), "explained") << report.dump(1);
   EXPECT_EQ(report.at("gate"), "validate logs");
   const json& joint = report.at("joints").at(1);
@@ -187,20 +191,7 @@ TEST_F(NamesAtTheGate, ANameThatTheTestLogsDoNotBearOutIsToldWithBothErrors) {
     IdentifiedModel robot = nominal_;
     robot.joints[1].effects.push_back(test::effect("ripple", {14}, {ripple, 0.4 * ripple}));
     const std::vector<ProcessedLog> test{test::small_session_log(robot, Role::test, 3).log};
-    const std::vector<std::optional<Impacts>> no_impacts(6);
-    const std::vector<std::optional<CurveResult>> no_curves(6);
-    const Deflections no_deflections;
-    return to_json(verdicts({nominal_,
-                             outcome_.models.current,
-                             outcome_,
-                             gate,
-                             {},
-                             no_deflections,
-                             no_impacts,
-                             no_curves,
-                             still_,
-                             processed_,
-                             test}));
+    return to_json(result(gate, test));
   };
   const json other = joint(-0.5), same = joint(0.5);
   const json &shows = other.at("joints").at(1), &bears_out = same.at("joints").at(1);
@@ -438,24 +429,9 @@ TEST_F(NamesAtTheGate, ATorqueWithoutAListedNameLeavesItsJointUnexplained) {
   const Gate gate = pass(outcome_, nominal_, logs_, still_);
   weigh_evidence(outcome_, gate);
   ASSERT_EQ(outcome_.found.size(), 1U);
-  const Deflections no_deflections;
-  const std::vector<std::optional<Impacts>> no_impacts(6);
-  const std::vector<std::optional<CurveResult>> no_curves(6);
-  const std::vector<ProcessedLog> no_test;
   const auto verdict_with = [&](Certainty certainty) {
     outcome_.found[0].evidence.certainty = certainty;
-    return verdicts({nominal_,
-                     outcome_.models.current,
-                     outcome_,
-                     gate,
-                     {},
-                     no_deflections,
-                     no_impacts,
-                     no_curves,
-                     still_,
-                     processed_,
-                     no_test})
-        .joints[1];
+    return result(gate).joints[1];
   };
   EXPECT_EQ(verdict_with(Certainty::likely).verdict, Verdict::explained);
   const JointDiagnosis nameless = verdict_with(Certainty::unlisted);

@@ -91,7 +91,7 @@ TEST(Windows, BelongToTheirRecording) {
 TEST(Windows, ShortLogsStayWhole) {
   const auto out = cut_up({log_of(1000), log_of(30)}, room_for(4000));
   EXPECT_EQ(out.back().log.samples(), 3001);
-  EXPECT_FALSE(out.back().continues);
+  EXPECT_FALSE(out.back().log.continues);
   Index rows = 0;
   for (const SessionLog& entry : out) rows += 2 * entry.log.rows();
   EXPECT_LE(rows, 4000);
@@ -152,6 +152,67 @@ TEST(Windows, SessionsOfLongLogsHaveTheirColumns) {
     EXPECT_EQ(entry.log.lost_velocity, log.lost_velocity.middleRows(from, count));
     EXPECT_EQ(entry.log.measured_dq.size(), 0);
   }
+}
+
+// What is fitted around the search sees the same seconds, at the rate of the recording.
+TEST(Windows, AreTheSameSecondsOfTheRecording) {
+  ProcessedLog log = long_recording(), shorter = log_of(30, 1000).log;
+  log.filter.excited_hz = 1;  // the search smooths the positions
+  log.first = 80;
+  shorter.filter = log.filter;
+  shorter.role = Role::validate;
+  const SessionOptions options = room_for(7200);
+  std::optional<Session> session;
+  const auto searched = sessions({log, shorter}, {}, session, options);
+  const auto out = windows_as_recorded({log, shorter}, searched, options);
+  ASSERT_EQ(out.size(), searched.size());
+  ASSERT_GT(out.size(), 10U);
+  for (std::size_t w = 0; w + 1 < out.size(); ++w) {
+    const ProcessedLog &seen = searched[w].log, &part = out[w];
+    EXPECT_NEAR(part.t[part.first], seen.t[seen.first], 1e-9);
+    EXPECT_NEAR(part.t[part.last - 1], seen.t[seen.last - 1], 1e-9);
+    EXPECT_GE(part.first, 100);  // the filter's end, and what effects with memory were before
+    const auto from = static_cast<Index>(std::lround(part.t[0] / log.step_s));
+    EXPECT_EQ(part.q, log.q.middleRows(from, part.samples()));
+    EXPECT_EQ(part.tau, log.tau.middleRows(from, part.samples()));
+  }
+  EXPECT_EQ(out.back().q, shorter.q);
+  EXPECT_EQ(out.back().role, Role::validate);
+}
+
+// The first window may begin where the recording does.
+TEST(Windows, OfALogThatIsALittleTooLongAreTheSameSeconds) {
+  const ProcessedLog log = long_recording();
+  const SessionOptions options = room_for(1.94e4);  // of 2 x 9994 rows
+  std::optional<Session> session;
+  const auto searched = sessions({log}, {}, session, options);
+  const auto out = windows_as_recorded({log}, searched, options);
+  ASSERT_GT(out.size(), 40U);
+  EXPECT_LT(out.front().samples(), 2300);
+  for (std::size_t w = 0; w < out.size(); ++w) {
+    EXPECT_TRUE(searched[w].window);
+    EXPECT_EQ(out[w].continues, w > 0);
+    EXPECT_NEAR(out[w].t[out[w].first], searched[w].log.t[searched[w].log.first], 1e-9);
+  }
+}
+
+TEST(Windows, HaveTheRowsOfTheSearchWhereTheWholeLogHasFewer) {
+  ProcessedLog log = long_recording();
+  const SessionOptions options = room_for(7200);
+  std::optional<Session> session;
+  const auto searched = sessions({log}, {}, session, options);
+  const Index interval = std::lround(searched.front().log.decimation * searched.front().log.step_s / log.step_s);
+  log.decimation = 10 * interval;
+  EXPECT_EQ(windows_as_recorded({log}, searched, options).front().decimation, interval);
+  log.decimation = 1;
+  EXPECT_EQ(windows_as_recorded({log}, searched, options).front().decimation, 1);
+}
+
+TEST(Windows, AreNoneOfLogsThatFit) {
+  const ProcessedLog log = long_recording();
+  std::optional<Session> session;
+  const SessionOptions options = room_for(1e6);
+  EXPECT_TRUE(windows_as_recorded({log}, sessions({log}, {}, session, options), options).empty());
 }
 
 TEST(Windows, SessionsStayWholeWhereAJointMovesInNone) {

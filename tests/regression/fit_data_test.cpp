@@ -80,9 +80,25 @@ TEST(Prediction, IsAddedTimesAFactorAtItsOwnTimes) {
     Eigen::MatrixXd rest = logs[0].tau;
     add_prediction(-2, model, logs[0], rest);
     EXPECT_LT((rest - (logs[0].tau - 2 * torque)).norm(), 1e-12 * torque.norm());
+    for (std::size_t j = 0; j < 2; ++j)
+      EXPECT_EQ(predict_joint(model, logs[0], j), torque.col(static_cast<Index>(j))) << j;
     const double off = (torque - logs[0].tau).norm() / torque.norm();
     EXPECT_TRUE(lead_s == 0 ? off < 1e-6 : off > 1e-4) << off;
   }
+}
+
+// Windows of one recording are no trajectories of their own: its blocks judge one another.
+TEST(FitData, PartsOfARecordingAreOneTrajectory) {
+  auto logs = test::processed({test::exact_log(plant, Role::train, 1), test::exact_log(plant, Role::train, 2)});
+  const FitData two = make_fit_data(robot, logs, 0);
+  EXPECT_FALSE(two.one_recording);
+  EXPECT_EQ(two.blocks.size(), 2U);
+  logs[1].continues = true;
+  const FitData one = make_fit_data(robot, logs, 0);
+  EXPECT_TRUE(one.one_recording);
+  EXPECT_EQ(one.blocks.size(), 5U);
+  EXPECT_EQ(one.blocks.back().to, logs[0].rows() + logs[1].rows());
+  EXPECT_EQ(one.first_row, two.first_row);
 }
 
 TEST(FitData, SaturatedRowsAndJointsThatAreLeftOutAreNotUsable) {
