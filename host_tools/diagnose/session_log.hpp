@@ -31,11 +31,11 @@ struct RowCache {
 /// A log of one of the two sessions. Rows are decimated to `log.decimation`.
 struct SessionLog {
   ProcessedLog log;
-  bool healthy = false;    ///< of the baseline
-  bool fits = true;        ///< else it judges only (validate)
-  double age_s = 0;        ///< of the session when the log begins: what drifts has drifted so far
-  double bending_hz = 0;   ///< gears bend by the load of the motion below; 0: of all of it
-  bool window = false;     ///< of a longer recording (in_windows())
+  bool healthy = false;   ///< of the baseline
+  bool fits = true;       ///< else it judges only (validate)
+  double age_s = 0;       ///< of the session when the log begins: what drifts has drifted so far
+  double bending_hz = 0;  ///< gears bend by the load of the motion below; 0: of all of it
+  bool window = false;    ///< of a longer recording (in_windows())
   std::shared_ptr<RowCache> cache = std::make_shared<RowCache>();
 };
 
