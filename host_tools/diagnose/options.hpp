@@ -67,8 +67,8 @@ struct SessionOptions {
   /// Hz; .. and at least that; theory: the drive's tick of 2 ms, at which effects with memory have to hold
   double thinned_hz = 500;
   /// rows of all logs, times joints; what a diagnosis has room for. Longer recordings are looked at in windows; hand:
-  /// 367 s of six joints at 25 rows a second; with 2 000 000 rows of a log half a gigabyte
-  double most_rows = 55'000;
+  /// 333 s of six joints at 25 rows a second; with 2 000 000 rows of a log half a gigabyte
+  double most_rows = 50'000;
   /// s; of all logs together that stay, however many rows a second they have; hand: 160 s and as much of a baseline
   double least_kept_s = 320;
   /// share of its range in the logs; a joint that moves less in the windows would not be known: then none are cut; hand

@@ -116,9 +116,11 @@ class Recording {
     ProcessedLog out;
     out.step_s = recorded_.step_s;
     for (const auto columns : columns_of_log) {
-      if ((recorded_.*columns).size() > 0) out.*columns = (recorded_.*columns).col(joint);
+      if (columns != &ProcessedLog::tau && (recorded_.*columns).size() > 0)
+        out.*columns = (recorded_.*columns).col(joint);
     }
     if (smoothing_) smooth(out, joint, *smoothing_);
+    if (recorded_.tau.size() > 0) out.tau = recorded_.tau.col(joint);  // beside what smooths, it is one more
     return thinned(std::move(out), every_);
   }
 
@@ -181,7 +183,10 @@ std::vector<SessionLog> sessions(const std::vector<ProcessedLog>& now, const std
   for (const ProcessedLog& log : before) recordings.emplace_back(log, true, log.t[0], options);
   std::vector<SessionLog> frames;
   frames.reserve(recordings.size());
-  for (const Recording& recording : recordings) frames.push_back(recording.frame);
+  for (const Recording& recording : recordings) {
+    frames.push_back(recording.frame);
+    frames.back().log.t.resize(0);  // it is planned by numbers of samples
+  }
   keep_alike_rows(frames, options);
   for (std::size_t r = 0; r < frames.size(); ++r) recordings[r].frame.log.decimation = frames[r].log.decimation;
   const Index joints = now.front().q.cols();
