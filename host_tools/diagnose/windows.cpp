@@ -155,12 +155,14 @@ std::vector<std::vector<Window>> plan_windows(const std::vector<SessionLog>& log
         logs, std::max(options.most_rows / static_cast<double>(joints), options.least_kept_s * rows_a_second));
   }
   std::vector<std::vector<Window>> out;
+  out.reserve(logs.size());
   for (const SessionLog& entry : logs) out.push_back(cut(entry.log, most, options));
   return out;
 }
 
 std::vector<std::vector<Window>> whole_logs(const std::vector<SessionLog>& logs) {
   std::vector<std::vector<Window>> out;
+  out.reserve(logs.size());
   for (const SessionLog& entry : logs) out.push_back({whole_of(entry.log)});
   return out;
 }
